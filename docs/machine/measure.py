@@ -11,7 +11,7 @@ import os
 import platform
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
@@ -21,7 +21,7 @@ from typing import Any
 
 from docs.machine.pages import DOCS, ROOT
 from symfric import bench
-from symfric.cli import bench_tables, output
+from symfric.cli import output
 from symfric.cli.bench import SUBJECTS
 from symfric.foundation.files import write_text
 
@@ -58,35 +58,21 @@ def commit() -> str:
     return head.stdout.strip() + " with changes" * bool(changed.stdout.strip())
 
 
-def result_of(subject: str, quick: bool) -> Any:
-    """What `symfric bench SUBJECT` measures."""
-    if subject == "jitter":
-        from symfric.bench.jitter import SCALES, jitter  # noqa: PLC0415
-
-        return jitter(SCALES[1::2] if quick else SCALES)
-    return getattr(bench, f"bench_{subject}")(quick=quick)
-
-
 def measured(subject: str, quick: bool) -> dict[str, Any]:
     """The tables that `symfric bench SUBJECT` prints, with what they were measured on."""
-    tables: list[dict[str, Any]] = []
-
-    def keep(
-        columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "", digits: int = 6
-    ) -> None:
-        shown = [[c if isinstance(c, str) else output.number(c, digits) for c in r] for r in rows]
-        if shown:
-            tables.append({"title": title, "columns": list(columns), "rows": shown})
-
     loads, began = [os.getloadavg()[0]], perf_counter()
-    result = result_of(subject, quick)
+    result = getattr(bench, f"bench_{subject}")(quick=quick)
     loads.append(os.getloadavg()[0])
     spent = perf_counter() - began
-    printed, output.show_table = output.show_table, keep
-    try:
-        getattr(bench_tables, subject)(result)
-    finally:
-        output.show_table = printed
+    tables = [
+        {
+            "title": one.title,
+            "columns": list(one.head),
+            "rows": [[c if isinstance(c, str) else output.number(c) for c in r] for r in one.rows],
+        }
+        for one in result.shown()
+        if not isinstance(one, str) and one.rows
+    ]
     return {
         "title": subject.capitalize(),
         "about": "",

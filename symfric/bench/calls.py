@@ -7,23 +7,23 @@ take turns; ratios are over the first of each task, which is ours.
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from math import nan
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.contenders import buffered, compiled
+from symfric.bench import table
+from symfric.bench.contenders import buffered, compiled, tolerances
 from symfric.bench.timing import interleaved, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.background import wait
 from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
-from symfric.integrator.running.run import Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
@@ -40,9 +40,7 @@ TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)
 FREE = ("mu_s", "mu_d", "k", "v_belt")
 
 
-@final
-@dataclass(frozen=True)
-class CallRow:
+class CallRow(NamedTuple):
     """One way to do a task.
 
     Attributes:
@@ -64,19 +62,26 @@ class CallRow:
 
 @final
 @dataclass(frozen=True, eq=False)
-class CallBenchmark:
+class CallBenchmark(table.Report):
     """All rows of one run of the benchmark."""
 
     rows: tuple[CallRow, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Rows; errors that there are none of are left out."""
-        return {"rows": [{k: v for k, v in asdict(r).items() if v == v} for r in self.rows]}
+        rows = table.plain(self.rows)
+        return {"rows": [{k: v for k, v in row.items() if v is not None} for row in rows]}
+
+    def shown(self) -> Iterator[table.Table | str]:
+        """Each task by each way, and what that costs."""
+        yield table.of(
+            "Processor time; ratio: over the first way of the task", self.rows,
+            {"task": "task", "by": "who", "time [us]": table.shortened("time_us"), "per": "per",
+             "error": table.known_only("error"), "ratio": table.rounded("ratio", 2)},
+        )  # fmt: skip
 
 
-def bench_calls(
-    *, quick: bool = False, progress: Callable[[str, float], None] | None = None
-) -> CallBenchmark:
+def bench_calls(*, quick: bool = False, progress: table.Progress = None) -> CallBenchmark:
     """Measure all tasks on this machine.
 
     Args:
@@ -85,9 +90,7 @@ def bench_calls(
     """
     tasks = (_drive, _arm, _events, _gradient, _signals, _imports)
     rows: list[CallRow] = []
-    for k, task in enumerate(tasks):
-        if progress is not None:
-            progress(task.__name__.strip("_"), k / len(tasks))
+    for task in table.each(tasks, progress, lambda task: task.__name__.strip("_")):
         with unwarned():
             rows += task(quick)
     return CallBenchmark(tuple(rows))
@@ -153,8 +156,7 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
     """CasADi's `rosenbrock`, compiled where there is a compiler, called through its buffer."""
     inputs = input_data(model, {v.name: Hold([0.0, dt], [0.0, 1.0]) for v in model.u}, 0.0, dt)
     whole = system(model, inputs)
-    tolerances = Tolerances(RTOL, 0.1 * RTOL * whole.nominal, 0.0, 10_000_000)
-    problem = peer(whole, inputs, np.zeros(0), tolerances, "rosenbrock")
+    problem = peer(whole, inputs, np.zeros(0), tolerances(whole, RTOL), "rosenbrock")
     solver = ca.integrator("stepping", "rosenbrock", problem.dae, 0.0, dt, problem.options)
     function = compiled(solver)[0] if find_compiler() else solver
     x, z, data = (

@@ -1,15 +1,15 @@
-"""Who solves a mechanism: ours, and CasADi's integrators on the same equations.
+"""Integrators that are compared: ours, CasADi's and SciPy's on the same model, and C by hand.
 
-Each is made for one tolerance and then called as often as the clock wants. Time of a call is what a
-user waits for once everything is built: `simulate` starts from names, solves for a consistent start
-and ends in named signals, CasADi's integrators get that start and end in states. So does our
-compiled loop alone, "symfric loop": to compare with where a run takes some milliseconds or less.
+Each is made for one tolerance and then called as often as needed. A call is what a user waits for
+once everything is built: `simulate` starts from names, solves for a consistent start and ends in
+named signals; the others get that start and end in states. So does our compiled loop alone,
+`loop`, for comparison where a run takes some milliseconds or less.
 """
 
-import os
+import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, cast, final
@@ -18,10 +18,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import find_compiler, no_compiler
+from symfric.bench.timing import FASTEST, compile_time
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.arguments import chosen
-from symfric.integrator.compiled.compiler import FLAGS
+from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import (
     consistent,
     first_guess,
@@ -37,47 +37,57 @@ from symfric.integrator.running.outputs import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
+from symfric.laws import BrownMcPhee
 from symfric.model import Model
+from symfric.scenes import Rabinowicz
 
 Array = NDArray[np.float64]
-Solve = Callable[[], tuple[Array, int]]
-"""() -> watched states at the times, shape (watched, times), and the number of steps."""
-
-FASTEST = (*(f for f in FLAGS if f != "-ffp-contract=off"), "-freciprocal-math")
-"""Others need not round as CasADi's virtual machine does: they get what is quickest."""
+Watched = tuple[str, ...]
+"""Names of states."""
+Solve = Callable[..., tuple[Array, Callable[[], int]]]
+"""Start values by keyword -> watched states at the times, shape (watched, times), and a function
+that counts the steps, which takes no time of the call."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A solver made for one tolerance; `compile_s` is what the C compiler took for it [s]."""
+    """A solver made for one tolerance; `compile_s` is the time of the C compiler for it [s]."""
 
     solve: Solve
     compile_s: float = 0.0
 
 
-def ours(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> Contender:
-    """`simulate` in the compiled engine; the step is compiled once for all tolerances."""
-    end = float(times[-1])
-    # steps are the same every time, and counting them is not what is measured
-    steps = simulate(model, end, rtol=rtol, t_eval=times, backend="compiled").statistics.steps
+def ours(
+    model: Model,
+    times: Array,
+    watched: Watched,
+    rtol: float,
+    backend: str = "compiled",
+    method: str = "auto",
+) -> Contender:
+    """`simulate`, with everything a user pays for; its step is compiled once for all tolerances."""
 
-    def solve() -> tuple[Array, int]:
-        run = simulate(model, end, rtol=rtol, t_eval=times, backend="compiled")
-        return np.array([run[name] for name in watched]), steps
+    def solve(**start: float) -> tuple[Array, Callable[[], int]]:
+        run = simulate(
+            model, float(times[-1]), x0=start, rtol=rtol, t_eval=times, backend=backend,
+            method=method,
+        )  # fmt: skip
+        return np.array([run[name] for name in watched]), lambda: run.statistics.steps
 
     return Contender(solve)
 
 
-def loop(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> Contender:
+def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
     """The compiled loop of `simulate` alone, from a consistent start to states: as peers run."""
-    whole, inputs, y0 = _start(model, times)
+    whole, inputs = equations(model, float(times[-1]))
     made = Integrator(model, inputs, chosen("bench", "auto", rtol))
     engine, end = made.compiled(), float(times[-1])
     rows, work = [whole.names.index(name) for name in watched], made.borrow()
+    begin = _beginning(model, whole)
 
-    def solve() -> tuple[Array, int]:
-        State.begin(work.S, 0.0, first_step(end), y0)
+    def solve(**start: float) -> tuple[Array, Callable[[], int]]:
+        State.begin(work.S, 0.0, first_step(end), begin(**start))
         Given.begin(work.R, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(0))
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
@@ -88,113 +98,149 @@ def loop(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> C
             steps += records.shape[0]
         if reason is not Stop.END:
             raise RuntimeError(f"the step became too small at t = {work.S[State.T]:g} s")
-        return outputs.values[rows], steps
+        return outputs.values[rows], lambda: steps
 
     solve()
     return Contender(solve)
 
 
-def rosenbrock(
-    model: Model, times: Array, watched: tuple[str, ...], rtol: float, explicit: bool
+def casadi(
+    model: Model,
+    times: Array,
+    watched: Watched,
+    rtol: float,
+    plugin: str = "rosenbrock",
+    as_c: bool = True,
+    explicit: bool = False,
 ) -> Contender:
-    """CasADi's `rosenbrock`, compiled whole.
+    """CasADi's integrator `plugin`, its states scaled by nominal values as ours are.
 
     Args:
+        as_c: compile it whole.
         explicit: eliminate the accelerations, x' = ode(x, z), instead of solving for them along
             with multipliers and normal forces.
     """
-    whole, inputs, y0 = _start(model, times)
-    problem = peer(whole, inputs, np.zeros(0), _tolerances(whole, rtol), "rosenbrock")
+    whole, inputs = equations(model, float(times[-1]))
+    problem = peer(whole, inputs, np.zeros(0), tolerances(whole, rtol), "rosenbrock")
     dae, scale, skip = problem.dae, whole.nominal, whole.nx
     if explicit and model.ode is not None and model.holonomic is not None:
         x, z = model.vector("x"), model.vector("z")
         dae = {"x": x, "z": z, "ode": model.ode, "alg": model.alg}
         scale, skip = np.ones(whole.nx), whole.nx + model.holonomic.n
-    solver = ca.integrator("peer", "rosenbrock", dae, 0.0, times.tolist(), problem.options)
-    generated, seconds = compiled(solver)
-    x0, z0 = y0[: whole.nx] / scale, y0[skip : whole.nx + len(whole.algebraic[1])]
+    options: dict[str, Any] = dict(problem.options)
+    if plugin != "rosenbrock":
+        options["quad_err_con"] = True
+    solver = ca.integrator("peer", plugin, dae, 0.0, times.tolist(), options)
+    run, seconds = compiled(solver) if as_c else (solver, 0.0)
+    call, find = _from_start_to_states(run)
     rows = [whole.names.index(name) for name in watched]
-    solver(x0=x0, z0=z0)
-    steps = int(solver.stats()["n_steps"])
+    begin = _beginning(model, whole)
 
-    whole_call = _of_one_argument(generated, x0.size, z0.size)
-    given, call, ends = buffered(whole_call)
-    given[:] = np.concatenate([x0, z0])
-    found = ends.reshape(times.size, -1).T
+    @cache
+    def scaled(**start: float) -> Array:
+        y0 = begin(**start)
+        z0 = y0[skip : whole.nx + len(whole.algebraic[1])]
+        return np.concatenate([y0[: whole.nx] / scale[: whole.nx], z0])
 
-    def solve() -> tuple[Array, int]:
-        call()
-        return found[rows] * scale[rows, None], steps
+    def solve(**start: float) -> tuple[Array, Callable[[], int]]:
+        given = scaled(**start)
+
+        def count() -> int:
+            if as_c:
+                solver(x0=given[: whole.nx], z0=given[whole.nx :])
+            stats = solver.stats()
+            return int(stats.get("n_steps", stats.get("nsteps", 0)))
+
+        states = call(given) if as_c else find(given)
+        return states.reshape(times.size, -1).T[rows] * scale[rows, None], count
 
     return Contender(solve, seconds)
 
 
-def _of_one_argument(solver: ca.Function, n_x: int, n_z: int) -> ca.Function:
-    """The integrator as a Function from its start (x0, z0) to all states at the times."""
+def _from_start_to_states(
+    solver: ca.Function,
+) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+    """An integrator from (x0, z0) to all states at the times: through buffers, and as it is."""
+    n_x, n_z = solver.numel_in("x0"), solver.numel_in("z0")
     x, z = ca.MX.sym("x0", n_x), ca.MX.sym("z0", n_z)
-    return ca.Function("start_to_states", [ca.vertcat(x, z)], [solver(x0=x, z0=z)["xf"]])
+    whole = ca.Function("start_to_states", [ca.vertcat(x, z)], [solver(x0=x, z0=z)["xf"]])
+    given, evaluate, ends = buffered(whole)
+
+    def call(start: Array) -> Array:
+        given[:] = start
+        evaluate()
+        return ends.copy()
+
+    def find(start: Array) -> Array:
+        return solver(x0=start[:n_x], z0=start[n_x:])["xf"].full().ravel("F")
+
+    return call, find
 
 
-def buffered(
-    function: ca.Function, argument: str | int = 0, result: str | int = 0
-) -> tuple[Array, Callable[[], None], Array]:
-    """One argument, call and one result of a Function, without conversions; all others are zero."""
-    a = function.index_in(argument) if isinstance(argument, str) else argument
-    r = function.index_out(result) if isinstance(result, str) else result
-    given, found = np.zeros(function.numel_in(a)), np.zeros(function.numel_out(r))
-    buffer, call = cast(tuple[Any, Any], function.buffer())
-    buffer.set_arg(a, flat_view(given))
-    buffer.set_res(r, flat_view(found))
-
-    def evaluate(_: object = buffer) -> None:
-        # the raw call does not keep its buffer alive; the default argument does
-        call()
-
-    return given, evaluate, found
-
-
-def idas(model: Model, times: Array, watched: tuple[str, ...], rtol: float, name: str) -> Contender:
+def idas(model: Model, times: Array, watched: Watched, rtol: float, name: str) -> Contender:
     """SUNDIALS' idas, which cannot be compiled: "sundials" for index 1, "ggl" for index 2.
 
     Raises:
         RuntimeError: it fails.
     """
-    whole, inputs, y0 = _start(model, times)
-    problem = peer(whole, inputs, np.zeros(0), _tolerances(whole, rtol), name)
+    whole, inputs = equations(model, float(times[-1]))
+    problem = peer(whole, inputs, np.zeros(0), tolerances(whole, rtol), name)
+    y0 = _beginning(model, whole)()
     y0 = np.concatenate([y0, np.zeros(problem.system.n - whole.n)])
     solver, data = problem.over(np.concatenate([[0.0], times]), y0)
-    columns = problem.system.algebraic[1]
-    x0, z0 = y0[: whole.nx] / whole.nominal, y0[columns]
+    x0, z0 = y0[: whole.nx] / whole.nominal, y0[problem.system.algebraic[1]]
     rows = [whole.names.index(name) for name in watched]
 
-    def solve() -> tuple[Array, int]:
+    def solve() -> tuple[Array, Callable[[], int]]:
         found = solver(x0=x0, z0=z0, u=data)["xf"].full()
-        return found[rows] * whole.nominal[rows, None], int(solver.stats()["nsteps"])
+        return found[rows] * whole.nominal[rows, None], lambda: int(solver.stats()["nsteps"])
 
     solve()
     return Contender(solve)
 
 
-def _tolerances(whole: System, rtol: float) -> Tolerances:
-    return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
+def scipy(model: Model, times: Array, watched: Watched, rtol: float, method: str) -> Contender:
+    """SciPy's `solve_ivp` with right-hand side and exact Jacobian from CasADi buffers.
+
+    Raises:
+        ModuleNotFoundError: SciPy is not installed.
+    """
+    from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
+
+    whole, _ = equations(model, float(times[-1]))
+    rows = [whole.names.index(name) for name in watched]
+    y, f_call, slope = buffered(ca.Function("f", [whole.y], [ca.densify(whole.f)]))
+    jacobian = ca.Function("j", [whole.y], [ca.densify(ca.jacobian(whole.f, whole.y))])
+    y_too, j_call, matrix = buffered(jacobian)
+
+    def right(_: float, state: Array) -> Array:
+        y[:] = state
+        f_call()
+        return slope.copy()
+
+    def derivative(_: float, state: Array) -> Array:
+        y_too[:] = state
+        j_call()
+        return matrix.reshape(whole.n, whole.n).T.copy()
+
+    def solve(**start: float) -> tuple[Array, Callable[[], int]]:
+        found = solve_ivp(
+            right, (0.0, float(times[-1])), model.initial_state(start), method=method, rtol=rtol,
+            atol=0.1 * rtol * whole.nominal, t_eval=times, jac=derivative,
+        )  # fmt: skip
+        return found.y[rows], lambda: int(found.nfev)
+
+    return Contender(solve)
 
 
-def _start(model: Model, times: Array) -> tuple[System, InputData, Array]:
-    """System, inputs and consistent start of a model without parameters and inputs."""
-    inputs = input_data(model, None, 0.0, float(times[-1]))
-    whole = system(model, inputs)
-    y = first_guess(whole, model, model.initial_state())
-    return whole, inputs, consistent(whole, "bench", y, np.zeros(whole.d.numel()))
-
-
-MAKERS: dict[str, tuple[str, Callable[..., Contender]]] = {
+MECHANISMS: dict[str, tuple[str, Callable[..., Contender]]] = {
     "symfric": ("joint", ours),
     "symfric loop": ("joint", loop),
     "symfric absolute": ("absolute", ours),
-    "rosenbrock absolute": ("absolute", partial(rosenbrock, explicit=False)),
-    "rosenbrock absolute ode": ("absolute", partial(rosenbrock, explicit=True)),
-    "rosenbrock joint": ("joint", partial(rosenbrock, explicit=False)),
-    "rosenbrock joint ode": ("joint", partial(rosenbrock, explicit=True)),
+    "rosenbrock absolute": ("absolute", casadi),
+    "rosenbrock absolute ode": ("absolute", partial(casadi, explicit=True)),
+    "rosenbrock joint": ("joint", casadi),
+    "rosenbrock joint ode": ("joint", partial(casadi, explicit=True)),
     "idas GGL absolute": ("absolute", partial(idas, name="ggl")),
     "idas GGL joint": ("joint", partial(idas, name="ggl")),
     "idas absolute": ("absolute", partial(idas, name="sundials")),
@@ -203,28 +249,132 @@ MAKERS: dict[str, tuple[str, Callable[..., Contender]]] = {
 """Name -> formulation, and how a solver is made of its model; "ode": accelerations eliminated."""
 
 
+def equations(model: Model, end: float) -> tuple[System, InputData]:
+    """The equations of a model without inputs, from 0 to `end` [s]."""
+    inputs = input_data(model, None, 0.0, end)
+    return system(model, inputs), inputs
+
+
+def tolerances(whole: System, rtol: float) -> Tolerances:
+    """Those of peers: absolute ones a tenth of the relative one times nominal values."""
+    return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
+
+
+def _beginning(model: Model, whole: System) -> Callable[..., Array]:
+    """Start values by keyword -> all unknowns, consistent; kept, as it is not what is measured."""
+
+    @cache
+    def begin(**start: float) -> Array:
+        y = first_guess(whole, model, model.initial_state(start))
+        return consistent(whole, "bench", y, np.zeros(whole.d.numel()))
+
+    return begin
+
+
+def buffered(function: ca.Function) -> tuple[Array, Callable[[], None], Array]:
+    """First argument, call and first result of a Function, without conversions."""
+    given, found = np.zeros(function.numel_in(0)), np.zeros(function.numel_out(0))
+    buffer, call = cast(tuple[Any, Any], function.buffer())
+    buffer.set_arg(0, flat_view(given))
+    buffer.set_res(0, flat_view(found))
+
+    def evaluate(_: object = buffer) -> None:
+        # the raw call does not keep its buffer alive; the default argument does
+        call()
+
+    return given, evaluate, found
+
+
 def compiled(function: ca.Function) -> tuple[ca.Function, float]:
-    """`function` from generated C, and what the compiler took [s]; never from a cache.
+    """`function` from generated C, and the time of the compiler [s]; never from a cache.
 
     Raises:
         CompileError: no compiler.
     """
     generator = ca.CodeGenerator(f"{function.name()}.c")
     generator.add(function)
-    source = generator.dump()
     with TemporaryDirectory() as folder:
-        library = Path(folder) / "generated.so"
-        seconds = compile_time(source, library)
-        return ca.external(function.name(), str(library)), seconds
+        shared = Path(folder) / "generated.so"
+        seconds = compile_time(generator.dump(), shared)
+        return ca.external(function.name(), str(shared)), seconds
 
 
-def compile_time(source: str, target: str | Path = os.devnull) -> float:
-    """Processor time [s] of the C compiler on `source`, with the flags that suit it best."""
-    compiler = find_compiler()
-    if compiler is None:
-        raise no_compiler()
-    before = os.times()
-    compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
-    after = os.times()
-    user = after.children_user - before.children_user
-    return user + after.children_system - before.children_system
+class ByHand:
+    """Rabinowicz's stick-slip with Brown-McPhee friction in C by hand: a bound for general codes.
+
+    RADAU5 (Hairer and Wanner, IV.8) for this one equation of two states: derivatives by hand, 2 by
+    2 systems in closed form, derivatives kept while Newton's method converges fast, the collocation
+    polynomial as dense output and first guess, Gustafsson's controller. Nothing is checked.
+
+    Raises:
+        CompileError: there is no compiler, or it failed.
+    """
+
+    def __init__(self, scene: Rabinowicz) -> None:
+        law = scene.law
+        if not isinstance(law, BrownMcPhee) or law.mu_v:
+            raise ValueError(f"by_hand: expected BrownMcPhee without viscous part, got {law!r}")
+        given = {name: getattr(law, name) for name in ("mu_s", "mu_d", "v_t")}
+        given |= {name: getattr(scene, name) for name in ("m", "k", "v_belt", "g")}
+        numbers = [f"#define P_{n} {float(x)!r}\n" for n, x in (given | collocation()).items()]
+        source = "".join(numbers) + Path(__file__).with_name("by_hand.c").read_text("utf-8")
+        self._run = ctypes.CDLL(str(library(source, "by_hand", flags=FASTEST))).by_hand
+        self._run.restype = ctypes.c_longlong
+        self._run.argtypes = [
+            *[ctypes.c_double] * 3, ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 2,
+        ]  # fmt: skip
+
+    def __call__(self, v: float, times: Array, rtol: float) -> tuple[Array, int]:
+        """Position [m] and velocity [m/s] at `times` > 0 [s], shape (2, times), and steps.
+
+        Args:
+            v: velocity at the start [m/s]; the position is 0.
+            times: increasing.
+            rtol: relative tolerance; absolute ones are 0.1 rtol times 0.1 m and 0.1 m/s.
+        """
+        found, steps = np.empty((2, times.size)), np.zeros(1, dtype=np.int64)
+        if self._run(
+            v, rtol, 0.01 * rtol, times.ctypes.data, times.size, found.ctypes.data,
+            steps.ctypes.data,
+        ):  # fmt: skip
+            raise RuntimeError("by_hand: expected a solution, got steps that shrink to nothing")
+        return found, int(steps[0])
+
+
+def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
+    """`ByHand` with the default numbers of scene and law, of which `model` is made."""
+    del model, watched  # its position
+    run = ByHand(Rabinowicz(BrownMcPhee()))
+
+    def solve(v: float) -> tuple[Array, Callable[[], int]]:
+        found, steps = run(v, times, rtol)
+        return found[:1], lambda: steps
+
+    return Contender(solve)
+
+
+def collocation() -> dict[str, float]:
+    """Constants of the three-stage method of Radau: T^-1 A^-1 T is one real and one complex block.
+
+    Source: Hairer and Wanner, IV.8.
+    """
+    r = np.sqrt(6.0)
+    A = np.array(
+        [
+            [(88 - 7 * r) / 360, (296 - 169 * r) / 1800, (-2 + 3 * r) / 225],
+            [(296 + 169 * r) / 1800, (88 + 7 * r) / 360, (-2 - 3 * r) / 225],
+            [(16 - r) / 36, (16 + r) / 36, 1 / 9],
+        ]
+    )
+    values, vectors = np.linalg.eig(np.linalg.inv(A))
+    real, pair = int(np.argmin(np.abs(np.imag(values)))), int(np.argmax(np.imag(values)))
+    # (a + ib)(w2 + i w3) in the plane of Re and -Im of the eigenvector of a + ib
+    plane = vectors[:, pair]
+    T = np.column_stack([np.real(vectors[:, real]), np.real(plane), -np.imag(plane)])
+    found = {"gamma": np.real(values[real]), "alpha": np.real(values[pair])}
+    found |= {"beta": np.imag(values[pair])}
+    for name, matrix in (("T", T), ("TI", np.linalg.inv(T))):
+        found |= {f"{name}{i}{j}": matrix[i, j] for i in range(3) for j in range(3)}
+    found |= {"c1": (4 - r) / 10, "c2": (4 + r) / 10}
+    found |= {"e1": -(13 + 7 * r) / 3, "e2": (-13 + 7 * r) / 3, "e3": -1 / 3}
+    return {name: float(value) for name, value in found.items()}

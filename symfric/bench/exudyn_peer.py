@@ -41,7 +41,7 @@ def slider_crank(scene: SliderCrank, law: BrownMcPhee, times: Array, steps: int)
         system.SolveDynamic(_settings(exu, 1, TINY, TINY), solverType=_method(exu))
         multipliers = system.systemData.GetAECoordinates()
 
-    def solve() -> tuple[Array, int]:
+    def solve() -> tuple[Array, Callable[[], int]]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             fresh, sensor = _system(exu, scene, law)
@@ -49,7 +49,7 @@ def slider_crank(scene: SliderCrank, law: BrownMcPhee, times: Array, steps: int)
             settings = _settings(exu, steps, float(times[-1]), float(times[1] - times[0]))
             fresh.SolveDynamic(settings, solverType=_method(exu))
             found = np.array(fresh.GetSensorStoredData(sensor))
-        return np.interp(times, found[:, 0], found[:, 1])[None], steps
+        return np.interp(times, found[:, 0], found[:, 1])[None], lambda: steps
 
     return Contender(solve)
 

@@ -1,25 +1,42 @@
-"""Identification against its goals: who finds the truth, from where, and at what cost."""
+"""Identification and its goals: who finds the truth, from where, and at what cost."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+import tempfile
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from importlib import import_module
-from math import isfinite, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, final
+from time import process_time
+from typing import TYPE_CHECKING, Literal, NamedTuple, final
 
+from identification import Dataset, Fit, Fitted, InverseDynamics
+from symfric.bench import table
+from symfric.bench.file_campaign import File, campaign
 from symfric.foundation.parameters import check_names
+from symfric.foundation.status import SolveError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CASES = ("lugre", "coverage", "emps", "laws", "franka", "starts", "gms", "files")
-"""Modules `symfric.bench.identification_<case>`, each with `measure(quick) -> rows`."""
-Tell = Callable[[str, float], None]
+
+CASES = {
+    "lugre": "memory",
+    "coverage": "repeats",
+    "emps": "measured",
+    "laws": "measured",
+    "franka": "measured",
+    "starts": "repeats",
+    "gms": "memory",
+    "files": "",
+}
+"""Case -> module `symfric.bench.identification_<module>`, this one for none, whose function of the
+name of the case measures its rows: `case(quick)`."""
 
 
 @final
 @dataclass(frozen=True)
-class Row:
+class Row(table.Judged):
     """One measured number beside its goal.
 
     Attributes:
@@ -38,66 +55,160 @@ class Row:
     seconds: float
     note: str = ""
 
-    @property
-    def met(self) -> bool:
-        """Whether the goal is met; NaN meets none."""
-        return self.value <= self.goal if self.better == "<=" else self.value >= self.goal
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything by name; what was not measured is None."""
-        return (
-            asdict(self)
-            | {"value": self.value if isfinite(self.value) else None}
-            | {"met": self.met}
-        )
-
 
 @final
 @dataclass(frozen=True, eq=False)
-class IdentificationBenchmark:
+class IdentificationBenchmark(table.Report):
     """What was measured, case by case."""
 
     rows: tuple[Row, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Rows as dictionaries."""
-        return {"rows": [row.to_dict() for row in self.rows]}
+    def shown(self) -> Iterator[table.Table | str]:
+        """Numbers and their goals."""
+        yield table.of(
+            "Identification beside its goals", self.rows,
+            {"case": "case", "what": "what", "measured": table.known_only("value"),
+             "goal": lambda r: f"{r.better} {r.goal:g}",
+             "met": lambda r: "yes" if r.met else "no", "cpu [s]": table.rounded("seconds", 1),
+             "note": "note"},
+        )  # fmt: skip
 
     def plot(self, path: str | Path) -> "Figure":
         """How far each number is from its goal; right of the line it is worse."""
         from symfric.bench.pictures import plot_goals  # noqa: PLC0415  (matplotlib is slow)
 
-        known = [row for row in self.rows if row.value > 0 and row.goal > 0]
-        side = {"<=": 1.0, ">=": -1.0}
-        return plot_goals(
-            [f"{row.case}: {row.what}" for row in known],
-            [side[row.better] * log10(row.value / row.goal) for row in known],
-            [row.met for row in known],
-            path,
-        )
+        return plot_goals(((f"{row.case}: {row.what}", row) for row in self.rows), path)
 
 
 def bench_identification(
-    *, quick: bool = False, cases: tuple[str, ...] = CASES, progress: Tell | None = None
+    *,
+    quick: bool = False,
+    cases: Sequence[str] = tuple(CASES),
+    progress: table.Progress = None,
 ) -> IdentificationBenchmark:
-    """Measure `cases`; `quick` takes fewer seeds. Ctrl-C leaves the rows that there are.
+    """Measure `cases`; `quick` takes fewer seeds. Ctrl-C returns the rows so far.
 
     Raises:
         ValueError: an unknown case.
     """
     check_names("bench identification: cases", cases, CASES)
-    rows = list[Row]()
+    every = table.each(cases, progress, str)
+    rows = (row for case in every for row in _measure_of(case)(quick))
+    return IdentificationBenchmark(table.until_stopped(rows))
+
+
+def _measure_of(case: str) -> Callable[[bool], Iterator[Row]]:
+    module = CASES[case]
+    if not module:
+        return files
+    return getattr(import_module(f"symfric.bench.identification_{module}"), case)
+
+
+TRUTH = {"m": 95.0, "offset": -3.0, "mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
+CLOSE = 0.05
+"""Relative error of a parameter that counts as right."""
+EVERY = 5
+"""Of so many files one is tried where it has to be quick."""
+
+
+class Outcome(NamedTuple):
+    """How a file ended.
+
+    Attributes:
+        file: its name.
+        truth: "good", "bad" or "hidden".
+        kind: "refused", "flagged", "right", "silent" or "crashed".
+        sentence: what was said.
+    """
+
+    file: str
+    truth: str
+    kind: str
+    sentence: str
+
+
+def outcomes(quick: bool = False, seed: int = 3) -> Iterator[Outcome]:
+    """Every file of the campaign, one after the other."""
+    with tempfile.TemporaryDirectory() as folder:
+        for k, file in enumerate(campaign(seed)):
+            if not quick or k % EVERY == 0:
+                yield outcome(file, Path(folder))
+
+
+def outcome(file: File, folder: Path) -> Outcome:
+    """What becomes of one file."""
+    path = folder / f"log{file.suffix}"
+    path.write_bytes(file.content)
     try:
-        for row in _measured(cases, quick, progress):
-            rows.append(row)
-    except KeyboardInterrupt:
-        if not rows:
-            raise
-    return IdentificationBenchmark(tuple(rows))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            kind, sentence = _judged(path, file)
+    except (ValueError, SolveError) as error:
+        kind, sentence = "refused", str(error)
+    except Exception as error:  # noqa: BLE001  (whatever it is, it is counted and shown)
+        kind, sentence = "crashed", f"{type(error).__name__}: {error}"
+    return Outcome(file.name, file.truth, kind, sentence)
 
 
-def _measured(cases: tuple[str, ...], quick: bool, progress: Tell | None) -> Iterator[Row]:
-    for k, case in enumerate(cases):
-        if progress is not None:
-            progress(case, k / len(cases))
-        yield from import_module(f"symfric.bench.identification_{case}").measure(quick)
+def _judged(path: Path, file: File) -> tuple[str, str]:
+    data = Dataset.read(path, **file.said)
+    findings = data.check()
+    if findings.errors:
+        return "refused", findings.errors[0].sentence
+    if {"gap", "irregular"} & set(findings.kinds):  # as the findings say
+        data = data.resampled()
+    fit = Fit(InverseDynamics(), "stribeck", data).solve()
+    wrong = [name for name in TRUTH if not _is_close(fit, name)]
+    if not fit.verdict.good:
+        return "flagged", fit.message
+    if not wrong:
+        return "right", fit.message
+    if findings.warnings:
+        return "flagged", f"{findings.warnings[0].sentence} Wrong: {', '.join(wrong)}."
+    told = ", ".join(f"{name} {fit.values[name]:.4g}" for name in wrong)
+    return "silent", f"{fit.message} Wrong: {told}."
+
+
+def _is_close(fit: Fitted, name: str) -> bool:
+    """Whether a parameter is right, or is said not to be told by the data."""
+    estimate = fit.parameters[name]
+    error = abs(estimate.value - TRUTH[name])
+    low, high = estimate.low, estimate.high
+    inside = low is not None and high is not None and low <= TRUTH[name] <= high
+    return error <= CLOSE * abs(TRUTH[name]) or inside
+
+
+def files(quick: bool = False) -> Iterator[Row]:
+    """Rows of the bench: files answered wrongly in silence, crashes, good files that are right.
+
+    Each file of `symfric.bench.file_campaign` is read, checked and fitted by inverse dynamics with
+    a Stribeck law, as a stranger would. It ends as
+
+        refused   the reader, the fit or the status says in a sentence why there is no result,
+        flagged   there is a result, but the data or the residuals say that it is not to be trusted,
+        right     every parameter within 5 % or its 95 % interval of the truth,
+        silent    a wrong result without a word,
+        crashed   an error that is no sentence.
+
+    Of good files all must be right, of bad ones none silent. What no file can show is listed in
+    `file_campaign` and counted apart.
+    """
+    begun = process_time()
+    found = list(outcomes(quick))
+    seconds = process_time() - begun
+    counts = Counter((o.truth, o.kind) for o in found)
+    silent = [o.file for o in found if o.truth == "bad" and o.kind == "silent"]
+    good = [o for o in found if o.truth == "good"]
+    lost = [o.file for o in good if o.kind != "right"]
+    bad = sum(o.truth == "bad" for o in found)
+    hidden = sum(o.truth == "hidden" for o in found)
+    refused, flagged = counts["bad", "refused"], counts["bad", "flagged"]
+    note = f"{bad} bad: {refused} refused, {flagged} flagged, {counts['bad', 'right']} right"
+    yield Row("files", "bad files wrong in silence", len(silent), 0, "<=", seconds,
+              "; ".join([note, *silent]))  # fmt: skip
+    yield Row("files", "good files right", (len(good) - len(lost)) / max(len(good), 1), 1.0, ">=",
+              0.0, ", ".join(lost))  # fmt: skip
+    crashed = [o.file for o in found if o.kind == "crashed"]
+    yield Row("files", "crashes", len(crashed), 0, "<=", 0.0, ", ".join(crashed))
+    yield Row("files", "files", len(found), 20 if quick else 100, ">=", 0.0,
+              f"{hidden} with what no file can show")  # fmt: skip

@@ -1,27 +1,31 @@
-"""Run time against error of ours and other integrators on Rabinowicz's stick-slip."""
+"""Run time against error on Rabinowicz's stick-slip, ours and other integrators; derivatives."""
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, suppress
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
+from io import StringIO
 from math import exp, log, nan
 from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench import peers
-from symfric.bench.by_hand import ByHand
+from symfric.bench import contenders, table
+from symfric.bench.contenders import Contender, equations, tolerances
 from symfric.bench.ensemble import EnsembleRow, measure_ensemble
-from symfric.bench.sensitivities import SensitivityRow, measure_sensitivities
 from symfric.bench.timing import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
+from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model
-from symfric.scenes import Rabinowicz, rabinowicz
+from symfric.results.trajectory import Trajectory
+from symfric.scenes import rabinowicz
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,16 +40,14 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 ERRORS = (1e-4, 1e-5, 1e-7)
 
 
-@final
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One integrator at one tolerance.
 
     Attributes:
         error: median over the start velocities of the largest position error at 400 times,
             relative to the largest position.
         time_s: median over them of the shortest processor time of a call [s].
-        steps: median number of steps (evaluations for SciPy, 0 for compiled peers).
+        steps: median number of steps (evaluations for SciPy).
     """
 
     case: str
@@ -56,9 +58,33 @@ class Row:
     steps: int
 
 
+class SensitivityRow(NamedTuple):
+    """Derivatives of the end of a run by some parameters.
+
+    Attributes:
+        case: scene and law.
+        integrator: who computed them.
+        parameters: how many.
+        rtol: tolerance.
+        plain_s: time [s] of the run alone.
+        forward, adjoint: time of the run with derivatives over that of the run alone; forward
+            those of all states, adjoint the gradient of the position; None where it failed.
+        error: largest relative error of a derivative of the position.
+    """
+
+    case: str
+    integrator: str
+    parameters: int
+    rtol: float
+    plain_s: float
+    forward: float
+    adjoint: float | None
+    error: float
+
+
 @final
 @dataclass(frozen=True, eq=False)
-class Benchmark:
+class Benchmark(table.Report):
     """All rows of one run of the benchmark.
 
     Attributes:
@@ -97,129 +123,120 @@ class Benchmark:
         return exp(log(t0) + share * (log(t1) - log(t0)))
 
     def ratios(self, reference: str = "symfric compiled") -> list[dict[str, Any]]:
-        """Time of every integrator divided by that of `reference`, at equal error."""
-        names = list(dict.fromkeys(r.integrator for r in self.rows))
+        """Time of every integrator over that of `reference` at equal error, where both reach it."""
         found: list[dict[str, Any]] = []
         for case in dict.fromkeys(r.case for r in self.rows):
             for error in ERRORS:
                 base = self.time_at(case, reference, error)
-                found += [
-                    {
-                        "case": case,
-                        "error": error,
-                        "integrator": name,
-                        "time_s": self.time_at(case, name, error),
-                        "ratio": self.time_at(case, name, error) / base,
-                    }
-                    for name in names
-                ]
+                for name in dict.fromkeys(r.integrator for r in self.rows):
+                    time = self.time_at(case, name, error)
+                    row = {"case": case, "error": error, "integrator": name, "time_s": time}
+                    found += [row | {"ratio": time / base}] if time / base == time / base else []
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """Rows, ratios (those that were reached), what was skipped, first results and the rest."""
-        ratios = [r for r in self.ratios() if r["ratio"] == r["ratio"]]
-        return {
-            "rows": [asdict(row) for row in self.rows],
-            "ratios": ratios,
-            "skipped": self.skipped,
-            "first": self.first,
-            "ensemble": [asdict(row) for row in self.ensemble],
-            "sensitivities": [asdict(row) for row in self.sensitivities],
-        }
+        """Everything as plain data."""
+        return table.plain(self) | {"ratios": table.plain(self.ratios())}
+
+    def shown(self) -> Iterator[table.Table | str]:
+        """Runs, ratios, ensembles and derivatives."""
+        yield table.of(
+            "Time of a run of 20 s against its error", self.rows,
+            {"case": "case", "integrator": "integrator", "rtol": "rtol",
+             "error": table.shortened("error"), "time [ms]": lambda r: 1e3 * r.time_s,
+             "steps": "steps"},
+        )  # fmt: skip
+        yield table.Table(
+            "At equal error, time over that of symfric compiled",
+            ["case", "error", "integrator", "time [ms]", "ratio"],
+            [[r["case"], r["error"], r["integrator"], 1e3 * r["time_s"], round(r["ratio"], 2)]
+             for r in self.ratios()],
+        )  # fmt: skip
+        yield table.of(
+            "Ensembles; cvodes: time of a Python loop over cvodes at the same rtol over ours",
+            self.ensemble,
+            {"case": "case", "members": "members", "threads": "workers",
+             "us each": table.rounded("member_s", 1, 1e6),
+             "efficiency": table.rounded("efficiency", 2), "cvodes": table.rounded("ratio", 1)},
+        )  # fmt: skip
+        yield table.of(
+            "Derivatives by p parameters: time of the run with them over that of the run alone",
+            self.sensitivities,
+            {"case": "case", "integrator": "integrator", "p": "parameters",
+             "run [ms]": table.rounded("plain_s", 3, 1e3), "forward": table.rounded("forward", 1),
+             "adjoint": lambda r: "failed" if r.adjoint is None else f"{r.adjoint:.1f}"},
+        )  # fmt: skip
+        yield from table.not_run(self.skipped)
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Work-precision diagram: time against error, a panel per case."""
         from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
 
-        lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
-        for row in self.rows:
-            case = lines.setdefault(row.case, {})
-            case.setdefault(row.integrator, []).append((row.error, row.time_s))
-        return plot_work_precision(lines, path)
+        return plot_work_precision(
+            ((r.case, r.integrator, r.error, r.time_s) for r in self.rows), path
+        )
 
 
-def bench_integrator(
-    *, quick: bool = False, progress: Callable[[str, float], None] | None = None
-) -> Benchmark:
+def bench_integrator(*, quick: bool = False, progress: table.Progress = None) -> Benchmark:
     """Measure all integrators that this machine has, in one run.
 
     Args:
         quick: fewer tolerances, start velocities and members, no SciPy; for tests.
         progress: called with what is measured and the fraction done.
     """
-    tolerances = TOLERANCES[2:5] if quick else TOLERANCES
+    rtols = TOLERANCES[2:5] if quick else TOLERANCES
     starts = STARTS[:1] if quick else STARTS
-    everyone, skipped = _kinds(quick)
+    everyone, skipped = _integrators(quick)
     rows: list[Row] = []
-    first: dict[str, dict[str, float]] = {}
-    total, done = len(CASES) * len(everyone), 0
-    for case, law in CASES.items():
-        model, kinds = rabinowicz(law), dict(everyone)
-        if find_compiler() is not None and isinstance(law, BrownMcPhee):
-            kinds["C by hand"] = (_by_hand, 0.0)
-        first[case] = _first(law)
-        reference = [_reference(model, v) for v in starts]
-        for name, (make, most_accurate) in kinds.items():
-            if progress is not None:
-                progress(f"{case}: {name}", done / total)
-            done += 1
-            with unwarned():
-                rows += [
-                    _measure(case, name, rtol, make(model, TIMES, rtol), starts, reference)
-                    for rtol in tolerances
-                    if rtol >= most_accurate
-                ]
+    first = {case: _first(law) for case, law in CASES.items()}
+    models = {case: rabinowicz(law) for case, law in CASES.items()}
+    exact = {case: [_reference(model, v) for v in starts] for case, model in models.items()}
+    tasks = [(case, name) for case in CASES for name in everyone]
+    for case, name in table.each(tasks, progress, ": ".join):
+        make, most_accurate = everyone[name]
+        if name == "C by hand" and not isinstance(CASES[case], BrownMcPhee):
+            continue
+        with unwarned():
+            rows += [
+                _measured(case, name, rtol, make(models[case], TIMES, ("x",), rtol), starts,
+                          exact[case])
+                for rtol in rtols
+                if rtol >= most_accurate
+            ]  # fmt: skip
     many: list[EnsembleRow] = []
     slopes: list[SensitivityRow] = []
-    for case, law in CASES.items():
-        if progress is not None:
-            progress(f"{case}: ensembles and derivatives", 1.0)
+    for case, law in table.each([*CASES.items()], progress, lambda item: f"{item[0]}: derivatives"):
         many += measure_ensemble(case, law, quick)
         slopes += measure_sensitivities(case, law, quick)
     return Benchmark(tuple(rows), skipped, first, tuple(many), tuple(slopes))
 
 
-Maker = Callable[[Model, Array, float], peers.Solve]
+Maker = Callable[..., Contender]
 
 
-def _kinds(quick: bool) -> tuple[dict[str, tuple[Maker, float]], dict[str, str]]:
+def _integrators(quick: bool) -> tuple[dict[str, tuple[Maker, float]], dict[str, str]]:
     """Integrator -> (how to make it, tightest tolerance worth its time); what is missing."""
-    compiler = find_compiler() is not None
-    kinds: dict[str, tuple[Maker, float]] = {}
+    found: dict[str, tuple[Maker, float]] = {}
     skipped: dict[str, str] = {}
-    if compiler:
-        ours = partial(peers.ours, backend="compiled")
-        kinds["symfric compiled"] = (partial(ours, method="auto"), 0.0)
-        kinds["symfric compiled rodas4p"] = (partial(ours, method="rodas4p"), 0.0)
-        kinds["symfric compiled radau5"] = (partial(ours, method="radau5"), 0.0)
-        rosenbrock = partial(peers.casadi, plugin="rosenbrock", compiled=True)
-        kinds["casadi rosenbrock compiled"] = (rosenbrock, 0.0)
+    if find_compiler() is not None:
+        for name, method in (("", "auto"), (" rodas4p", "rodas4p"), (" radau5", "radau5")):
+            found[f"symfric compiled{name}"] = (partial(contenders.ours, method=method), 0.0)
+        found["casadi rosenbrock compiled"] = (contenders.casadi, 0.0)
     else:
-        for name in ("symfric compiled", "casadi rosenbrock compiled"):
-            skipped[name] = "no C compiler"
-    kinds["symfric vm"] = (partial(peers.ours, backend="vm", method="auto"), 0.0)
+        names = ("symfric compiled", "casadi rosenbrock compiled")
+        skipped |= dict.fromkeys(names, "no C compiler")
+    found["symfric vm"] = (partial(contenders.ours, backend="vm"), 0.0)
     for plugin in ("rosenbrock", "cvodes", "idas"):
-        kinds[f"casadi {plugin}"] = (partial(peers.casadi, plugin=plugin, compiled=False), 0.0)
-    if quick:
-        return kinds, skipped
-    if find_spec("scipy") is None:
+        make = partial(contenders.casadi, plugin=plugin, as_c=False)
+        found[f"casadi {plugin}"] = (make, 0.0)
+    if find_spec("scipy") is None and not quick:
         skipped["scipy"] = "not installed"
-    else:
-        kinds["scipy Radau"] = (partial(peers.scipy, method="Radau"), 1e-7)
-        kinds["scipy LSODA"] = (partial(peers.scipy, method="LSODA"), 1e-10)
-    return kinds, skipped
-
-
-def _by_hand(model: Model, times: Array, rtol: float) -> peers.Solve:
-    """Radau5 in C for this equation alone."""
-    del model  # its defaults
-    run = ByHand(Rabinowicz(BrownMcPhee()))
-
-    def solve(v: float) -> tuple[Array, Callable[[], int]]:
-        (x, _), steps = run(v, times, rtol)
-        return x, lambda: steps
-
-    return solve
+    elif not quick:
+        found["scipy Radau"] = (partial(contenders.scipy, method="Radau"), 1e-7)
+        found["scipy LSODA"] = (partial(contenders.scipy, method="LSODA"), 1e-10)
+    if find_compiler() is not None:
+        found["C by hand"] = (contenders.by_hand, 0.0)
+    return found, skipped
 
 
 def _reference(model: Model, v: float) -> Array:
@@ -229,37 +246,107 @@ def _reference(model: Model, v: float) -> Array:
     )["x"]  # fmt: skip
 
 
-def _measure(
+def _measured(
     case: str,
     name: str,
     rtol: float,
-    solve: peers.Solve,
+    contender: Contender,
     starts: tuple[float, ...],
     reference: list[Array],
 ) -> Row:
     errors, seconds, steps = [], [], []
     for v, exact in zip(starts, reference, strict=True):
-        time, (x, count) = best_time(partial(solve, v), clock=process_time)
+        time, ((x,), count) = best_time(partial(contender.solve, v=v), clock=process_time)
         errors.append(float(np.abs(x - exact).max() / np.abs(exact).max()))
         seconds.append(time)
         steps.append(count())
-    return Row(
-        case,
-        name,
-        rtol,
-        float(np.median(errors)),
-        float(np.median(seconds)),
-        int(np.median(steps)),
-    )
+    error, time_s = float(np.median(errors)), float(np.median(seconds))
+    return Row(case, name, rtol, error, time_s, int(np.median(steps)))
 
 
 def _first(law: Law) -> dict[str, float]:
     """Build, compile and run times [s] of a model that was never run, as this machine stands."""
-    result = simulate(
-        rabinowicz(law), T_END, backend="compiled" if find_compiler() else "vm"
-    ).statistics
-    return {
-        "build_s": result.build_time,
-        "compile_or_load_s": result.compile_time,
-        "run_s": result.run_time,
-    }
+    backend = "compiled" if find_compiler() else "vm"
+    result = simulate(rabinowicz(law), T_END, backend=backend).statistics
+    times = (result.build_time, result.compile_time, result.run_time)
+    return dict(zip(("build_s", "compile_or_load_s", "run_s"), times, strict=True))
+
+
+# ---- derivatives: forward and backward over the plain run ----
+
+RTOL, V = 1e-6, 0.02
+FREE = ("mu_s", "mu_d", "k", "m", "v_belt", "g")
+Call = Callable[[], Array]
+
+
+def measure_sensitivities(case: str, law: Law, quick: bool) -> Iterator[SensitivityRow]:
+    """Rows for one parameter and for all, ours in both engines and CasADi's integrators."""
+    for count in (1, len(FREE)):
+        names = FREE[:count]
+        model = rabinowicz(law, free=names)
+        slopes = _run(model, "vm", names, rtol=1e-11).sensitivities
+        exact = np.array([slopes[name]["x"][0] for name in names])
+        for backend in ("compiled", "vm") if find_compiler() else ("vm",):
+            yield _costs(case, f"symfric {backend}", exact, *_of_ours(model, backend, names))
+        for plugin in () if quick else ("rosenbrock", "cvodes"):
+            yield _costs(case, f"casadi {plugin}", exact, *_of_peer(model, plugin))
+
+
+def _costs(
+    case: str, integrator: str, exact: Array, alone: Call, forward: Call, adjoint: Call
+) -> SensitivityRow:
+    base, _ = _repeated(alone)
+    forward_s, found = _repeated(forward)
+    ratio = None
+    with redirect_stderr(StringIO()), suppress(RuntimeError):  # SUNDIALS says more than that
+        ratio = _repeated(adjoint)[0] / base
+    error = float(np.max(np.abs(found / exact - 1)))
+    return SensitivityRow(
+        case, integrator, exact.size, RTOL, base, forward_s / base, ratio, error
+    )  # fmt: skip
+
+
+def _repeated(call: Call) -> tuple[float, Array]:
+    """Shortest time of a call that is not the first: that one builds and compiles."""
+    call()
+    return best_time(call)
+
+
+def _run(model: Model, backend: str, names: tuple[str, ...], rtol: float = RTOL) -> Trajectory:
+    return simulate(
+        model, T_END, x0={"v": V}, rtol=rtol, t_eval=[T_END], backend=backend, sensitivities=names,
+        method="radau5",
+    )  # fmt: skip
+
+
+def _of_ours(model: Model, backend: str, names: tuple[str, ...]) -> tuple[Call, Call, Call]:
+    def forward() -> Array:
+        slopes = _run(model, backend, names).sensitivities
+        return np.array([slopes[name]["x"][0] for name in names])
+
+    return (
+        lambda: _run(model, backend, ())["x"],
+        forward,
+        lambda: np.array(list(_run(model, backend, names).gradient({"x": 1.0}).values())),
+    )
+
+
+def _of_peer(model: Model, plugin: str) -> tuple[Call, Call, Call]:
+    """CasADi's integrator; start values that follow parameters are differentiated along."""
+    whole, inputs = equations(model, T_END)
+    name = "rosenbrock" if plugin == "rosenbrock" else "sundials"
+    values = model.values("p")
+    problem = peer(whole, inputs, values, tolerances(whole, RTOL), name)
+    solver = ca.integrator("solver", plugin, problem.dae, 0.0, T_END, problem.options)
+    p, seed = ca.MX.sym("p", len(model.p)), ca.DM.eye(len(model.p))
+    x0 = model.initial_state({"v": V}) / whole.nominal
+    by_p = model.start_by_parameters({"v": V}) / whole.nominal[:, None]
+    start = x0 + ca.mtimes(ca.DM(by_p), p - ca.DM(values))
+    x = solver(x0=start, p=p)["xf"]
+    ahead = ca.Function("ahead", [p], [ca.jtimes(x, p, seed)])
+    back = ca.Function("back", [p], [ca.gradient(x[0], p)])
+    return (
+        lambda: solver(x0=x0, p=values)["xf"].full(),
+        lambda: ahead(values).full()[0] * whole.nominal[0],
+        lambda: back(values).full(),
+    )

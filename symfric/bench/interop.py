@@ -11,17 +11,18 @@ import contextlib
 import io
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from math import hypot, isfinite
+from math import hypot
 from time import process_time
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.bench import table
 from symfric.integrator import Hold, flow, simulate
 from symfric.laws import GMS, BrownMcPhee, ElastoPlastic, Law, LuGre
 from symfric.model import Model
@@ -47,9 +48,7 @@ LAWS: dict[str, Callable[[], Law]] = {
 QUICK = ("brown_mcphee", "lugre")
 
 
-@final
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """What one tool made of the move.
 
     Attributes:
@@ -93,44 +92,61 @@ class Run:
 
 @final
 @dataclass(frozen=True, eq=False)
-class InteropBenchmark:
+class InteropBenchmark(table.Report):
     """Moves, integrators and what is not installed."""
 
     moves: tuple[Move, ...]
     runs: tuple[Run, ...]
     absent: tuple[str, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Rows by name; numbers that are not there are None."""
-        rows = {"moves": [asdict(m) for m in self.moves], "runs": [asdict(r) for r in self.runs]}
-        return {
-            name: [{k: None if _nan(v) else v for k, v in row.items()} for row in each]
-            for name, each in rows.items()
-        } | {"absent": [*self.absent]}
+    def shown(self) -> Iterator[table.Table | str]:
+        """Moves by tool, route and law; CasADi's integrators; what is absent."""
+        yield table.of(
+            "0.1 m in 1 s against friction: cost, miss by `simulate` with the law itself",
+            self.moves,
+            {"tool": "tool", "route": lambda m: m.route[:7], "law": "law",
+             "J": lambda m: f"{m.cost:.3f}", "miss": table.shortened("miss"), "it.": "iterations",
+             "s": lambda m: f"{m.time_s:.1f}", "": lambda m: _word(m.answer)},
+        )  # fmt: skip
+        yield table.of(
+            "20 s of stick-slip in CasADi's integrators; time over that of symfric without "
+            "compiler",
+            self.runs,
+            {"integrator": "integrator", "law": "law", "error [m]": table.shortened("error"),
+             "time ratio": table.shortened("ratio"), "": "answer"},
+        )  # fmt: skip
+        yield from (f"{tool} is not installed: no rows" for tool in self.absent)
 
 
-def _nan(value: Any) -> bool:
-    return isinstance(value, float) and not isfinite(value)
+def _word(answer: str) -> str:
+    """The words of Ipopt, shorter; nothing where it solved the problem."""
+    known = {
+        "Solve_Succeeded": "",
+        "Maximum_CpuTime_Exceeded": "out of time",
+        "Search_Direction_Becomes_Too_Small": "gave up",
+    }
+    return known.get(answer, answer.replace("_", " ").lower())
 
 
-def bench_interop(
-    *, quick: bool = False, progress: Callable[[str, float], None] | None = None
-) -> InteropBenchmark:
-    """Measure all tools that are installed; `quick`: two laws. Ctrl-C leaves what there is."""
-    tasks = [(tool, route, law) for law in (QUICK if quick else LAWS) for tool, route in ROUTES]
+def bench_interop(*, quick: bool = False, progress: table.Progress = None) -> InteropBenchmark:
+    """Measure all tools that are installed; `quick`: two laws. Ctrl-C returns the rows so far."""
     absent = tuple(tool for tool in ("rockit", "do_mpc") if find_spec(tool) is None)
-    moves, runs = list[Move](), list[Run]()
-    try:
-        for k, (tool, route, law) in enumerate(tasks):
-            if progress is not None:
-                progress(f"{tool}, {route}, {law}", k / (len(tasks) + 1))
-            if tool not in absent:
-                moves.append(move(tool, route, law))
-        runs += [run for law in QUICK for run in integrators(law)]
-    except KeyboardInterrupt:
-        if not moves:
-            raise
-    return InteropBenchmark(tuple(moves), tuple(runs), absent)
+    tasks = [
+        (tool, route, law)
+        for law in (QUICK if quick else LAWS)
+        for tool, route in ROUTES
+        if tool not in absent
+    ]
+
+    def measured() -> Iterator[Move | Run]:
+        for task in table.each(tasks, progress, ", ".join):
+            yield move(*task)
+        for law in QUICK:
+            yield from integrators(law)
+
+    found = table.until_stopped(measured())
+    moves = tuple(row for row in found if isinstance(row, Move))
+    return InteropBenchmark(moves, tuple(row for row in found if isinstance(row, Run)), absent)
 
 
 def move(tool: str, route: str, law: str) -> Move:

@@ -1,16 +1,17 @@
 """Correct digits and run time on problems of others with published solutions."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
-from symfric.bench.problems import PROBLEMS
-from symfric.bench.problems.problem import Problem
+from symfric.bench import table
+from symfric.bench.ivp_mechanisms import PROBLEMS
+from symfric.bench.ivp_problems import Problem
 from symfric.bench.timing import best_time
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.simulate import simulate
@@ -24,9 +25,7 @@ METHODS = ("rodas5p", "radau5")
 TOLERANCES = (1e-6, 1e-8, 1e-10)
 
 
-@final
-@dataclass(frozen=True)
-class IvpRow:
+class IvpRow(NamedTuple):
     """One method on one problem at one tolerance.
 
     Attributes:
@@ -55,38 +54,45 @@ class IvpRow:
 
 @final
 @dataclass(frozen=True, eq=False)
-class IvpBenchmark:
+class IvpBenchmark(table.Report):
     """All rows of one run of the benchmark."""
 
     rows: tuple[IvpRow, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Rows; digits that are none are null."""
-        return {
-            "rows": [
-                {k: None if v in (inf, -inf) else v for k, v in asdict(row).items()}
-                for row in self.rows
-            ],
-            "sources": {problem.name: problem.source for problem in PROBLEMS},
-        }
+        return table.plain(self) | {"sources": {p.name: p.source for p in PROBLEMS}}
+
+    def shown(self) -> Iterator[table.Table | str]:
+        """Digits, steps and times, and the drift of constraints."""
+        run: dict[str, table.Column] = {"problem": "problem", "method": "method", "rtol": "rtol"}
+        yield table.of(
+            "Correct digits of the worst signal at the end", self.rows,
+            {**run, "digits": table.rounded("scd", 1), "wanted": lambda r: r.wanted or "",
+             "steps": "steps", "time [ms]": table.shortened("time_s", 1e3)},
+        )  # fmt: skip
+        yield table.of(
+            "Largest value of a constraint that is kept as an acceleration only",
+            [r for r in self.rows if r.drift],
+            {**run, "drift": table.shortened("drift")},
+        )
+        yield from table.not_run(
+            {f"{r.problem}, {r.method}": r.message for r in self.rows if r.message}
+        )
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Work-precision diagram: time against relative error, a panel per problem."""
         from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
 
-        lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
-        for row in self.rows:
-            if np.isfinite(row.scd):
-                case = lines.setdefault(row.problem, {})
-                case.setdefault(row.method, []).append((10**-row.scd, row.time_s))
-        return plot_work_precision(lines, path, "relative error [1]")
+        points = ((r.problem, r.method, 10**-r.scd, r.time_s) for r in self.rows if r.scd > -inf)
+        return plot_work_precision(points, path, "relative error [1]")
 
 
 def bench_ivp(
     *,
     quick: bool = False,
     problems: Sequence[Problem] = PROBLEMS,
-    progress: Callable[[str, float], None] | None = None,
+    progress: table.Progress = None,
 ) -> IvpBenchmark:
     """Measure all problems.
 
@@ -96,11 +102,9 @@ def bench_ivp(
         progress: called with what is measured and the fraction done.
     """
     rows: list[IvpRow] = []
-    for k, problem in enumerate(problems):
+    for problem in table.each(problems, progress, lambda problem: problem.name):
         model = problem.model()
         for method in METHODS:
-            if progress is not None:
-                progress(f"{problem.name}: {method}", k / len(problems))
             tolerances = TOLERANCES[:1] if quick or method in problem.laborious else TOLERANCES
             rows += [measure(problem, model, method, rtol) for rtol in tolerances]
     return IvpBenchmark(tuple(rows))

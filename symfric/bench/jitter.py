@@ -8,18 +8,18 @@ resolves the transition, and where a fixed explicit step does not, h mu'(0) N / 
 jitter.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.bench import table
 from symfric.figures import FigureData
 from symfric.figures.data import Curve
-from symfric.foundation.style import colour
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
@@ -53,7 +53,7 @@ def jitter(
     fixed_ms: Sequence[float] = FIXED_MS,
     tolerances: Sequence[float] = TOLERANCES,
     t_end: float = T_END,
-    progress: Callable[[str, float], None] | None = None,
+    progress: table.Progress = None,
 ) -> FigureData:
     """Total variation of the accelerations of sliders 1 and 4.
 
@@ -90,31 +90,38 @@ def jitter(
     )
 
 
-def plot_jitter(data: FigureData, path: str | Path | None = None) -> "Figure":
-    """A panel per slider, a colour per way of stepping, the laws by line and marker."""
-    from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
+@final
+@dataclass(frozen=True, eq=False)
+class JitterBenchmark(table.Report):
+    """Total variations of accelerations, see `jitter`."""
 
-    figure, axes = panels(len(data.panels), 7.5, 3.0)
-    cases = list(dict.fromkeys(c.case for c in data.curves))
-    laws = list(dict.fromkeys(c.law for c in data.curves))
-    for axis, (x, y) in zip(axes, data.panels, strict=True):
-        for c in data.curves:
-            law = laws.index(c.law)
-            axis.semilogx(
-                c[x], c[y], "-o" if law == 0 else "--s", color=colour(cases.index(c.case)),
-                linewidth=1.2, markersize=5 if law == 0 else 4, label=c.label,
-                markerfacecolor=None if law == 0 else "none",
-            )  # fmt: skip
-        values = np.concatenate([c[y] for c in data.curves])
-        axis.set_yscale("log" if np.nanmax(values) > 5 * np.nanmin(values) else "linear")
-        axis.set_ylabel(f"{y} [m/s²]")
-        axis.grid(alpha=0.3, which="both")
-    axes[-1].set_xlabel("velocity of the peak of friction [m/s]")
-    figure.suptitle(data.title, fontsize="medium")
-    figure.legend(
-        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small"
-    )
-    return save(figure, path)
+    data: FigureData
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figure as plain data."""
+        return self.data.to_dict()
+
+    def shown(self) -> Iterator[table.Table | str]:
+        """A line for each law, way of stepping and velocity."""
+        units = self.data.units
+        rows = [
+            [c.law, c.case, *(table.short(float(c[name][k])) for name in units)]
+            for c in self.data.curves
+            for k in range(c[next(iter(units))].size)
+        ]
+        head = ["law", "steps", *(f"{name} [{unit}]" for name, unit in units.items())]
+        yield table.Table(self.data.title, head, rows)
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """A panel per slider, a colour per way of stepping, the laws by line and marker."""
+        from symfric.bench.pictures import plot_jitter  # noqa: PLC0415
+
+        return plot_jitter(self.data, path)
+
+
+def bench_jitter(*, quick: bool = False, progress: table.Progress = None) -> JitterBenchmark:
+    """Measure both laws at all velocities; `quick`: at every other one."""
+    return JitterBenchmark(jitter(SCALES[1::2] if quick else SCALES, progress=progress))
 
 
 @final

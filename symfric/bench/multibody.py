@@ -1,25 +1,38 @@
 """Mechanisms: run time at equal error beside others, cost of the step, what is counted and met."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
 from math import inf, nan
 from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from symfric.bench import exudyn_peer
-from symfric.bench.chains import SIZES, ChainRow, chain, exponent, scaling
-from symfric.bench.contenders import MAKERS, Contender
-from symfric.bench.counts import CompileRow, CountRow, compile_rows, counts
-from symfric.bench.facts import DRIFT_S, DriftRow, Fact, NormRow, drifts, facts, norms
+from symfric.bench import exudyn_peer, table
+from symfric.bench.contenders import MECHANISMS, Array, Contender
+from symfric.bench.mechanisms import (
+    DRIFT_S,
+    SIZES,
+    ChainRow,
+    CompileRow,
+    CountRow,
+    DriftRow,
+    Fact,
+    NormRow,
+    chain,
+    compile_rows,
+    counts,
+    drifts,
+    exponent,
+    facts,
+    norms,
+    scaling,
+)
 from symfric.bench.timing import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.files import write_table
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
@@ -27,7 +40,7 @@ from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
+
 OURS, LOOP, EXUDYN = "symfric", "symfric loop", "exudyn"
 ERRORS = (1e-4, 2e-5, 1e-5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -64,9 +77,7 @@ CASES: dict[str, Case] = {
 }
 
 
-@final
-@dataclass(frozen=True)
-class RunRow:
+class RunRow(NamedTuple):
     """One integrator at one tolerance.
 
     Attributes:
@@ -85,9 +96,7 @@ class RunRow:
     compile_s: float
 
 
-@final
-@dataclass(frozen=True)
-class Ratio:
+class Ratio(NamedTuple):
     """The loosest setting of an integrator that keeps an error, against ours that keeps it.
 
     Attributes:
@@ -109,7 +118,7 @@ class Ratio:
 
 @final
 @dataclass(frozen=True, eq=False)
-class MultibodyBenchmark:
+class MultibodyBenchmark(table.Report):
     """All that one run of the benchmark has measured.
 
     Attributes:
@@ -157,13 +166,67 @@ class MultibodyBenchmark:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
-        tables = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "skipped"}
-        return {
-            **{name: [asdict(row) for row in rows] for name, rows in tables.items()},
-            "ratios": [asdict(row) for row in self.ratios()],
-            "chain_exponents": self.exponents(),
-            "skipped": self.skipped,
-        }
+        ratios, exponents = table.plain(self.ratios()), self.exponents()
+        return table.plain(self) | {"ratios": ratios, "chain_exponents": exponents}
+
+    def shown(self) -> Iterator[table.Table | str]:
+        """Runs, ratios, compilation, counts, chains, reference numbers, constraints, energy."""
+        common: dict[str, table.Column] = {
+            "integrator": "integrator", "rtol": "setting", "error": table.shortened("error"),
+        }  # fmt: skip
+        yield table.of(
+            "Time of a run against its error; rtol: for Exudyn the number of steps", self.runs,
+            {"case": "case", **common, "time [ms]": table.shortened("time_s", 1e3),
+             "steps": "steps", "gcc [s]": table.rounded("compile_s", 2)},
+        )  # fmt: skip
+        for case in dict.fromkeys(r.case for r in self.runs):
+            yield table.of(
+                f"{case}: the loosest tolerance that keeps an error; ratio: over the time of "
+                "`simulate` in joint coordinates, to loop: over that of its compiled loop alone",
+                [r for r in self.ratios() if r.case == case],
+                {"bound": "bound", **common, "steps": "steps",
+                 "time [ms]": table.shortened("time_s", 1e3), "ratio": table.rounded("ratio", 1),
+                 "to loop": table.rounded("loop_ratio", 1)},
+            )  # fmt: skip
+        yield table.of(
+            "Our step as machine code, once for all tolerances and parameters", self.compiled,
+            {"mechanism": "mechanism", "coordinates": "formulation",
+             "build [s]": table.shortened("build_s"), "lines of C": "lines",
+             "gcc [s]": table.rounded("compile_s", 2)},
+        )  # fmt: skip
+        yield table.of(
+            "What a mechanism needs: states, algebraic variables, CasADi instructions, nonzeros",
+            self.counts,
+            {"mechanism": "mechanism", "variant": "variant", "in": "formulation", "x": "states",
+             "z": "algebraic", "ode": "ode", "step": "step", "nonzeros": "nonzeros"},
+        )  # fmt: skip
+        growth = ", ".join(f"{name} {value:.2f}" for name, value in self.exponents().items())
+        yield table.of(
+            "A step of a chain in the virtual machine; exponents: "
+            f"{growth or 'of two lengths only'}",
+            self.chains,
+            {"links": "links", "build [s]": table.shortened("build_s"),
+             "instructions": "instructions", "step [us]": table.shortened("step_s", 1e6)},
+        )  # fmt: skip
+        yield table.of(
+            "Reference numbers and what ours differ by; digits: what they are good for",
+            self.facts,
+            {"case": "case", "t": "t", "signal": "signal",
+             "reference": lambda r: f"{r.reference:.9g}",
+             "off by": lambda r: table.short(r.value - r.reference), "digits": "digits"},
+        )  # fmt: skip
+        yield table.of(
+            "Largest norms of the constraints", self.norms,
+            {"case": "case", "coordinates": "formulation", "phi [m]": table.shortened("phi"),
+             "phi_dot, relative": table.shortened("phi_dot"),
+             "phi_ddot, relative": table.shortened("phi_ddot")},
+        )  # fmt: skip
+        yield table.of(
+            "Energy of frictionless mechanisms", self.drifts,
+            {"case": "case", "rtol": "rtol", "t_end [s]": "t_end", "steps": "steps",
+             "relative change": table.shortened("relative")},
+        )  # fmt: skip
+        yield from table.not_run(self.skipped)
 
     def exponents(self) -> dict[str, float]:
         """Growth of instructions and time of a step with the links, where chains were measured."""
@@ -171,27 +234,20 @@ class MultibodyBenchmark:
             return {}
         return {column: exponent(self.chains, column) for column in ("instructions", "step_s")}
 
-    def write_csv(self, path: str | Path) -> None:
-        """Write the runs, a line each."""
-        names = [field.name for field in fields(RunRow)]
-        write_table(path, names, ([getattr(row, name) for name in names] for row in self.runs))
-
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Work-precision diagram: time against error, a panel per case."""
         from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
 
-        lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
-        for row in self.runs:
-            case = lines.setdefault(row.case, {})
-            case.setdefault(row.integrator, []).append((row.error, row.time_s))
-        return plot_work_precision(lines, path)
+        return plot_work_precision(
+            ((r.case, r.integrator, r.error, r.time_s) for r in self.runs), path
+        )
 
 
 def bench_multibody(
     *,
     quick: bool = False,
     links: Sequence[int] = SIZES,
-    progress: Callable[[str, float], None] | None = None,
+    progress: table.Progress = None,
 ) -> MultibodyBenchmark:
     """Measure everything in one run, so that ratios are of one machine in one state.
 
@@ -200,10 +256,8 @@ def bench_multibody(
         links: lengths of the chains.
         progress: called with what is measured and the fraction done.
     """
-    tell = progress or _say_nothing
     formulations = ("joint",) if quick else ("joint", "absolute")
-    runs, skipped = _runs(quick, tell)
-    tell("counts, compilation, chains", 0.6)
+    runs, skipped = _runs(quick, progress)
     return MultibodyBenchmark(
         runs=tuple(runs),
         compiled=tuple(compile_rows(formulations)),
@@ -216,25 +270,20 @@ def bench_multibody(
     )
 
 
-def _say_nothing(_: str, __: float) -> None:
-    """Progress that nobody watches."""
-
-
-def _runs(quick: bool, tell: Callable[[str, float], None]) -> tuple[list[RunRow], dict[str, str]]:
+def _runs(quick: bool, progress: table.Progress) -> tuple[list[RunRow], dict[str, str]]:
     """All integrators on all cases."""
     rows: list[RunRow] = []
     skipped: dict[str, str] = {}
     if find_compiler() is None:
         return rows, {"runs": "no C compiler"}
     tolerances = TOLERANCES[2:5] if quick else TOLERANCES
-    for number, (case, what) in enumerate(CASES.items()):
+    for case, what in CASES.items():
         formulations = [f for f in what.watched if f == "joint" or not quick]
         models = {f: what.scene.mechanism().build(formulation=f) for f in formulations}
-        names = [name for name, (formulation, _) in MAKERS.items() if formulation in models]
+        names = [name for name, (formulation, _) in MECHANISMS.items() if formulation in models]
         exact = _exact(what)
-        for k, name in enumerate(names):
-            tell(f"{case}: {name}", 0.6 * (number + k / len(names)) / len(CASES))
-            formulation, make = MAKERS[name]
+        for name in table.each(names, progress, f"{case}: {{}}".format):
+            formulation, make = MECHANISMS[name]
             for rtol in tolerances:
                 with_rtol = partial(
                     make, models[formulation], what.times, what.watched[formulation], rtol
@@ -266,7 +315,7 @@ def _row(
     try:
         with unwarned():
             contender = make()
-            time_s, (found, steps) = best_time(contender.solve, budget=0.2, clock=process_time)
+            time_s, (found, count) = best_time(contender.solve, budget=0.2, clock=process_time)
     except RuntimeError as error:
         last = str(error).strip().splitlines()[-1]
         skipped[f"{case}: {name} at {setting:g}"] = last.rpartition(": ")[2]
@@ -278,7 +327,7 @@ def _row(
         setting=setting,
         error=float(error),
         time_s=time_s,
-        steps=steps,
+        steps=count(),
         compile_s=contender.compile_s,
     )
 

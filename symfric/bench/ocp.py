@@ -6,8 +6,8 @@ with layers of 1e-5 under the controls, and exact Coulomb friction with stiction
 processor time of a whole call, building and checking included.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 from statistics import median
@@ -17,22 +17,26 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
+from ocp.friction.exact import set_valued
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
+from ocp.result.solution import Solution
 from ocp.solve import solve
 from ocp.solving.perturbed import perturbed
 from ocp.solving.starts import Start, initial_points
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise
+from symfric.bench import table
 from symfric.bench.ocp_contenders import Attempt, has_rockit, opti, rockit
-from symfric.bench.ocp_mpc import MpcRow, mpc_rows
-from symfric.bench.ocp_referee import attempt_of, landed
-from symfric.bench.ocp_size import SizeRow, size_rows
+from symfric.bench.ocp_costs import MpcRow, SizeRow, mpc_rows, size_rows
+from symfric.integrator import Hold, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 Array = NDArray[np.float64]
 STARTS, RANDOM = 12, 50
@@ -45,7 +49,6 @@ BEST = 1e-3
 WIDTHS = (1e-1, 1e-2, 1e-3)
 """Layers [m/s] on which the others solve."""
 INTERVALS = 100
-Tell = Callable[[str, float], None]
 
 
 @final
@@ -84,7 +87,7 @@ class OcpRow:
 
 @final
 @dataclass(frozen=True, eq=False)
-class OcpBenchmark:
+class OcpBenchmark(table.Report):
     """All rows of one run of the benchmark.
 
     Attributes:
@@ -99,18 +102,37 @@ class OcpBenchmark:
     mpc: tuple[MpcRow, ...]
     skipped: dict[str, str]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
-        return {
-            "rows": [asdict(r) for r in self.rows],
-            "sizes": [asdict(r) for r in self.sizes],
-            "mpc": [asdict(r) for r in self.mpc],
-            "skipped": self.skipped,
-        }
+    def shown(self) -> Iterator[table.Table | str]:
+        """Problems by solvers, sizes of programs, controllers."""
+        yield table.of(
+            "Medians; landed: missed by no more than 1e-4; exact: with exact Coulomb friction",
+            self.rows,
+            {"case": "case", "solver": "solver", "starts": lambda r: f"{r.count} {r.starts}",
+             "landed": lambda r: f"{r.landed:.0%}", "best": lambda r: f"{r.best:.0%}", "J": "cost",
+             "off [%]": table.known_only("off", 2, 100), "miss": table.known_only("miss", 2),
+             "exact": table.known_only("exact", 2), "it.": table.rounded("iterations"),
+             "[s]": table.known_only("time_s", 2)},
+        )  # fmt: skip
+        if self.sizes:
+            yield table.of(
+                "Derivatives of a cart-pendulum's program in the virtual machine", self.sizes,
+                {"intervals": "intervals", "unknowns": "unknowns", "nonzeros": "nonzeros",
+                 "build [s]": table.shortened("build_s"), "J [ms]": table.shortened("jacobian_ms"),
+                 "H [ms]": table.shortened("hessian_ms"), "exponent": table.known_only("exponent")},
+            )  # fmt: skip
+        if self.mpc:
+            yield table.of(
+                "Controller of a drive; hidden: failures that it did not report", self.mpc,
+                {"plant": "plant", "cycles": "cycles", "median [ms]": table.shortened("median_ms"),
+                 "worst": table.shortened("worst_ms"), "cpu": table.shortened("worst_cpu_ms"),
+                 "QPs": "iterations", "failed": "unconverged", "hidden": "unreported",
+                 "[mm]": table.shortened("off_mm")},
+            )  # fmt: skip
+        yield from table.not_run(self.skipped)
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Miss against time, a panel for each problem with friction."""
-        from symfric.bench.ocp_picture import plot_ocp  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.bench.pictures import plot_ocp  # noqa: PLC0415  (matplotlib is slow)
 
         return plot_ocp(self.rows, path)
 
@@ -119,7 +141,7 @@ def bench_ocp(
     *,
     quick: bool = False,
     cases: Sequence[str] | None = None,
-    progress: Tell | None = None,
+    progress: table.Progress = None,
 ) -> OcpBenchmark:
     """Measure all problems on this machine; some minutes, `quick` one.
 
@@ -128,19 +150,12 @@ def bench_ocp(
         cases: names of ready problems; all of them if none.
     """
     ready = [READY[name] for name in cases or READY]
-    rows: list[OcpRow] = []
-    for k, one in enumerate(ready):
-        if progress is not None:
-            progress(one.name, k / len(ready))
-        rows += _case(one, quick)
+    rows = [
+        row for one in table.each(ready, progress, lambda r: r.name) for row in _case(one, quick)
+    ]
     skipped = {} if has_rockit() else {"rockit": "not installed"}
-    wanted = cases is None
-    return OcpBenchmark(
-        tuple(rows),
-        tuple(size_rows(quick)) if wanted else (),
-        tuple(mpc_rows(quick)) if wanted else (),
-        skipped,
-    )
+    sizes, mpc = ((), ()) if cases else (tuple(size_rows(quick)), tuple(mpc_rows(quick)))
+    return OcpBenchmark(tuple(rows), sizes, mpc, skipped)
 
 
 def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, Array]]:
@@ -240,3 +255,89 @@ def _middle(values: Sequence[float]) -> float:
     if not isfinite(values[0]) and all(v != v for v in values):
         return nan
     return median(v if v == v else float("inf") for v in values)
+
+
+# ---- how far motions are off what a problem asks for, whoever found the controls ----
+
+
+def attempt_of(solution: Solution, time_s: float) -> Attempt:
+    """What `ocp.solve` found, in the same terms."""
+    motion, meshes, controls = solution.motions[0], [], []
+    for stretch in motion.phases:
+        inside = (motion.t_control >= stretch.begin - 1e-12) & (motion.t_control < stretch.end)
+        meshes.append((motion.t_control[inside] - stretch.begin) / stretch.T)
+        controls.append({name: u[inside] for name, u in motion.controls.items()})
+    return Attempt(
+        cost=solution.cost,
+        iterations=solution.iterations,
+        answer=solution.status.name,
+        time_s=time_s,
+        durations=tuple(stretch.T for stretch in motion.phases),
+        controls=tuple(controls),
+        meshes=tuple(meshes),
+    )
+
+
+def landed(problem: Problem, attempt: Attempt, *, exact: bool = False, rtol: float = 1e-9) -> float:
+    """Largest relative miss of ends and middle points under the controls, simulated.
+
+    Of a state relative to its range, or its nominal value; NaN where the motion cannot be
+    simulated.
+
+    Args:
+        exact: with exact Coulomb friction and stiction in place of the laws.
+    """
+    state: dict[str, float] = {}
+    modes: dict[str, int] = {}
+    worst, clock = 0.0, 0.0
+    for span, T, controls in zip(problem.spans, attempt.durations, attempt.controls, strict=True):
+        mesh = attempt.meshes[span.phase] if attempt.meshes else None
+        looks = sorted({*span.nodes, *np.linspace(0, 1, 101).tolist()})
+        how: dict[str, Any] = {
+            "t_start": clock,
+            "x0": _begin(span, state),
+            "u": _held_controls(span, controls, mesh, clock, T),
+            "p": {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)},
+            "t_eval": clock + T * np.array(looks),
+            "rtol": rtol,
+            "throw": False,
+        }
+        if exact:
+            run = set_valued(span.model, clock + T, modes=modes, **how)
+            modes = dict(run.pieces[-1].modes) if run.pieces else {}
+        else:
+            run = simulate(span.model, clock + T, **how)
+        if not run.status.ok:
+            return nan
+        worst = max(worst, _miss(span, {n: run[n] for n in span.nodes[1.0]}, looks))
+        state, clock = {n: float(run[n][-1]) for n in span.nodes[1.0]}, clock + T
+    return worst
+
+
+def _begin(span: Span, before: Mapping[str, float]) -> dict[str, float]:
+    linked = {link.state for link in span.links}
+    return {
+        v.name: before[v.name] if v.name in linked else float(np.mean(span.nodes[0.0][v.name]))
+        for v in span.model.x
+    }
+
+
+def _held_controls(
+    span: Span, controls: Mapping[str, Array], mesh: Array | None, clock: float, T: float
+) -> dict[str, Hold]:
+    N = next(iter(controls.values())).size
+    at = clock + T * (np.arange(N) / N if mesh is None else mesh)
+    at[0] = clock
+    return {n: Hold(at, np.clip(u, *span.box(n))) for n, u in controls.items()}
+
+
+def _miss(span: Span, signals: Mapping[str, Array], looks: Sequence[float]) -> float:
+    nominal = {v.name: v.nominal for v in span.model.x}
+    worst = 0.0
+    for s, boxes in span.nodes.items():
+        for name, (low, high) in boxes.items():
+            if s > 0 and isfinite(low) and isfinite(high):
+                x = float(signals[name][looks.index(s)])
+                size = max(float(np.abs(signals[name]).max()), nominal[name])
+                worst = max(worst, (low - x) / size, (x - high) / size)
+    return worst

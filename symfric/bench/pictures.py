@@ -1,16 +1,21 @@
 """Pictures of benchmarks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import chain
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from symfric.bench.table import Judged
+from symfric.figures import FigureData
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import COLOURS, MARKERS, colour, dash
 
 if TYPE_CHECKING:
+    from symfric.bench.ocp import OcpRow
     from symfric.bench.regularisation import RegularisationRow
 
 ABREAST = 5
@@ -23,17 +28,20 @@ def _filled(number: int) -> str | None:
 
 
 def plot_work_precision(
-    lines: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]],
+    points: Iterable[tuple[str, str, float, float]],
     path: str | Path | None = None,
     error_label: str = "relative position error [1]",
 ) -> Figure:
-    """Run time against error, a panel per case, at most five beside each other.
+    """Run time against error, a panel per case, at most five in a row.
 
     Args:
-        lines: case -> integrator -> points (relative error, time in s).
+        points: case, integrator, relative error, time [s].
         path: image file.
         error_label: what the error is.
     """
+    lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for case, name, error, time in points:
+        lines.setdefault(case, {}).setdefault(name, []).append((error, time))
     columns = min(len(lines), ABREAST)
     rows = -(-len(lines) // columns)
     figure, tiles = grid(rows, columns, 11.0, 1.6 + 3.2 * rows, sharey=True)
@@ -42,8 +50,8 @@ def plot_work_precision(
     for axis in axes[len(lines) :]:
         axis.set_axis_off()
     for axis, (case, integrators) in zip(axes, lines.items(), strict=False):
-        for name, points in integrators.items():
-            error, time = zip(*sorted(points), strict=True)
+        for name, line in integrators.items():
+            error, time = zip(*sorted(line), strict=True)
             bold = name.startswith("symfric")
             axis.loglog(
                 error, [1e3 * t for t in time], markersize=4 if bold else 3,
@@ -102,17 +110,73 @@ def plot_regularisation(
     return save(figure, path)
 
 
-def plot_goals(
-    names: Sequence[str], decades: Sequence[float], met: Sequence[bool], path: str | Path | None
-) -> Figure:
+def plot_goals(rows: Iterable[tuple[str, Judged]], path: str | Path | None) -> Figure:
     """How many decades each number lies beyond its goal, a bar each; left of zero it is met."""
-    figure, (axis,) = panels(1, 8.0, 0.5 + 0.25 * len(names))
-    bars = axis.barh(names, decades, color=[colour(2) if well else colour(1) for well in met])
-    for bar, well in zip(bars, met, strict=True):
-        bar.set_hatch("" if well else "///")
+    known = [(name, goal) for name, goal in rows if goal.decades == goal.decades]
+    figure, (axis,) = panels(1, 8.0, 0.5 + 0.25 * len(known))
+    for name, goal in known:
+        axis.barh(
+            name, goal.decades, color=colour(2 if goal.met else 1), hatch="" if goal.met else "///"
+        )
     axis.axvline(0.0, color="0.3", linewidth=0.8)
     axis.invert_yaxis()
     axis.set_xlabel("decades beyond the goal")
     axis.tick_params(axis="y", labelsize="small")
     axis.grid(axis="x", alpha=0.3)
+    return save(figure, path)
+
+
+LEAST = 1e-14
+"""What is drawn for less."""
+
+
+def plot_ocp(rows: "Sequence[OcpRow]", path: str | Path | None = None) -> Figure:
+    """Relative miss with exact friction against processor time, a panel for each problem.
+
+    Crosses are motions that also cost more than 0.1 % above the best one known.
+    """
+    cases = list(dict.fromkeys(row.case for row in rows if row.exact == row.exact))
+    figure, axes = panels(len(cases))
+    for axis, case in zip(axes, cases, strict=False):
+        for row in rows:
+            if row.case != case or row.starts == "far" or not isfinite(row.exact):
+                continue
+            shade = colour(("symfric", "Opti", "rockit").index(row.solver.split()[0]))
+            marker = "o" if row.best > 0.5 else "x"
+            axis.loglog(row.time_s, max(row.exact, LEAST), marker, color=shade)
+            axis.annotate(
+                row.solver, (row.time_s, max(row.exact, LEAST)), xytext=(4, 3),
+                textcoords="offset points", fontsize="x-small",
+            )  # fmt: skip
+        axis.margins(x=0.2, y=0.2)
+        axis.axhline(1e-4, color="0.7", linewidth=0.8, zorder=0)
+        axis.set_ylabel("miss [1]")
+        axis.set_title(case.replace("_", " "), fontsize="small")
+    axes[-1].set_xlabel("processor time of a call [s]")
+    figure.align_ylabels(axes)
+    return save(figure, path)
+
+
+def plot_jitter(data: FigureData, path: str | Path | None = None) -> Figure:
+    """A panel per slider, a colour per way of stepping, the laws by line and marker."""
+    figure, axes = panels(len(data.panels), 7.5, 3.0)
+    cases = list(dict.fromkeys(c.case for c in data.curves))
+    laws = list(dict.fromkeys(c.law for c in data.curves))
+    for axis, (x, y) in zip(axes, data.panels, strict=True):
+        for c in data.curves:
+            law = laws.index(c.law)
+            axis.semilogx(
+                c[x], c[y], "-o" if law == 0 else "--s", color=colour(cases.index(c.case)),
+                linewidth=1.2, markersize=5 if law == 0 else 4, label=c.label,
+                markerfacecolor=None if law == 0 else "none",
+            )  # fmt: skip
+        values = np.concatenate([c[y] for c in data.curves])
+        axis.set_yscale("log" if np.nanmax(values) > 5 * np.nanmin(values) else "linear")
+        axis.set_ylabel(f"{y} [m/s²]")
+        axis.grid(alpha=0.3, which="both")
+    axes[-1].set_xlabel("velocity of the peak of friction [m/s]")
+    figure.suptitle(data.title, fontsize="medium")
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small"
+    )
     return save(figure, path)

@@ -15,15 +15,16 @@ smooth laws choose by how they creep, each in its way (1e-4 to 1e-3 apart). Ther
 measured against its own limit, and a law with mu_s = mu_d against set-valued friction.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import log, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.bench import table
 from symfric.figures.regularisation import (
     Bed,
     Regularisation,
@@ -33,7 +34,6 @@ from symfric.figures.regularisation import (
     sample,
 )
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.files import write_table
 from symfric.foundation.parameters import parameters
 from symfric.laws import (
     BrownMcPhee,
@@ -86,9 +86,7 @@ class Case:
     of: tuple[str, ...] | None = None
 
 
-@final
-@dataclass(frozen=True)
-class RegularisationRow:
+class RegularisationRow(NamedTuple):
     """One width at one tolerance.
 
     Attributes:
@@ -182,20 +180,33 @@ CASES = (
 
 @final
 @dataclass(frozen=True)
-class RegularisationBenchmark:
+class RegularisationBenchmark(table.Report):
     """Errors and costs of all cases over width and tolerance; see `bench_regularisation`."""
 
     rows: tuple[RegularisationRow, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data; NaN becomes null."""
-        rows = [asdict(row) for row in self.rows]
-        return {"rows": [{k: None if v != v else v for k, v in row.items()} for row in rows]}
-
-    def write_csv(self, path: str | Path) -> None:
-        """Write the rows, a line each."""
-        names = [field.name for field in fields(RegularisationRow)]
-        write_table(path, names, ([getattr(row, name) for name in names] for row in self.rows))
+    def shown(self) -> Iterator[table.Table | str]:
+        """A table per case, a line per width: errors at each tolerance, order and cost."""
+        for case in dict.fromkeys(row.case for row in self.rows):
+            own = [row for row in self.rows if row.case == case]
+            first, rtols = own[0], list(dict.fromkeys(row.rtol for row in own))
+            lines = [
+                [row for row in own if row.value == x] for x in dict.fromkeys(r.value for r in own)
+            ]
+            cyclic = any(line[-1].cycle_error == line[-1].cycle_error for line in lines)
+            yield table.Table(
+                f"{case}: error at each rtol against {first.reference}, good for "
+                f"{first.uncertain:.1g}; order and cycle at the smallest rtol, cost at the largest",
+                [f"{first.parameter} [{first.unit}]", *(f"{rtol:g}" for rtol in rtols), "order",
+                 *(["cycle"] if cyclic else []), "steps", "[ms]"],
+                [
+                    [table.short(line[0].value), *(table.short(r.error) for r in line),
+                     table.known(line[-1].order, 2),
+                     *([table.known(line[-1].cycle_error)] if cyclic else []), line[0].steps,
+                     table.short(1e3 * line[0].time_s)]
+                    for line in lines
+                ],
+            )  # fmt: skip
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Error against width above, CPU time below, a column per case, a line per tolerance."""
@@ -210,7 +221,7 @@ def bench_regularisation(
     cases: Sequence[Case] = CASES,
     factors: Sequence[float] = HALF_DECADES,
     rtols: Sequence[float] = RTOLS,
-    progress: Callable[[str, float], None] | None = None,
+    progress: table.Progress = None,
 ) -> RegularisationBenchmark:
     """Run every case at every width and tolerance, as machine code where there is a compiler.
 
@@ -219,9 +230,7 @@ def bench_regularisation(
     factors = factors[::2] if quick else factors
     backend = "vm" if quick or find_compiler() is None else "compiled"
     rows: list[RegularisationRow] = []
-    for number, case in enumerate(cases):
-        if progress is not None:
-            progress(case.name, number / len(cases))
+    for case in table.each(cases, progress, lambda case: case.name):
         rows += _measured(case, factors, rtols, 2 if quick else ROUNDS, backend)
     return RegularisationBenchmark(tuple(rows))
 

@@ -1,17 +1,23 @@
-"""Honest timing of short calls."""
+"""Honest timing of short calls, and of the C compiler."""
 
+import os
 import warnings
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from time import perf_counter, process_time
 from typing import TypeVar
 
+from symfric.foundation.compiler import find_compiler, no_compiler
+from symfric.integrator.compiled.compiler import FLAGS
+
 T = TypeVar("T")
+FASTEST = (*(f for f in FLAGS if f != "-ffp-contract=off"), "-freciprocal-math")
+"""Flags for others, which need not round as CasADi's virtual machine does."""
 
 
 @contextmanager
 def unwarned() -> Generator[None]:
-    """Loose tolerances are measured on purpose, and what stands around a call is not measured."""
+    """No warnings: loose tolerances are measured on purpose."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -25,7 +31,7 @@ def best_time(
 ) -> tuple[float, T]:
     """Shortest time [s] of `call` over repeats within `budget` seconds, and its result.
 
-    The shortest one is what the code costs; everything above it is the rest of the machine. Of a
+    The shortest one is what the code costs; the rest is what else the machine does. Of a
     call that has no threads the processor time (`time.process_time`) is the better clock.
     """
     best, spent, result = float("inf"), 0.0, None
@@ -62,3 +68,19 @@ def interleaved(
             best[name] = min(best[name], process_time() - begin)
         made += 1
     return best
+
+
+def compile_time(source: str, target: str | os.PathLike[str] = os.devnull) -> float:
+    """Processor time [s] of the C compiler on `source`, with the fastest flags.
+
+    Raises:
+        CompileError: no compiler.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise no_compiler()
+    before = os.times()
+    compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
+    after = os.times()
+    user = after.children_user - before.children_user
+    return user + after.children_system - before.children_system

@@ -1,4 +1,9 @@
-"""The commands put together, and how errors become exit statuses."""
+"""The commands put together, and how errors become exit statuses.
+
+Typer's sentences about a line that cannot be read name neither the value nor the way out ("Input
+should be a valid number, unable to parse string as a number"). Which mistake it is they tell by
+their classes, which are not exported.
+"""
 
 import os
 import sys
@@ -6,14 +11,14 @@ import warnings
 from collections.abc import Sequence
 from errno import ENOSPC
 from io import TextIOWrapper
+from re import search
 from types import TracebackType
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
 from symfric import SolveError, Status, __version__
-from symfric.cli import usage
-from symfric.cli.commands import SETTINGS, Commands
+from symfric.cli.commands import SETTINGS, Commands, argument_shown, is_option
 from symfric.foundation.programs import ProgramError
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
@@ -62,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
     except (KeyboardInterrupt, typer.Abort):
         return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
-    except (ValueError, OSError, MemoryError, ProgramError, usage.UsageError) as error:
+    except (ValueError, OSError, MemoryError, ProgramError, UsageError) as error:
         return _refuse(error, BAD_INPUT)
 
 
@@ -85,7 +90,7 @@ def sentence(error: BaseException) -> str:
         return f"'{error.filename}': {error.strerror}"
     if isinstance(error, MemoryError):
         return "expected a task that fits into memory, got a larger one; ask for fewer --samples"
-    text = usage.sentence(error) if isinstance(error, usage.UsageError) else str(error)
+    text = usage_sentence(error) if isinstance(error, UsageError) else str(error)
     return " ".join(text.split()).removesuffix(".")
 
 
@@ -112,3 +117,46 @@ def _report_defect(
         "set SYMFRIC_DEBUG=1 to see where, and please report it",
         err=True,
     )
+
+
+UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
+"""What all errors of usage derive from."""
+
+
+def usage_sentence(error: Any) -> str:
+    """`<command>: expected <what>, got <value>; <hint>`."""
+    kind, option = type(error).__name__, getattr(error, "option_name", "")
+    if kind == "BadOptionUsage":  # of which Typer does not tell the command
+        least = "requires" in error.message
+        return (
+            f"{option}: expected {'a' if least else 'no'} value, got {'none' if least else 'one'}"
+        )
+    if error.ctx is None:
+        return error.format_message()
+    where, hint = error.ctx.info_name, f"see {error.ctx.command_path} -h"
+    if kind == "MissingParameter":
+        return f"{where}: expected {_parameter_shown(error.param)}, got none; {hint}"
+    if kind == "BadParameter" and error.param is not None:
+        what = "a whole number" if "integer" in error.message else "a number"
+        return f"{where}: {error.param.opts[0]}: expected {what}, got '{_value_given(error)}'"
+    if kind == "NoSuchOption":
+        close = ", ".join(error.possibilities or ())
+        offer = f"did you mean {close}?" if close else hint
+        return f"{where}: expected an option of it, got {option}; {offer}"
+    extra = search(r"unexpected extra argument(?:\(s\)|s)? \((.*)\)", error.message)
+    if extra:
+        again = "; repeat the option for each NAME=VALUE" if "=" in extra[1] else f"; {hint}"
+        return f"{where}: expected no other argument, got {extra[1]}{again}"
+    return error.format_message()
+
+
+def _parameter_shown(parameter: Any) -> str:
+    if is_option(parameter):
+        return f"{parameter.opts[0]} {parameter.metavar}"
+    return argument_shown(parameter)
+
+
+def _value_given(error: Any) -> str:
+    """What was given, from the usage_sentence or from the error behind it."""
+    told = search(r"^'(.*)' is not", error.message)
+    return told[1] if told else str(error.__cause__.errors()[0]["input"])

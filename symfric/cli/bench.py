@@ -1,13 +1,15 @@
 """`symfric bench`: run time against error, as ratios measured in one run."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from symfric.cli import bench_tables, output
-from symfric.cli.options import JsonOption, PlotOption, check_outputs
+from symfric.cli import output
+from symfric.cli.options import JsonOption, PlotOption, argument, check_outputs, option
 from symfric.foundation.parameters import check_names
+
+if TYPE_CHECKING:
+    from symfric.bench.table import Table
 
 SUBJECTS = (
     "integrator",
@@ -34,21 +36,17 @@ def _completed(incomplete: str) -> list[str]:
 def bench(
     subject: Annotated[
         str,
-        typer.Argument(
-            metavar="SUBJECT",
-            help=f"What to measure, default integrator: {', '.join(SUBJECTS)}.",
-            autocompletion=_completed,
+        argument(
+            "SUBJECT", f"What to measure, default integrator: {', '.join(SUBJECTS)}.", _completed
         ),
     ] = "integrator",
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, fewer others.")] = False,
+    quick: Annotated[bool, option("--quick", "Fewer points, fewer others.")] = False,
     links: Annotated[
-        str | None,
-        typer.Option("--links", metavar="N,N,...", help="Lengths of chains; multibody only."),
+        str | None, option("--links N,N,...", "Lengths of chains; multibody only.")
     ] = None,
     plot: PlotOption = None,
     csv: Annotated[
-        Path | None,
-        typer.Option("--csv", metavar="FILE.csv", help="Runs of multibody, regularisation."),
+        Path | None, option("--csv FILE.csv", "Runs of multibody, regularisation.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -80,50 +78,30 @@ def bench(
     if given:
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     check_outputs(json, csv, picture=plot)
-    if subject == "jitter":
-        _jitter(quick, plot, json)
-    else:
-        _measure(subject, quick, links, plot, csv, json)
-    output.say_written(plot, csv, json)
-
-
-def _measure(
-    subject: str,
-    quick: bool,
-    links: str | None,
-    plot: Path | None,
-    csv: Path | None,
-    json: str | None,
-) -> None:
     from symfric import bench as measures  # noqa: PLC0415  (only this command needs it)
 
     sizes = {"links": lengths(links)} if links else {}
     with output.progress("measuring") as tell:
-
-        def told(_: str, fraction: float) -> None:
-            tell(fraction)
-
-        result = getattr(measures, f"bench_{subject}")(quick=quick, progress=told, **sizes)
+        result = getattr(measures, f"bench_{subject}")(
+            quick=quick, progress=output.unnamed(tell), **sizes
+        )
     if plot:
         result.plot(plot)
     if csv:
         result.write_csv(csv)
     output.emit_json(result.to_dict(), json)
     if json != "-":
-        getattr(bench_tables, subject)(result)
+        show(result.shown())
+    output.say_written(plot, csv, json)
 
 
-def _jitter(quick: bool, plot: Path | None, json: str | None) -> None:
-    from symfric.bench.jitter import SCALES, jitter, plot_jitter  # noqa: PLC0415
-
-    scales = SCALES[1::2] if quick else SCALES
-    with output.progress("measuring") as tell:
-        data = jitter(scales, progress=lambda _, fraction: tell(fraction))
-    if plot:
-        plot_jitter(data, plot)
-    output.emit_json(data.to_dict(), json)
-    if json != "-":
-        bench_tables.jitter(data)
+def show(shown: "Iterable[Table | str]") -> None:
+    """Print tables and sentences."""
+    for item in shown:
+        if isinstance(item, str):
+            output.show(item)
+        else:
+            output.show_table(item.head, item.rows, item.title)
 
 
 def lengths(text: str) -> tuple[int, ...]:

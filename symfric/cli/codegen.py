@@ -8,28 +8,31 @@ from typing import Annotated, Any
 import typer
 
 from symfric.cli import completions, output
-from symfric.cli.codegen_compensator import SETTINGS, compensator_block
-from symfric.cli.codegen_robot import robot_block
-from symfric.cli.codegen_shown import show_sizes, show_verification
 from symfric.cli.codegen_subject import (
     PLANT,
+    SETTINGS,
     check_applicable,
     chosen_law,
+    compensator_block,
     machine_of,
+    robot_block,
     subject_of,
 )
 from symfric.cli.machines import LawOfOption, PresetOption, kind_of
 from symfric.cli.options import (
     JsonOption,
     SetOption,
+    argument,
     assignments,
     check_folder,
     check_outputs,
     numbers,
+    option,
     with_settings,
 )
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.codegen.kit.generate import with_cores
+from symfric.codegen.proof.verify import Check
 from symfric.embedded import CORES, Measured, measure
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
@@ -40,124 +43,96 @@ REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")
 
 
 def codegen(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
+    out: Annotated[Path, option("--out DIR", "Folder for the files.")],
     fit: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="FIT.json|ROBOT.urdf",
-            help="What `symfric identify --json` wrote; a robot with --inverse-dynamics.",
+        argument(
+            "FIT.json|ROBOT.urdf",
+            "What `symfric identify --json` wrote; a robot with --inverse-dynamics.",
         ),
     ] = None,
     law: Annotated[
         str | None,
-        typer.Option(
-            "--law",
-            metavar="NAME",
-            help="Friction law, such as lugre; or FIT.json.",
-            autocompletion=completions.laws,
-        ),
+        option("--law NAME", "Friction law, such as lugre; or FIT.json.", completions.laws),
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     scene: Annotated[
         str | None,
-        typer.Option(
-            "--scene",
-            metavar="NAME",
-            help="The plant of this scene, or FILE.urdf, with the law.",
-            autocompletion=completions.scenes,
+        option(
+            "--scene NAME",
+            "The plant of this scene, or FILE.urdf, with the law.",
+            completions.scenes,
         ),
     ] = None,
     method: Annotated[
         str | None,
-        typer.Option(
-            "--method",
-            metavar="NAME",
-            help="Formula of a plant; default rodas3, of mechanisms with friction backward_euler.",
+        option(
+            "--method NAME",
+            "Formula of a plant; default rodas3, of mechanisms with friction backward_euler.",
         ),
     ] = None,
     real: Annotated[
         str | None,
-        typer.Option(
-            "--real",
-            metavar="|".join(REALS),
-            help="Type of numbers; default both, double for a plant.",
+        option(
+            "--real", "Type of numbers; default both, double for a plant.", metavar="|".join(REALS)
         ),
     ] = None,
     step_size: Annotated[
         float | None,
-        typer.Option(
-            "--step-size",
-            metavar="SECONDS",
-            help="Step as a constant, for laws with states, plants.",
-        ),
+        option("--step-size SECONDS", "Step as a constant, for laws with states, plants."),
     ] = None,
     name: Annotated[
-        str | None,
-        typer.Option("--name", metavar="NAME", help="C identifier; default from the law."),
+        str | None, option("--name NAME", "C identifier; default from the law.")
     ] = None,
     fold: Annotated[
-        bool,
-        typer.Option("--fold", help="Bake all parameters in; without it all can be changed."),
+        bool, option("--fold", "Bake all parameters in; without it all can be changed.")
     ] = False,
     free: Annotated[
-        list[str] | None,
-        typer.Option("--free", metavar="NAME", help="Keep this one variable, bake the others in."),
+        list[str] | None, option("--free NAME", "Keep this one variable, bake the others in.")
     ] = None,
     guards: Annotated[
-        bool,
-        typer.Option("--guards/--no-guards", help="Clamp, repair and report what cannot be."),
+        bool, option("--guards/--no-guards", "Clamp, repair and report what cannot be.")
     ] = True,
     kit: Annotated[
         bool,
-        typer.Option(
-            "--kit/--no-kit",
-            help="Unit test, CMake, Python and Simulink files beside the sources.",
-        ),
+        option("--kit/--no-kit", "Unit test, CMake, Python and Simulink files beside the sources."),
     ] = True,
     core: Annotated[
         list[str] | None,
-        typer.Option(
-            "--core", metavar="NAME", help=f"Measure it on this core, too: {', '.join(CORES)}."
-        ),
+        option("--core NAME", f"Measure it on this core, too: {', '.join(CORES)}."),
     ] = None,
     turning: Annotated[
-        bool, typer.Option("--turning", help="A law in rad/s and N m: units in the header.")
+        bool, option("--turning", "A law in rad/s and N m: units in the header.")
     ] = False,
     inverse_dynamics: Annotated[
         bool,
-        typer.Option(
+        option(
             "--inverse-dynamics",
-            help="Forces of the joints that a motion needs, of ROBOT.urdf or --scene, with the "
+            "Forces of the joints that a motion needs, of ROBOT.urdf or --scene, with the "
             "friction of --law or of the file.",
         ),
     ] = False,
     payload: Annotated[
-        str | None,
-        typer.Option(
-            "--payload", metavar="FRAME", help="Link or frame that carries a load, set at run time."
-        ),
+        str | None, option("--payload FRAME", "Link or frame that carries a load, set at run time.")
     ] = None,
     tunable_gravity: Annotated[
-        bool, typer.Option("--tunable-gravity", help="Gravity is set at run time.")
+        bool, option("--tunable-gravity", "Gravity is set at run time.")
     ] = False,
     compensator: Annotated[
-        bool,
-        typer.Option("--compensator", help="A friction compensator of the law, or of a fit."),
+        bool, option("--compensator", "A friction compensator of the law, or of a fit.")
     ] = False,
     compensation: Annotated[
         list[str] | None,
-        typer.Option(
-            "--compensation",
-            metavar="NAME=VALUE",
-            help="What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
+        option(
+            "--compensation NAME=VALUE",
+            "What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
             f"{', '.join(SETTINGS)}.",
         ),
     ] = None,
     compiler: Annotated[
-        str | None,
-        typer.Option("--compiler", metavar="COMMAND", help="Default: $CC, gcc or clang."),
+        str | None, option("--compiler COMMAND", "Default: $CC, gcc or clang.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -269,3 +244,62 @@ def to_dict(
         "verification": verification.to_dict(),
         "cores": [m.to_dict() for m in measured],
     }
+
+
+def show_verification(verification: Verification) -> None:
+    """Print how the C compares with CasADi, one row a floating point type."""
+    compiler = f" ({verification.compiler})" if verification.compiler else ""
+    output.show(f"{verification.name}: {verification.status}{compiler}")
+    if verification.checks:
+        output.show_table(
+            ["type", "steps", "warnings", "against CasADi", "error", "of", "foreign symbols"],
+            [
+                (
+                    check.real,
+                    check.steps,
+                    len(check.warnings),
+                    compared(check),
+                    f"{check.error:.2g}",
+                    check.worst or "-",
+                    ", ".join(check.foreign or ()) or "none",
+                )
+                for check in verification.checks
+            ],
+        )
+    for check in verification.checks:
+        if check.ties:
+            output.show(
+                f"{check.real}: in {check.ties} of {check.steps} steps a mode ties and rounding "
+                "decides it, in CasADi as in C"
+            )
+
+
+def compared(check: Check) -> str:
+    """How the C compares with CasADi, in words."""
+    return "differs" if check.ulp is None and not check.near else bits(check.ulp)
+
+
+def bits(ulp: int | None) -> str:
+    """How near the C in double is to CasADi, in words."""
+    if ulp is None:
+        return "within rounding"
+    return "bit for bit equal" if ulp == 0 else f"{ulp} ulp apart"
+
+
+def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
+    """Print what the C needs here, by size and -fstack-usage, and on other cores, by QEMU."""
+    rows: list[tuple[str | float, ...]] = []
+    for real in generated.reals:
+        found = generated.manifest["real"][real].get("measured")
+        if found is not None:
+            stack = max(found["stack"].values(), default="-")
+            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
+    for m in measured:
+        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else ("-", "-", "-", "-")
+        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
+        rows.append((m.real, m.core, *numbers))
+    if rows:
+        head = ["type", "built by, for", "code [B]", "stack [B]", "instructions", "at most"]
+        output.show_table(head, rows)
+    for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
+        output.show(f"{core}: {status}")

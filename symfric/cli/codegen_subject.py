@@ -1,18 +1,22 @@
-"""What `symfric codegen` makes C of, and which options say something to it."""
+"""Subjects of `symfric codegen`: laws, plants, robots, compensators, and the options of each."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import final
 
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import output
-from symfric.cli.machines import formed, forms
+from symfric.cli.machines import formed, forms, kind_of
+from symfric.codegen import Block, inverse_dynamics_block
+from symfric.compensation import Compensation, compensator, settings_from_text
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, parameters
 from symfric.foundation.status import Status
 from symfric.laws import AnyLaw
+from symfric.multibody import Mechanism, read_urdf
 from symfric.scenes import Drive, Scene
+from symfric.scenes.mechanism import MechanismScene
 
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
@@ -154,3 +158,89 @@ def machine_of(
             f"fitted under a load of 1 N; {hint}"
         )
     return with_values(machine, values)
+
+
+SETTINGS = tuple(item.name for item in fields(Compensation))
+"""What can be said about a compensator, for the help."""
+
+
+def compensator_block(
+    law: AnyLaw,
+    drive: Drive | None,
+    texts: Sequence[str],
+    *,
+    name: str | None,
+    h: float | None,
+    turning: bool,
+    fold: bool,
+) -> Block:
+    """The compensator of a law, with the load and the offset of the drive that it was fitted in.
+
+    Args:
+        law: with its numbers.
+        drive: that of a fit.
+        texts: settings, NAME=VALUE each, see `settings_from_text`.
+
+    Raises:
+        ValueError: a population; as `compensator`.
+    """
+    if not isinstance(law, Law):
+        raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
+    subject = law if drive is None else replace(drive, law=law)
+    settings = settings_from_text(texts)
+    return compensator(subject, settings=settings, name=name, h=h, turning=turning, fold=fold)
+
+
+def robot_block(
+    file: Path | None,
+    scene: str | None,
+    law: str | None,
+    values: dict[str, float],
+    *,
+    name: str | None,
+    h: float | None,
+    fold: bool,
+    payload: str | None,
+    tunable_gravity: bool,
+) -> Block:
+    """The inverse dynamics of a robot's file or of a scene.
+
+    Args:
+        file, scene: one of them; a scene may be a robot's file, too.
+        law: in all joints; of a file without one, what its tags say.
+        values: parameters of the scene or of the law, which become its defaults.
+        fold: the numbers of friction become constants.
+        payload: frame that carries a load; its inertia is a parameter, too.
+
+    Raises:
+        ValueError: both or none of them; no mechanism; as `inverse_dynamics_block`.
+    """
+    where = file if scene is None else scene
+    if where is None or (file is not None and scene is not None):
+        got = "neither" if where is None else "both"
+        raise ValueError(f"{INVERSE}: expected a robot's FILE.urdf or --scene NAME, got {got}")
+    if file is not None and file.suffix.lower() != ".urdf":
+        raise ValueError(f"{INVERSE}: expected a robot's FILE.urdf, got '{file}'")
+    return inverse_dynamics_block(
+        _mechanism(str(where), law, values),
+        name=name,
+        h=h,
+        fold=fold,
+        payload=payload,
+        payload_inertia=payload is not None,
+        tunable_gravity=tunable_gravity,
+    )
+
+
+def _mechanism(scene: str, law: str | None, values: dict[str, float]) -> Mechanism:
+    if law is None and scene.endswith(".urdf"):
+        if values:
+            raise ValueError(f"{INVERSE}: --set: expected with --law only, got {', '.join(values)}")
+        return read_urdf(scene)
+    if law is None:
+        raise ValueError(f"{INVERSE}: expected --law NAME with --scene {scene}, got none")
+    machine = kind_of(scene, "--scene")(law_from_text(law))
+    check_names(f"--set of {scene}", values, parameters(machine))
+    if not isinstance(machine, MechanismScene):
+        raise ValueError(f"{INVERSE}: expected a scene of bodies and joints, got {scene}")
+    return with_values(machine, values).mechanism()

@@ -2,7 +2,7 @@
 
 from importlib import import_module
 from inspect import cleandoc
-from typing import Any
+from typing import Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -23,6 +23,8 @@ COMMANDS = {
     "stress": "Judge runs of random laws in random scenes.",
 }
 """What there is, and the first line of each."""
+MODULES = {"report": "run"}
+"""Commands that do not stand in a module of their own name."""
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -36,6 +38,33 @@ WIDTH = 78
 """Columns of an example."""
 
 
+TEXTS = (str, str | None, list[str], list[str] | None)
+"""Types of parameters that are texts as they stand."""
+
+
+def convert_as_needed(parameter: Any, is_text: bool) -> Any:
+    """The parameter, which now takes texts, defaults and nothing as they are.
+
+    The conversion of Typer loads pydantic, which takes longer than a simulation.
+    """
+    if "process_value" in vars(parameter):
+        return parameter
+    convert = parameter.process_value
+    several = parameter.nargs == -1 or getattr(parameter, "multiple", False)
+
+    def process_value(ctx: Any, value: Any) -> Any:
+        if parameter.required and not value:
+            return convert(ctx, value)
+        if value is None:
+            return () if several else None
+        if is_text:
+            return list(value) if several else value
+        return value if value is parameter.default else convert(ctx, value)
+
+    parameter.process_value = process_value
+    return parameter
+
+
 class Commands(TyperGroup):
     """Loads the command that is called, and none for a list of them."""
 
@@ -43,6 +72,10 @@ class Commands(TyperGroup):
         super().__init__(**attributes)
         known: dict[str, Any] = dict.fromkeys(COMMANDS)
         self.commands = known
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options before a command."""
+        return [convert_as_needed(p, False) for p in super().get_params(ctx)]
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Their names, in the order of the help."""
@@ -54,7 +87,8 @@ class Commands(TyperGroup):
             return None
         one = typer.Typer(**SETTINGS)
         name = cmd_name.replace("-", "_")
-        one.command(cls=Command)(getattr(import_module(f"symfric.cli.{name}"), name))
+        function = getattr(import_module(f"symfric.cli.{MODULES.get(name, name)}"), name)
+        one.command(cls=Command)(function)
         return typer.main.get_command(one)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -73,6 +107,12 @@ class Commands(TyperGroup):
 
 class Command(TyperCommand):
     """A command whose help names arguments as the texts do, and ends in lines to copy."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Arguments and options."""
+        hints = get_type_hints(self.callback) if self.callback else {}
+        found = super().get_params(ctx)
+        return [convert_as_needed(p, hints.get(str(p.name)) in TEXTS) for p in found]
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """The line of usage behind the name."""

@@ -64,8 +64,8 @@ def places(context: typer.Context, incomplete: str) -> list[str]:
 def _machines(context: typer.Context) -> list[Any]:
     from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
 
-    words = (context.params.get("scene"), context.params.get("what"), *map(str, context.args))
-    return [ALL_SCENES[word] for word in words if word in ALL_SCENES]
+    words = (context.params.get("scene"), context.params.get("what"), *context.args)
+    return [ALL_SCENES[word] for word in map(str, words) if word in ALL_SCENES]
 
 
 def figures(incomplete: str) -> list[str]:
@@ -97,7 +97,7 @@ def settings(context: typer.Context, incomplete: str) -> list[str]:
 
     words = [str(word) for word in context.args]  # arguments before an option without its value
     named = context.params.get("law") or context.params.get("name") or []
-    machines = [w for w in (context.params.get("scene"), *words) if w in ALL_SCENES]
+    machines = [w for w in (str(context.params.get("scene")), *words) if w in ALL_SCENES]
     texts = [named] if isinstance(named, str) else [*named]
     if not (texts or machines):
         texts = words

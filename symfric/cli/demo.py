@@ -15,8 +15,8 @@ from identification.result.fitted import Fitted
 from ocp import Free, Solution, rest_to_rest, solve
 from symfric import ALL_LAWS, LuGre, simulate
 from symfric.cli import output
-from symfric.cli.codegen_shown import show_verification
-from symfric.cli.options import check_folder
+from symfric.cli.codegen import show_verification
+from symfric.cli.options import check_folder, option
 from symfric.cli.run import show_trajectory
 from symfric.codegen import generate, verify
 from symfric.foundation.files import write_text
@@ -44,15 +44,12 @@ class Chapter:
 
 
 def demo(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")
-    ] = Path("out"),
+    out: Annotated[Path, option("--out DIR", "Folder for the results.")] = Path("out"),
     data: Annotated[
         Path | None,
-        typer.Option(
-            "--data",
-            metavar="DIR",
-            help="Folder of the EMPS benchmark; without it, and without ../shared/data/EMPS, "
+        option(
+            "--data DIR",
+            "Folder of the EMPS benchmark; without it, and without ../shared/data/EMPS, "
             "a simulated record is identified.",
         ),
     ] = None,

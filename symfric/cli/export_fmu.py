@@ -3,12 +3,17 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from symfric.cli import completions, output
 from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
-from symfric.cli.options import JsonOption, SetOption, assignments, check_outputs
-from symfric.cli.user_file import held_by_file
+from symfric.cli.options import (
+    JsonOption,
+    SetOption,
+    argument,
+    assignments,
+    check_outputs,
+    held_by_file,
+    option,
+)
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
 from symfric.fmu.export import KINDS
@@ -23,62 +28,40 @@ DEFAULT_NAME = "model"
 def export_fmu(
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="SCENE|FILE.urdf|FILE.py[:NAME]",
-            help="A scene, a robot, or a `Model`, or a function that returns one, in a file.",
-            autocompletion=completions.scenes,
+        argument(
+            "SCENE|FILE.urdf|FILE.py[:NAME]",
+            "A scene, a robot, or a `Model`, or a function that returns one, in a file.",
+            completions.scenes,
         ),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE.fmu", help="Default: the name of the model."),
-    ] = None,
+    out: Annotated[Path | None, option("--out FILE.fmu", "Default: the name of the model.")] = None,
     law: Annotated[
-        str | None,
-        typer.Option(
-            "--law",
-            metavar="NAME",
-            help="Friction law of a scene.",
-            autocompletion=completions.laws,
-        ),
+        str | None, option("--law NAME", "Friction law of a scene.", completions.laws)
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     free: Annotated[
         list[str] | None,
-        typer.Option(
-            "--free",
-            metavar="NAME",
-            help="Make this parameter tunable, and others not; by default all that are not zero.",
+        option(
+            "--free NAME",
+            "Make this parameter tunable, and others not; by default all that are not zero.",
         ),
     ] = None,
-    fmi: Annotated[int, typer.Option("--fmi", metavar="2|3", help="Version of the standard.")] = 3,
-    kind: Annotated[
-        str,
-        typer.Option("--kind", metavar="NAME", help=f"{' or '.join(KINDS)}."),
-    ] = KINDS[0],
+    fmi: Annotated[int, option("--fmi 2|3", "Version of the standard.")] = 3,
+    kind: Annotated[str, option("--kind NAME", f"{' or '.join(KINDS)}.")] = KINDS[0],
     rtol: Annotated[
-        float,
-        typer.Option(
-            "--rtol", metavar="NUMBER", help="Relative tolerance of a step; tunable in the unit."
-        ),
+        float, option("--rtol NUMBER", "Relative tolerance of a step; tunable in the unit.")
     ] = 1e-6,
     step_size: Annotated[
-        float | None,
-        typer.Option("--step-size", metavar="SECONDS", help="Fixed steps of this length instead."),
+        float | None, option("--step-size SECONDS", "Fixed steps of this length instead.")
     ] = None,
-    method: Annotated[
-        str,
-        typer.Option("--method", metavar="NAME", help="Formula, as of `run` and `codegen`."),
-    ] = "auto",
+    method: Annotated[str, option("--method NAME", "Formula, as of `run` and `codegen`.")] = "auto",
     t_end: Annotated[
-        float | None,
-        typer.Option("--t-end", metavar="SECONDS", help="Stop time of the default experiment."),
+        float | None, option("--t-end SECONDS", "Stop time of the default experiment.")
     ] = None,
     name: Annotated[
-        str | None,
-        typer.Option("--name", metavar="NAME", help="Model identifier; default from the model."),
+        str | None, option("--name NAME", "Model identifier; default from the model.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -147,9 +130,9 @@ def from_file(
         ValueError: no such file or name, a file that fails, something that is no model.
     """
     given = {"--law": law, "--preset": preset, "--law-of": law_of}
-    for option, value in given.items():
+    for name, value in given.items():
         if value:
-            raise ValueError(f"{option}: expected none with '{what}', which has its laws")
+            raise ValueError(f"{name}: expected none with '{what}', which has its laws")
     kind = Model | Scene
     values = {n: checks.parsed(f"--set {n}", text) for n, text in settings.items()}
     return held_by_file("export-fmu", what, DEFAULT_NAME, values, "Model", kind)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from symfric.cli import completions, output
-from symfric.cli.options import WorkersOption
+from symfric.cli.options import WorkersOption, argument, option
 from symfric.foundation.files import make_folder
 from symfric.gallery import chosen, short
 from symfric.gallery.plate import about
@@ -22,22 +22,12 @@ INTERRUPTED = 130
 def gallery(
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="NAME",
-            help="A figure, or a paper; all if none is given.",
-            autocompletion=completions.plates,
-        ),
+        argument("NAME", "A figure, or a paper; all if none is given.", completions.plates),
     ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Where pictures and numbers go.")
-    ] = Path("gallery"),
-    quick: Annotated[
-        bool, typer.Option("--quick", help="At reduced size, a second a figure.")
-    ] = False,
+    out: Annotated[Path, option("--out DIR", "Where pictures and numbers go.")] = Path("gallery"),
+    quick: Annotated[bool, option("--quick", "At reduced size, a second a figure.")] = False,
     workers: WorkersOption = None,
-    listed: Annotated[
-        bool, typer.Option("--list", help="List the figures and compute none.")
-    ] = False,
+    listed: Annotated[bool, option("--list", "List the figures and compute none.")] = False,
 ) -> None:
     """Compute the figures of the papers again.
 

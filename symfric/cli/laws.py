@@ -5,11 +5,18 @@ from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from symfric import ALL_LAWS, parameters
 from symfric.cli import completions, output
-from symfric.cli.options import JsonOption, PlotOption, SetOption, all_with, any_with, check_outputs
+from symfric.cli.options import (
+    JsonOption,
+    PlotOption,
+    SetOption,
+    all_with,
+    any_with,
+    argument,
+    check_outputs,
+    option,
+)
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.magnitudes import NORMAL_FORCE, parts, phenomena
 from symfric.foundation import checks
@@ -22,40 +29,21 @@ from symfric.scenes import ALL_SCENES
 
 def laws(
     name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NAME",
-            help="One law, such as lugre.",
-            autocompletion=completions.all_laws,
-        ),
+        str | None, argument("NAME", "One law, such as lugre.", completions.all_laws)
     ] = None,
     settings: SetOption = None,
     plot: PlotOption = None,
     figure: Annotated[
         str | None,
-        typer.Option(
-            "--figure",
-            metavar="FIGURE",
-            help=f"Behaviour: {', '.join(FIGURES)}.",
-            autocompletion=completions.figures,
-        ),
+        option("--figure FIGURE", f"Behaviour: {', '.join(FIGURES)}.", completions.figures),
     ] = None,
     others: Annotated[
         list[str] | None,
-        typer.Option(
-            "--compare",
-            metavar="LAW",
-            help="Overlay another law; may be repeated.",
-            autocompletion=completions.all_laws,
-        ),
+        option("--compare LAW", "Overlay another law; may be repeated.", completions.all_laws),
     ] = None,
     normal_force: Annotated[
         float | None,
-        typer.Option(
-            "--normal-force",
-            metavar="NUMBER",
-            help="Normal force [N]; default 1, and 7.848 for --figure.",
-        ),
+        option("--normal-force NUMBER", "Normal force [N]; default 1, and 7.848 for --figure."),
     ] = None,
     json: JsonOption = None,
 ) -> None:

@@ -1,53 +1,52 @@
-"""A scene as commands name it: its laws, a paper's preset, its parameters."""
+"""A scene as commands name it: its laws, a paper's preset, its parameters, and what drives it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, final
 
-import typer
+import numpy as np
 
-from symfric import Law, law_from_text, parameters, with_values
+from symfric import Law, Linear, law_from_text, parameters, rate_of, with_values
 from symfric.cli import completions
-from symfric.cli.options import assignments
+from symfric.cli.options import argument, assignments, numbers, option
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.multibody.urdf.read import relative
-from symfric.scenes import ALL_SCENES, Robot, Scene
+from symfric.foundation.tables import Column, read_table
+from symfric.integrator import Input
+from symfric.integrator.equations.inputs import Sampled
+from symfric.model import Model
+from symfric.scenes import ALL_SCENES, Scene
 
 SceneArgument = Annotated[
     str,
-    typer.Argument(
-        metavar="SCENE",
-        help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.",
-        autocompletion=completions.scenes,
+    argument(
+        "SCENE", f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.", completions.scenes
     ),
 ]
 LawsOption = Annotated[
     list[str],
-    typer.Option(
-        "--law",
-        metavar="NAME[,NAME]",
-        help="Friction law; several, with commas or repeated, are compared.",
-        autocompletion=completions.each_law,
+    option(
+        "--law NAME[,NAME]",
+        "Friction law; several, with commas or repeated, are compared.",
+        completions.each_law,
     ),
 ]
 PresetOption = Annotated[
     str | None,
-    typer.Option(
-        "--preset",
-        metavar="NAME",
-        help="Numbers of a paper; `symfric scenes SCENE` lists them.",
-        autocompletion=completions.presets,
+    option(
+        "--preset NAME",
+        "Numbers of a paper; `symfric scenes SCENE` lists them.",
+        completions.presets,
     ),
 ]
 LawOfOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--law-of",
-        metavar="PLACE=LAW",
-        help="Law of another place of the scene or joint of a robot, as hinge=coulomb.",
-        autocompletion=completions.places,
+    option(
+        "--law-of PLACE=LAW",
+        "Law of another place of the scene or joint of a robot, as hinge=coulomb.",
+        completions.places,
     ),
 ]
 
@@ -68,6 +67,9 @@ def kind_of(
     """
     others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
+        from symfric.multibody.urdf.read import relative  # noqa: PLC0415  (of robots only)
+        from symfric.scenes import Robot  # noqa: PLC0415
+
         check_names("--preset of a robot", [preset] if preset else [], ())
         laws = tuple(relative(law) for law in others.values())
         return lambda law: Robot(relative(law), scene, tuple(others), laws)
@@ -150,3 +152,107 @@ def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool 
         return checks.choice(f"--set {name}", text, ("true", "false")) == "true"
     number = _number(name, text)
     return int(number) if number.is_integer() else checks.count(f"--set {name}", number)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """What drives a scene, from where it starts, and until when it runs.
+
+    Attributes:
+        signals: inputs by name.
+        told: how people write them.
+        start: state -> value.
+        until: last time [s].
+    """
+
+    signals: dict[str, Input]
+    told: dict[str, str]
+    start: dict[str, float]
+    until: float
+
+
+def driven(
+    scene: Scene,
+    model: Model,
+    texts: Sequence[str] | None,
+    x0: Sequence[str] | None,
+    t_end: float | None,
+) -> Driven:
+    """What texts of --input, --x0 and --t-end mean for a scene.
+
+    An input that is not given is that of the scene. The last time is that of the samples, or the
+    one that shows the scene. Samples of a state whose rate is an input (`Scene.integrals`) are that
+    input, and say where the state starts.
+
+    Raises:
+        ValueError: unknown names, an input beside its integral, or what `input_from_text` refuses.
+    """
+    given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
+    ways = {state: rate for state, rate in scene.integrals.items() if rate in units}
+    units |= {v.name: v.unit for v in model.x if v.name in ways}
+    check_names(f"--input of {model.name}", given, units)
+    signals: dict[str, Input] = {}
+    told, start = dict(given), dict[str, float]()
+    for name, text in given.items():
+        signal = input_from_text(name, text, units[name])
+        if name not in ways:
+            signals[name] = signal
+            continue
+        if ways[name] in given:
+            raise ValueError(f"--input: expected {name} or its rate {ways[name]}, got both")
+        signals[ways[name]] = rate_of(signal)
+        start[name] = float(np.asarray(signal.values)[0] if isinstance(signal, Linear) else signal)  # type: ignore[arg-type]
+    for name, own in scene.inputs.items():
+        if name not in signals:
+            signals[name], told[name] = own.function, own.text
+    ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
+    until = max(ends, default=scene.t_end) if t_end is None else t_end
+    return Driven(signals, told, start | numbers("--x0", x0), until)
+
+
+def input_from_text(name: str, text: str, unit: str) -> Linear | float:
+    """The input that `text` means: `2.0`, or `FILE.csv:COLUMN` interpolated linearly over time.
+
+    Args:
+        name: of the input.
+        text: what stands behind the equals sign.
+        unit: SI unit of the input.
+
+    Raises:
+        ValueError: neither a finite number nor a column of a readable file.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        file, colon, column = text.rpartition(":")
+        if not colon or not file or not column:
+            raise ValueError(
+                f"--input {name}: expected a number or FILE.csv:COLUMN, got '{text}'"
+            ) from None
+        return read_column(Path(file), column, unit)
+    return checks.number(f"--input {name}", value)
+
+
+def read_column(path: Path, column: str, unit: str) -> Linear:
+    """Samples of `column` over the column t of a CSV file.
+
+    Units in the header become SI, as in `symfric identify`; without one the column is in SI.
+
+    Raises:
+        ValueError: no such column or two, no column t, a unit of something else, a row that holds
+            no numbers, times not increasing.
+        OSError: the file cannot be read.
+    """
+    names = (column, column.partition("[")[0].strip())
+    table = read_table(
+        path,
+        {
+            "t": Column(("t", "time", "Time"), "s", assumed=True),
+            column: Column(names, unit, assumed=True),
+        },
+    )
+    try:
+        return Linear(table.columns["t"], table.columns[column])
+    except ValueError as error:
+        raise ValueError(f"read '{path.name}': {error}") from None

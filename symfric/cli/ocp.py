@@ -3,18 +3,25 @@
 from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
-import typer
-
 from ocp import Problem, Solution, load, solve
+from ocp.job import Friction
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
-from ocp.solve import Friction
 from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import completions, output
-from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
-from symfric.cli.user_file import held_by_file, made
+from symfric.cli.options import (
+    JsonOption,
+    PlotOption,
+    SetOption,
+    argument,
+    called_with,
+    check_outputs,
+    held_by_file,
+    numbers,
+    option,
+)
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
@@ -26,60 +33,41 @@ DEFAULT_NAME = "problem"
 def ocp(
     problem: Annotated[
         str | None,
-        typer.Argument(
-            metavar="NAME|FILE.py[:NAME]",
-            help="A ready problem, or a `Problem`, or a function that returns one, in a file.",
-            autocompletion=completions.problems,
+        argument(
+            "NAME|FILE.py[:NAME]",
+            "A ready problem, or a `Problem`, or a function that returns one, in a file.",
+            completions.problems,
         ),
     ] = None,
     settings: SetOption = None,
     intervals: Annotated[
-        int | None, typer.Option("--intervals", metavar="N", help="Equal intervals to begin with.")
+        int | None, option("--intervals N", "Equal intervals to begin with.")
     ] = None,
     scheme: Annotated[
-        str,
-        typer.Option(
-            "--scheme",
-            metavar="NAME",
-            help="radau3, legendre4, shooting:rodas5p:2 (method, steps).",
-        ),
+        str, option("--scheme NAME", "radau3, legendre4, shooting:rodas5p:2 (method, steps).")
     ] = "radau3",
     solver: Annotated[
-        str, typer.Option("--solver", metavar="|".join(SOLVERS), help="What solves the program.")
+        str, option("--solver", "What solves the program.", metavar="|".join(SOLVERS))
     ] = "ipopt",
     friction: Annotated[
-        str,
-        typer.Option(
-            "--friction", metavar="NAME", help=f"How it is met: {', '.join(get_args(Friction))}."
-        ),
+        str, option("--friction NAME", f"How it is met: {', '.join(get_args(Friction))}.")
     ] = "auto",
     tolerance: Annotated[
-        float,
-        typer.Option(
-            "--tolerance", metavar="NUMBER", help="Largest relative miss of what is asked for."
-        ),
+        float, option("--tolerance NUMBER", "Largest relative miss of what is asked for.")
     ] = 1e-3,
     resting_margin: Annotated[
         float,
-        typer.Option(
-            "--resting-margin",
-            metavar="NUMBER",
-            help="Share of its static level (dimensionless) that a contact at rest keeps from it.",
+        option(
+            "--resting-margin NUMBER",
+            "Share of its static level (dimensionless) that a contact at rest keeps from it.",
         ),
     ] = 1e-4,
     max_time: Annotated[
-        float | None,
-        typer.Option("--max-time", metavar="SECONDS", help="Time after which to stop."),
+        float | None, option("--max-time SECONDS", "Time after which to stop.")
     ] = None,
-    guess: Annotated[
-        Path | None, typer.Option("--guess", metavar="FILE", help="Start from a saved solution.")
-    ] = None,
-    save: Annotated[
-        Path | None, typer.Option("--save", metavar="FILE", help="Save it for a warm start.")
-    ] = None,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all signals.")
-    ] = None,
+    guess: Annotated[Path | None, option("--guess FILE", "Start from a saved solution.")] = None,
+    save: Annotated[Path | None, option("--save FILE", "Save it for a warm start.")] = None,
+    csv: Annotated[Path | None, option("--csv FILE.csv", "Write all signals.")] = None,
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -141,7 +129,7 @@ def problem_of(text: str, values: dict[str, float]) -> tuple[Ready | None, Probl
     _, _, name = text.partition(".py")
     if not (name == "" and text.endswith(".py")) and not name.startswith(":"):
         check_names("ocp", [text], READY)
-        return READY[text], made(text, READY[text].make, values)
+        return READY[text], called_with(text, READY[text].make, values)
     return None, held_by_file("ocp", text, DEFAULT_NAME, values, "Problem", Problem)
 
 

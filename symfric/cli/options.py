@@ -1,9 +1,13 @@
-"""Options that several commands share, and what their texts mean."""
+"""Options that several commands share, and what their texts mean; files of the user among them."""
 
-from collections.abc import Iterable, Sequence
+import runpy
+import traceback
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial, wraps
+from inspect import isclass, isfunction, signature
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -13,47 +17,50 @@ from symfric.foundation import checks
 from symfric.foundation.files import check_file
 from symfric.foundation.files import check_folder as check_folder
 from symfric.foundation.parameters import check_names, options
+from symfric.foundation.status import SolveError
 from symfric.laws import AnyLaw, any_from_text
 
+
+def option(
+    words: str,
+    meaning: str,
+    completion: Callable[..., list[str]] | None = None,
+    metavar: str | None = None,
+) -> Any:
+    """An option: its names and, behind them, what stands for its value, as "--rtol NUMBER"."""
+    names = [word for word in words.split() if word.startswith("--")]
+    value = " ".join(word for word in words.split() if not word.startswith("--"))
+    return typer.Option(
+        *names, metavar=metavar or value or None, help=meaning, autocompletion=completion
+    )
+
+
+def argument(metavar: str, meaning: str, completion: Callable[..., list[str]] | None = None) -> Any:
+    """An argument without a name on the line."""
+    return typer.Argument(metavar=metavar, help=meaning, autocompletion=completion)
+
+
 JsonOption = Annotated[
-    str | None,
-    typer.Option("--json", metavar="FILE|-", help="Write JSON; - prints it and nothing else."),
+    str | None, option("--json FILE|-", "Write JSON; - prints it and nothing else.")
 ]
 MissingOption = Annotated[
     str,
-    typer.Option(
-        "--missing",
-        metavar="refuse|drop",
-        help="Rows in which a channel has no number, or that repeat the one before: drop them.",
+    option(
+        "--missing refuse|drop",
+        "Rows in which a channel has no number, or that repeat the one before: drop them.",
     ),
 ]
 ResampleOption = Annotated[
-    bool, typer.Option("--resample", help="Equal intervals; a long gap begins another record.")
+    bool, option("--resample", "Equal intervals; a long gap begins another record.")
 ]
-PlotOption = Annotated[
-    Path | None, typer.Option("--plot", metavar="FILE.png", help="Write a picture.")
-]
-HtmlOption = Annotated[
-    Path | None, typer.Option("--html", metavar="FILE.html", help="Write one page of it all.")
-]
-RtolOption = Annotated[
-    float, typer.Option("--rtol", metavar="NUMBER", help="Relative tolerance of a step.")
-]
-StartOption = Annotated[
-    list[str] | None,
-    typer.Option("--x0", metavar="NAME=VALUE", help="Start value of a state."),
-]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes; default one a core.")
-]
+PlotOption = Annotated[Path | None, option("--plot FILE.png", "Write a picture.")]
+HtmlOption = Annotated[Path | None, option("--html FILE.html", "Write one page of it all.")]
+RtolOption = Annotated[float, option("--rtol NUMBER", "Relative tolerance of a step.")]
+StartOption = Annotated[list[str] | None, option("--x0 NAME=VALUE", "Start value of a state.")]
+WorkersOption = Annotated[int | None, option("--workers N", "Processes; default one a core.")]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Set a parameter; may be repeated.",
-        autocompletion=completions.settings,
-    ),
+    option("--set NAME=VALUE", "Set a parameter; may be repeated.", completions.settings),
 ]
 
 
@@ -169,3 +176,116 @@ def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> Non
         if path is None or str(path) == "-":
             continue
         check_file(path)
+
+
+def held_by_file(
+    command: str, text: str, default: str, values: dict[str, float], wanted: str, kind: Any
+) -> Any:
+    """What FILE.py[:NAME] holds, or what the function of that name makes of the numbers of --set.
+
+    Args:
+        command: who asks.
+        text: FILE.py or FILE.py:NAME.
+        default: the name where none is given.
+        values: of --set.
+        wanted, kind: what it is to be, in words and as types.
+
+    Raises:
+        ValueError: no such file or name, a file that fails, numbers that do not fit, something else
+            than what is wanted.
+    """
+    name, held = _named(command, text, default, lambda value: isinstance(value, kind))
+    found = held[name]
+    if callable(found):
+        found = called_with(text, _with_line(command, held, found), values)
+    elif values:
+        raise ValueError(f"--set: expected none for '{name}', which is no function")
+    if not isinstance(found, kind):
+        what = f"a {wanted}, or a function that returns one"
+        raise checks.refused(f"{command} '{text}'", what, found)
+    return found
+
+
+def function_of_file(command: str, text: str, default: str, values: dict[str, float]) -> Any:
+    """What FILE.py[:NAME] holds and can be called, with the numbers of --set as its keywords.
+
+    Raises:
+        ValueError: no such file or name, a file that fails, numbers that do not fit.
+    """
+    name, held = _named(command, text, default, callable)
+    found = held[name]
+    if not callable(found):
+        raise checks.refused(f"{command} '{text}'", "a function law -> Model, or a scene", found)
+    first, *others = signature(found).parameters or [""]
+    check_names(f"--set of {text}, a function of {first}", values, others)
+    own = _with_line(command, held, found)
+    return partial(own, **values) if values else own
+
+
+def _with_line(command: str, held: Mapping[str, Any], function: Callable[..., Any]) -> Any:
+    """The function of a user's file; an error in it names its line in that file."""
+    if isclass(function):
+        return function
+
+    @wraps(function)
+    def called(*given: Any, **named: Any) -> Any:
+        try:
+            return function(*given, **named)
+        except (ValueError, SolveError):
+            raise
+        except Exception as error:
+            raise _failed(command, Path(held["__file__"]), error) from error
+
+    return called
+
+
+def _named(
+    command: str, text: str, default: str, fits: Callable[[Any], bool]
+) -> tuple[str, dict[str, Any]]:
+    """The name that FILE.py[:NAME] means, and all that the file holds.
+
+    Raises:
+        ValueError: no such file, a file that fails, no such name; it says which ones fit.
+    """
+    path, _, name = text.partition(".py")
+    file, name = Path(f"{path}.py"), name.removeprefix(":") or default
+    if not file.is_file():
+        raise ValueError(f"{command}: expected a Python file, got '{file}', which does not exist")
+    held = _names_of(command, file)
+    if name not in held:
+        there = [n for n, value in held.items() if _meant(value, held, fits)]
+        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
+        raise ValueError(f"{command}: expected '{name}' in '{file}', got none{hint}")
+    return name, held
+
+
+def _meant(value: object, held: Mapping[str, Any], fits: Callable[[Any], bool]) -> bool:
+    """Whether a name may be offered: what fits, and public functions of the file itself."""
+    if isfunction(value) or isclass(value):
+        return value.__module__ == held["__name__"] and value.__name__[0] != "_"
+    return fits(value)
+
+
+def _names_of(command: str, file: Path) -> dict[str, Any]:
+    """The names of a file that was run; an error in it says its line."""
+    try:
+        return runpy.run_path(str(file))
+    except Exception as error:
+        raise _failed(command, file, error) from error
+
+
+def _failed(command: str, file: Path, error: Exception) -> ValueError:
+    """The error that names the line of a user's file."""
+    frames = reversed(traceback.extract_tb(error.__traceback__))
+    own = getattr(error, "lineno", None)  # of a syntax error
+    line = next((f.lineno for f in frames if f.filename == str(file)), own)
+    return ValueError(
+        f"{command}: expected a file that runs, got {type(error).__name__} in line {line} of "
+        f"'{file}': {error}"
+    )
+
+
+def called_with(text: str, make: Any, values: dict[str, float]) -> Any:
+    """What a function makes of the numbers of --set."""
+    check_names(f"--set of {text}", values, list(signature(make).parameters))
+    return make(**values)

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import sys
 import textwrap
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,7 +13,6 @@ from typing import Any
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
@@ -74,15 +74,28 @@ def show_doc(text: str) -> None:
 @contextmanager
 def progress(text: str) -> Generator[Callable[[float], None]]:
     """A bar on standard error where that is a terminal; takes the fraction done."""
-    console = Console(stderr=True)
-    bar = Progress(console=console, transient=True, disable=not console.is_terminal)
-    with bar:
+    if not sys.stderr.isatty():
+        yield lambda fraction: None
+        return
+    from rich.progress import Progress  # noqa: PLC0415  (of terminals only)
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=1.0)
 
         def tell(fraction: float) -> None:
             bar.update(task, completed=fraction)
 
         yield tell
+
+
+def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
+    """`tell` as what takes the name of the item, too."""
+
+    def advance(name: str, fraction: float) -> None:
+        del name
+        tell(fraction)
+
+    return advance
 
 
 def note(text: str) -> None:

@@ -1,20 +1,22 @@
-"""`symfric run`: simulate a scene with one friction law, or compare several."""
+"""`symfric run` and `symfric report`: simulate a scene with one friction law or several."""
 
+import shlex
+import sys
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import typer
 
 from symfric import Law, SolveError, Trajectory, parameters, simulate
 from symfric.cli import output
-from symfric.cli.inputs import driven
 from symfric.cli.machines import (
     LawOfOption,
     LawsOption,
     PresetOption,
     SceneArgument,
+    driven,
     kind_of,
     scenes_with,
 )
@@ -27,12 +29,14 @@ from symfric.cli.options import (
     assignments,
     check_outputs,
     law_names,
+    option,
     seconds,
 )
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
+from symfric.results.report import report as write_report
 from symfric.scenes import MECHANISMS, Scene
 
 
@@ -44,10 +48,9 @@ def run(
     law_of: LawOfOption = None,
     inputs: Annotated[
         list[str] | None,
-        typer.Option(
-            "--input",
-            metavar="NAME=VALUE",
-            help="Input: a number, or FILE.csv:COLUMN over its column t, both in SI "
+        option(
+            "--input NAME=VALUE",
+            "Input: a number, or FILE.csv:COLUMN over its column t, both in SI "
             "or with their units in the header, as t [ms]; others stay as `symfric scenes SCENE` "
             "shows.",
         ),
@@ -55,62 +58,38 @@ def run(
     x0: StartOption = None,
     t_end: Annotated[
         float | None,
-        typer.Option(
-            "--t-end",
-            metavar="SECONDS",
-            help="Last time [s]; default the last sample, or what shows the scene.",
+        option(
+            "--t-end SECONDS", "Last time [s]; default the last sample, or what shows the scene."
         ),
     ] = None,
     rtol: RtolOption = 1e-6,
     method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            metavar="NAME",
-            help="Formula: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.",
-        ),
+        str, option("--method NAME", "Formula: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
     ] = "auto",
     backend: Annotated[
-        str,
-        typer.Option(
-            "--backend", metavar="auto|vm|compiled", help="What computes: compiled C, or CasADi."
-        ),
+        str, option("--backend auto|vm|compiled", "What computes: compiled C, or CasADi.")
     ] = "auto",
     peer: Annotated[
         str | None,
-        typer.Option(
-            "--peer",
-            metavar="sundials|rosenbrock|ggl",
-            help="One of CasADi's integrators instead, for comparison.",
+        option(
+            "--peer sundials|rosenbrock|ggl", "One of CasADi's integrators instead, for comparison."
         ),
     ] = None,
     max_step: Annotated[
-        float | None,
-        typer.Option("--max-step", metavar="SECONDS", help="Longest step; any by default."),
+        float | None, option("--max-step SECONDS", "Longest step; any by default.")
     ] = None,
     times: Annotated[
-        str | None,
-        typer.Option("--times", metavar="T1,T2,...", help="Times [s] at which a step has to end."),
+        str | None, option("--times T1,T2,...", "Times [s] at which a step has to end.")
     ] = None,
-    samples: Annotated[
-        int,
-        typer.Option("--samples", metavar="N", help="Equally spaced times of the result."),
-    ] = 2001,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", "--out", metavar="FILE.csv", help="Write the signals.")
-    ] = None,
+    samples: Annotated[int, option("--samples N", "Equally spaced times of the result.")] = 2001,
+    csv: Annotated[Path | None, option("--csv --out FILE.csv", "Write the signals.")] = None,
     plot: PlotOption = None,
     panels: Annotated[
         str,
-        typer.Option(
-            "--panels",
-            metavar="main|all",
-            help="Of --plot; main are positions, friction, energy or power.",
-        ),
+        option("--panels main|all", "Of --plot; main are positions, friction, energy or power."),
     ] = "main",
     movie: Annotated[
-        Path | None,
-        typer.Option("--animate", metavar="FILE.gif", help="Film the machine: .gif, .html, .mp4."),
+        Path | None, option("--animate FILE.gif", "Film the machine: .gif, .html, .mp4.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -171,9 +150,18 @@ def run(
             show_trajectory(name, trajectory)
             show_warnings(name, machines[name])
     output.say_written(csv, plot, movie, json)
-    for trajectory in found.values():
-        if not trajectory.status.ok:
-            raise SolveError(trajectory.message, trajectory.status, trajectory)
+    refuse_failed(found)
+
+
+def refuse_failed(found: Mapping[str, Trajectory]) -> None:
+    """Raise for the first run that did not reach its end.
+
+    Raises:
+        SolveError: with its message and what there is of the run.
+    """
+    for run in found.values():
+        if not run.status.ok:
+            raise SolveError(run.message, run.status, run)
 
 
 def check_movie(path: Path | None, scene: str, model: Model) -> None:
@@ -279,3 +267,53 @@ def show_books(trajectory: Trajectory) -> None:
         f"unexplained at most {np.abs(balance.defect).max():.1e} J "
         f"({balance.relative:.1e} of what moved)"
     )
+
+
+def report(
+    scene: SceneArgument,
+    law: LawsOption,
+    html: Annotated[Path, option("--html --out FILE.html", "Write one page of it all.")] = Path(
+        "report.html"
+    ),
+    settings: SetOption = None,
+    preset: PresetOption = None,
+    law_of: LawOfOption = None,
+    inputs: Annotated[list[str] | None, option("--input NAME=VALUE", "Input, as of `run`.")] = None,
+    x0: StartOption = None,
+    t_end: Annotated[
+        float | None, option("--t-end SECONDS", "Last time [s]; default as of `run`.")
+    ] = None,
+    rtol: RtolOption = 1e-6,
+) -> None:
+    """Simulate SCENE and write one page: signals, friction, error, laws.
+
+    The error of every run is measured by another formula at a hundredth of the tolerance. The page
+    needs nothing from elsewhere; it holds the laws with their limits and how to run it again.
+
+    Example: symfric report rabinowicz --law lugre --law brown_mcphee --html report.html
+    """
+    check_outputs(html)
+    laws = law_names(law)
+    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
+    models = {name: machine.model() for name, machine in machines.items()}
+    machine = next(iter(machines.values()))
+    given = driven(machine, models[laws[0]], inputs, x0, t_end)
+    how: Any = {
+        "x0": given.start,
+        "u": given.signals,
+        "rtol": rtol,
+        "samples": 2001,
+        "throw": False,
+    }
+    found: dict[str, Trajectory] = {}
+    for name, model in models.items():
+        with output.progress(f"{scene} with {name}") as tell:
+            found[name] = simulate(model, given.until, **how, measure_error=True, progress=tell)
+    write_report(
+        found,
+        html,
+        settings={name: parameters(machine) for name, machine in machines.items()},
+        command=output.printable(shlex.join(["symfric", *sys.argv[1:]])),
+    )
+    output.say_written(html)
+    refuse_failed(found)

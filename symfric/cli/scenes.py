@@ -5,13 +5,18 @@ from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from symfric import Law, SolveError, Trajectory, Viscous, parameters, simulate
 from symfric.cli import completions, output
-from symfric.cli.inputs import driven
-from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
-from symfric.cli.options import JsonOption, PlotOption, SetOption, assignments, check_outputs
+from symfric.cli.machines import LawOfOption, PresetOption, driven, scenes_with
+from symfric.cli.options import (
+    JsonOption,
+    PlotOption,
+    SetOption,
+    argument,
+    assignments,
+    check_outputs,
+    option,
+)
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Parameter, Variable, options
 from symfric.model import Model
@@ -24,19 +29,18 @@ LAW = "brown_mcphee"
 def scenes(
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="NAME|FILE.urdf",
-            help="One scene, such as drive, or a robot's FILE.urdf.",
-            autocompletion=completions.scenes,
+        argument(
+            "NAME|FILE.urdf",
+            "One scene, such as drive, or a robot's FILE.urdf.",
+            completions.scenes,
         ),
     ] = None,
     law: Annotated[
         str | None,
-        typer.Option(
-            "--law",
-            metavar="NAME",
-            help=f"Show the parameters and states of this law, too; pictures are of {LAW}.",
-            autocompletion=completions.laws,
+        option(
+            "--law NAME",
+            f"Show the parameters and states of this law, too; pictures are of {LAW}.",
+            completions.laws,
         ),
     ] = None,
     settings: SetOption = None,

@@ -19,8 +19,7 @@ from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
 from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
-from symfric.cli.fitting import Reading, reading
-from symfric.cli.fitting import kind_of as kind_of_residuals
+from symfric.cli.identify import Reading, reading, residuals_of
 from symfric.cli.machines import LawOfOption, PresetOption, formed, kind_of
 from symfric.cli.options import (
     HtmlOption,
@@ -30,12 +29,14 @@ from symfric.cli.options import (
     ResampleOption,
     SetOption,
     WorkersOption,
+    argument,
     assignments,
     check_outputs,
+    function_of_file,
     law_names,
+    option,
     with_settings,
 )
-from symfric.cli.user_file import function_of_file
 from symfric.figures.magnitudes import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
@@ -46,88 +47,62 @@ from symfric.scenes import Scene
 def select(
     scene: Annotated[
         str,
-        typer.Argument(
-            metavar="SCENE",
-            help="A scene, FILE.urdf, or FILE.py[:NAME], a function law -> Model.",
-            autocompletion=completions.scenes,
+        argument(
+            "SCENE",
+            "A scene, FILE.urdf, or FILE.py[:NAME], a function law -> Model.",
+            completions.scenes,
         ),
     ],
     need: Annotated[
-        str,
-        typer.Option(
-            "--need",
-            metavar="WORD,...",
-            help=f"Of {', '.join(NEEDS)}.",
-            autocompletion=completions.needs,
-        ),
+        str, option("--need WORD,...", f"Of {', '.join(NEEDS)}.", completions.needs)
     ] = "stiction,stribeck",
     accuracy: Annotated[
-        float,
-        typer.Option("--accuracy", metavar="NUMBER", help="Largest error relative to the motion."),
+        float, option("--accuracy NUMBER", "Largest error relative to the motion.")
     ] = 1e-4,
     law: Annotated[
         list[str] | None,
-        typer.Option(
-            "--law",
-            metavar="NAME[,NAME]",
-            help="Candidates, with commas or repeated; all laws by default.",
-            autocompletion=completions.each_law,
+        option(
+            "--law NAME[,NAME]",
+            "Candidates, with commas or repeated; all laws by default.",
+            completions.each_law,
         ),
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    t_end: Annotated[
-        float | None, typer.Option("--t-end", metavar="SECONDS", help="Last time [s].")
-    ] = None,
+    t_end: Annotated[float | None, option("--t-end SECONDS", "Last time [s].")] = None,
     of: Annotated[
-        str | None,
-        typer.Option("--of", metavar="SIGNAL,...", help="What is compared; default positions."),
+        str | None, option("--of SIGNAL,...", "What is compared; default positions.")
     ] = None,
-    control: Annotated[
-        float,
-        typer.Option("--control", metavar="NUMBER", help="Largest error of fixed steps."),
-    ] = 0.05,
+    control: Annotated[float, option("--control NUMBER", "Largest error of fixed steps.")] = 0.05,
     fixed_steps: Annotated[
-        bool, typer.Option("--fixed-steps/--no-fixed-steps", help="Measure them, too.")
+        bool, option("--fixed-steps/--no-fixed-steps", "Measure them, too.")
     ] = True,
     effort: Annotated[
-        float,
-        typer.Option(
-            "--effort", metavar="NUMBER", help="What a law may cost, in times of the usual."
-        ),
+        float, option("--effort NUMBER", "What a law may cost, in times of the usual.")
     ] = 1.0,
     workers: WorkersOption = None,
     data: Annotated[
-        list[str] | None,
-        typer.Option("--data", metavar="FILE", help="Fit the candidates to it first."),
+        list[str] | None, option("--data FILE", "Fit the candidates to it first.")
     ] = None,
-    kind: Annotated[
-        str, typer.Option("--kind", metavar="NAME", help="How, as of `symfric identify`.")
-    ] = "inverse",
+    kind: Annotated[str, option("--kind NAME", "How, as of `symfric identify`.")] = "inverse",
     columns: Annotated[
-        list[str] | None,
-        typer.Option("--column", metavar="SIGNAL=NAME", help="Column of a signal in the data."),
+        list[str] | None, option("--column SIGNAL=NAME", "Column of a signal in the data.")
     ] = None,
     units: Annotated[
-        list[str] | None,
-        typer.Option("--unit", metavar="SIGNAL=UNIT", help="Unit of a column in the data."),
+        list[str] | None, option("--unit SIGNAL=UNIT", "Unit of a column in the data.")
     ] = None,
     missing: MissingOption = "refuse",
     resample: ResampleOption = False,
     normal_force: Annotated[
-        float,
-        typer.Option("--normal-force", metavar="NUMBER", help="Normal force [N] of the data."),
+        float, option("--normal-force NUMBER", "Normal force [N] of the data.")
     ] = 1.0,
     paper: Annotated[
-        bool,
-        typer.Option("--paper", help="Jing and Mi's tables beside ours; two scenes have them."),
+        bool, option("--paper", "Jing and Mi's tables beside ours; two scenes have them.")
     ] = False,
     plot: PlotOption = None,
     html: HtmlOption = None,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write the table.")
-    ] = None,
+    csv: Annotated[Path | None, option("--csv FILE.csv", "Write the table.")] = None,
     json: JsonOption = None,
 ) -> None:
     """Rank friction laws on a machine, and say which to take.
@@ -313,7 +288,7 @@ def fitted(
     """
     from identification.select import select as rank_fits  # noqa: PLC0415  (only with data)
 
-    chosen = kind_of_residuals(kind, None, {})
+    chosen = residuals_of(kind, None, {})
     records = read.read(files)
     with output.progress("fit") as tell:
         ranking = rank_fits(

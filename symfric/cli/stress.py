@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from symfric.cli import output
-from symfric.cli.options import JsonOption, WorkersOption, check_folder, check_outputs
+from symfric.cli.options import JsonOption, WorkersOption, check_folder, check_outputs, option
 from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Case
 from symfric.stress.judge import CLASSES, FAILING, Verdict
@@ -17,22 +17,15 @@ EVERY = 60.0
 
 
 def stress(
-    cases: Annotated[int, typer.Option("--cases", metavar="N", help="How many cases.")] = 500,
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="N", help="Which cases; the same N, the same cases.")
-    ] = 1,
-    case: Annotated[
-        Path | None, typer.Option("--case", metavar="FILE", help="Rerun one saved case.")
-    ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Where failing cases are kept.")
-    ] = Path("stress_cases"),
+    cases: Annotated[int, option("--cases N", "How many cases.")] = 500,
+    seed: Annotated[int, option("--seed N", "Which cases; the same N, the same cases.")] = 1,
+    case: Annotated[Path | None, option("--case FILE", "Rerun one saved case.")] = None,
+    out: Annotated[Path, option("--out DIR", "Where failing cases are kept.")] = Path(
+        "stress_cases"
+    ),
     workers: WorkersOption = None,
     limit: Annotated[
-        float,
-        typer.Option(
-            "--limit", metavar="SECONDS", help="Processor time of a case; more counts as hanging."
-        ),
+        float, option("--limit SECONDS", "Processor time of a case; more counts as hanging.")
     ] = 120.0,
     json: JsonOption = None,
 ) -> None:

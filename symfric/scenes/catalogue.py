@@ -1,35 +1,61 @@
 """The ready machines by name."""
 
-from symfric.scenes.base import Scene
-from symfric.scenes.drive import Drive
-from symfric.scenes.linkages import DoublePendulum, FourBar, Pendulum, PendulumBox
-from symfric.scenes.mechanism import MechanismScene
-from symfric.scenes.rabinowicz import CoupledBlocks, Rabinowicz
-from symfric.scenes.rigs import Prescribed, QuarterCar
-from symfric.scenes.rotating import Clutch, DrillString, Nip
-from symfric.scenes.slider_crank import SliderCrank
-from symfric.scenes.spatial import Arm, FourMass
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, TypeVar, final
 
-MECHANISMS: dict[str, type[MechanismScene]] = {
-    "pendulum": Pendulum,
-    "double_pendulum": DoublePendulum,
-    "pendulum_box": PendulumBox,
-    "four_mass": FourMass,
-    "slider_crank": SliderCrank,
-    "four_bar": FourBar,
-    "arm": Arm,
+from symfric.scenes.base import Scene
+
+if TYPE_CHECKING:
+    from symfric.scenes.mechanism import MechanismScene
+
+S = TypeVar("S", bound=Scene, covariant=True)
+
+
+@final
+class Catalogue(Mapping[str, type[S]]):
+    """Scenes by name, each loaded when it is taken: one that rubs alone loads no mechanism."""
+
+    def __init__(self, places: Mapping[str, str]) -> None:
+        self._places = dict(places)
+
+    def __getitem__(self, name: str) -> type[S]:
+        module, kind = self._places[name].split()
+        return getattr(import_module(f"symfric.scenes.{module}"), kind)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
+
+
+_MECHANISMS = {
+    "pendulum": "linkages Pendulum",
+    "double_pendulum": "linkages DoublePendulum",
+    "pendulum_box": "linkages PendulumBox",
+    "four_mass": "spatial FourMass",
+    "slider_crank": "slider_crank SliderCrank",
+    "four_bar": "linkages FourBar",
+    "arm": "spatial Arm",
 }
+MECHANISMS: "Catalogue[MechanismScene]" = Catalogue(_MECHANISMS)
 """Scenes of several bodies, with the same law in several joints."""
 
-ALL_SCENES: dict[str, type[Scene]] = {
-    "rabinowicz": Rabinowicz,
-    "drive": Drive,
-    "quarter_car": QuarterCar,
-    "coupled_blocks": CoupledBlocks,
-    "drill_string": DrillString,
-    "clutch": Clutch,
-    "nip": Nip,
-    "prescribed": Prescribed,
-    **MECHANISMS,
-}
+ALL_SCENES: Catalogue[Scene] = Catalogue(
+    {
+        "rabinowicz": "rabinowicz Rabinowicz",
+        "drive": "drive Drive",
+        "quarter_car": "rigs QuarterCar",
+        "coupled_blocks": "rabinowicz CoupledBlocks",
+        "drill_string": "rotating DrillString",
+        "clutch": "rotating Clutch",
+        "nip": "rotating Nip",
+        "prescribed": "rigs Prescribed",
+        **_MECHANISMS,
+    }
+)
 """Every scene by the name the command line uses."""

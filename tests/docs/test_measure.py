@@ -15,9 +15,8 @@ def test_a_measurement_is_stored_with_machine_load_and_commit(
     move = Move("opti", "flow", "lugre", "Solve_Succeeded", 8, 1.114, 1.5e-6, 0.3)
     run = Run("cvodes", "lugre", 2e-5, 1.5)
     monkeypatch.setattr(measure, "STORED", tmp_path)
-    monkeypatch.setattr(
-        measure, "result_of", lambda *_: InteropBenchmark((move,), (run,), ("rockit",))
-    )
+    result = InteropBenchmark((move,), (run,), ("rockit",))
+    monkeypatch.setattr(measure.bench, "bench_interop", lambda quick: result)
     monkeypatch.setattr(measure, "commit", lambda: "abc")
     path = tmp_path / "interop.json"
     short = dict.fromkeys(bench_pages.SHORT, "-") | {"tables": []}

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 SCRIPT = """
-from symfric.bench.identification_lugre import case
+from symfric.bench.identification_memory import case
 fit = case(1).fit().solve(throw=False)
 print(" ".join(e.value.hex() for e in fit.parameters.values()))
 print(" ".join((e.standard_error or 0.0).hex() for e in fit.parameters.values()))
@@ -17,7 +17,7 @@ print(" ".join(s.hex() for s in fit.noise.values()), fit.evaluations)
 POOL = """
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from symfric.bench.identification_lugre import case
+from symfric.bench.identification_memory import case
 if __name__ == "__main__":
     fit = replace(case(1).fit(), starts=3)
     ends = []

@@ -134,11 +134,11 @@ TOLD = (
         "if law is not None or n in own}", "if True}", T_SCENES,
     ),
     Mutant(
-        "a report of a run that failed ends well", CLI + "report.py",
-        "if not trajectory.status.ok:", "if False:", results("report"),
+        "a report of a run that failed ends well", CLI + "run.py",
+        "if not run.status.ok:", "if False:", results("report"),
     ),
     Mutant(
-        "a report does not say how to do it again", CLI + "report.py",
+        "a report does not say how to do it again", CLI + "run.py",
         "shlex.join([\"symfric\", *sys.argv[1:]])", '""', results("report"),
     ),
     Mutant(

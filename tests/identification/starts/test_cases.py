@@ -9,8 +9,8 @@ from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
 from symfric import Dahl, Stribeck
-from symfric.bench import identification_franka as franka
-from symfric.bench import identification_gms as gms
+from symfric.bench.identification_measured import FRANKA, franka
+from symfric.bench.identification_memory import gms
 from symfric.laws.steady import steady_force
 
 
@@ -54,13 +54,13 @@ def test_stiffness_of_a_bristle_from_pre_sliding() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not franka.FOLDER.is_dir(), reason="needs the arm in ../shared/data")
+@pytest.mark.skipif(not FRANKA.is_dir(), reason="needs the arm in ../shared/data")
 def test_memory_meets_both_goals_of_the_arm() -> None:
-    rows = [row for row in franka.measure(quick=True) if "GMS" in row.what]
+    rows = [row for row in franka(quick=True) if "GMS" in row.what]
     assert len(rows) == 2
     assert all(row.met for row in rows)
 
 
 @pytest.mark.slow
 def test_four_elements_are_found_from_hysteresis() -> None:
-    assert all(row.met for row in gms.measure(quick=True))
+    assert all(row.met for row in gms(quick=True))

@@ -5,7 +5,7 @@ import pytest
 from backends import needs_compiler
 
 from symfric import BrownMcPhee, LuGre, simulate
-from symfric.bench.by_hand import ByHand, collocation
+from symfric.bench.contenders import ByHand, collocation
 from symfric.scenes import Rabinowicz
 
 TIMES = np.linspace(0.0, 20.0, 41)[1:]

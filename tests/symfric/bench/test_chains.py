@@ -3,7 +3,7 @@
 import pytest
 
 from symfric import BrownMcPhee, simulate
-from symfric.bench.chains import ChainRow, chain, exponent, scaling
+from symfric.bench.mechanisms import ChainRow, chain, exponent, scaling
 
 
 def test_every_length_is_measured() -> None:

@@ -3,23 +3,22 @@ from math import nan
 import pytest
 from cortex import on_target
 
-from symfric.bench import codegen, codegen_blocks, codegen_cores, embedded
-from symfric.bench.codegen import CodegenBenchmark, bench_codegen
-from symfric.bench.codegen_section import Goal, Section
-from symfric.bench.embedded import bench_embedded
+from symfric.bench import codegen
+from symfric.bench.codegen import CodegenBenchmark, bench_codegen, bench_embedded
+from symfric.bench.table import Goal, Section
 from symfric.embedded import Absent
 
 
-def few(monkeypatch, module) -> None:
-    first = next(codegen_blocks.cases())
-    monkeypatch.setattr(module, "cases", lambda: iter([first]))
+def few(monkeypatch) -> None:
+    first = next(codegen.cases())
+    monkeypatch.setattr(codegen, "cases", lambda: iter([first]))
 
 
 @on_target
 @pytest.mark.heavy
 def test_a_row_has_our_c_beside_that_of_casadi(monkeypatch):
-    few(monkeypatch, codegen_cores)
-    (row,) = codegen_cores.measure(quick=False).to_dict()["rows"]
+    few(monkeypatch)
+    (row,) = codegen.cores(quick=False).to_dict()["rows"]
     assert row["avg"] < row["f"] < row["casadi"]
     assert row["avg"] < row["guarded"]
     assert row["goals"] == "75 ok"
@@ -28,20 +27,17 @@ def test_a_row_has_our_c_beside_that_of_casadi(monkeypatch):
 @on_target
 @pytest.mark.heavy
 def test_every_core_is_measured(monkeypatch):
-    few(monkeypatch, embedded)
+    few(monkeypatch)
     rows = bench_embedded().rows
-    assert [(r.measured.core, r.measured.real) for r in rows] == list(embedded.TARGETS)
+    assert [(r.measured.core, r.measured.real) for r in rows] == list(codegen.TARGETS)
     assert all(r.ok for r in rows)
     assert max(r.measured.error for r in rows) < 1e-6
 
 
-@pytest.mark.parametrize("module", [codegen_cores, embedded])
-def test_absent_tools_are_named_and_nothing_fails(module, monkeypatch):
-    monkeypatch.setattr(module, "find_tools", lambda: Absent(("qemu-system-arm",)))
-    if module is embedded:
-        assert "apt-get" in bench_embedded().advice
-    else:
-        assert "apt-get" in module.measure(quick=True).notes[0]
+def test_absent_tools_are_named_and_nothing_fails(monkeypatch):
+    monkeypatch.setattr(codegen, "find_tools", lambda: Absent(("qemu-system-arm",)))
+    assert "apt-get" in bench_embedded().advice
+    assert "apt-get" in codegen.cores(quick=True).notes[0]
 
 
 def test_goals_are_met_on_their_own_side_and_never_by_a_number_that_is_not_there(tmp_path):

@@ -3,7 +3,7 @@
 import pytest
 from backends import needs_compiler
 
-from symfric.bench.counts import CountRow, compile_rows, counts
+from symfric.bench.mechanisms import CountRow, compile_rows, counts
 
 FOUR = (
     "frictionless",

@@ -18,7 +18,7 @@ def test_order_2_towards_our_solution() -> None:
     errors: list[float] = []
     for count in (500, 1000):
         found, steps = slider_crank(what.scene, CRANK, what.times, count).solve()
-        assert steps == count
+        assert steps() == count
         errors.append(float(np.abs(found[0] - exact).max()))
     assert errors[1] < 1e-4
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from symfric.bench.facts import Fact, drifts, facts, norms
+from symfric.bench.mechanisms import Fact, drifts, facts, norms
 
 
 @pytest.mark.parametrize("fact", facts(), ids=lambda f: f"{f.case}-{f.signal}-{f.t:g}")

@@ -1,4 +1,4 @@
-from symfric.bench.identification_gms import ranked
+from symfric.bench.identification_memory import ranked
 
 
 def test_lugre_is_flagged_on_data_of_gms_and_ranked_below_it() -> None:

@@ -13,7 +13,7 @@ def test_a_goal_is_met_on_its_own_side_and_never_by_a_number_that_is_not_there()
     assert row(1.0).met and not row(3.0).met
     assert row(3.0, ">=").met and not row(1.0, ">=").met
     assert not row(nan).met and not row(nan, ">=").met
-    assert row(nan).to_dict()["value"] is None
+    assert IdentificationBenchmark((row(nan),)).to_dict()["rows"][0]["value"] is None
 
 
 def test_picture_has_a_bar_for_each_number_known(tmp_path) -> None:

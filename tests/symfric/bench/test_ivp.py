@@ -9,12 +9,12 @@ import pytest
 from symfric import Model, Variable
 from symfric.bench import bench_ivp
 from symfric.bench.ivp import IvpBenchmark, IvpRow, correct_digits, measure
-from symfric.bench.problems import PROBLEMS, andrews, hires, ring_modulator, squeezer
-from symfric.bench.problems.problem import Problem
+from symfric.bench.ivp_mechanisms import ANDREWS, JOINT, PROBLEMS
+from symfric.bench.ivp_problems import Problem, hires
 from symfric.cli import main
 from symfric.integrator.simulate import simulate
 
-CHEAP = tuple(p for p in PROBLEMS if p not in (ring_modulator.PROBLEM, squeezer.PROBLEM))
+CHEAP = tuple(p for p in PROBLEMS if p is not JOINT and p.name != "ring modulator")
 """The squeezer of joints is measured among mechanisms, in `multibody/test_iftomm.py`."""
 LATE = {("ring modulator", "rodas5p"): 4}
 """What reaches fewer digits than wanted at rtol 1e-6: fast oscillations add up their phases."""
@@ -57,18 +57,18 @@ def test_published_digits_are_reached_by_all_methods_at_all_tolerances() -> None
 
 
 def test_drift_of_constraints_shrinks_with_the_tolerance() -> None:
-    model = andrews.model()
-    loose, tight = (measure(andrews.PROBLEM, model, "rodas5p", r, "vm") for r in (1e-6, 1e-8))
+    model = ANDREWS.model()
+    loose, tight = (measure(ANDREWS, model, "rodas5p", r, "vm") for r in (1e-6, 1e-8))
     assert 0.0 < tight.drift < 1e-2 * loose.drift < 1e-7
 
 
 def test_digits_are_those_of_the_worst_signal() -> None:
-    run = simulate(hires.model(), 1.0, backend="vm", samples=2)
+    run = simulate(hires(), 1.0, backend="vm", samples=2)
     end = run.final
-    other = Problem("off", hires.model, 1.0, {"y1": end["y1"], "y2": end["y2"] * (1 + 1e-4)})
+    other = Problem("off", hires, 1.0, {"y1": end["y1"], "y2": end["y2"] * (1 + 1e-4)})
     digits, worst = correct_digits(other, run)
     assert (round(digits, 3), worst) == (4.0, "y2")
-    assert correct_digits(Problem("same", hires.model, 1.0, {"y1": end["y1"]}), run)[0] < 16
+    assert correct_digits(Problem("same", hires, 1.0, {"y1": end["y1"]}), run)[0] < 16
 
 
 def test_failure_is_a_row_that_says_why() -> None:
@@ -93,7 +93,7 @@ def test_command_prints_and_writes_what_it_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("symfric.bench.bench_ivp", lambda **options: bench_ivp(
-        problems=(hires.PROBLEM,), **options))  # fmt: skip
+        problems=PROBLEMS[:1], **options))  # fmt: skip
     report, picture = tmp_path / "ivp.json", tmp_path / "ivp.svg"
     arguments = ["bench", "ivp", "--quick", "--json", str(report), "--plot", str(picture)]
     assert main(arguments) == 0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from symfric import Viscous, simulate
-from symfric.bench.jitter import jitter, plot_jitter, runge_kutta_4, variation
+from symfric.bench.jitter import jitter, runge_kutta_4, variation
+from symfric.bench.pictures import plot_jitter
 from symfric.figures import FigureData
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.inputs import input_data

@@ -5,10 +5,9 @@ import pytest
 
 from ocp import solve
 from ocp.problems.friction import out_and_back
-from symfric.bench.ocp import NEAR, bench_ocp, starts_of
+from symfric.bench.ocp import NEAR, attempt_of, bench_ocp, landed, starts_of
 from symfric.bench.ocp_contenders import Attempt, opti
-from symfric.bench.ocp_referee import attempt_of, landed
-from symfric.bench.ocp_size import size_rows
+from symfric.bench.ocp_costs import size_rows
 
 
 def test_opti_solves_the_smooth_problem_and_misses_the_sharp_one() -> None:

@@ -9,7 +9,7 @@ import pytest
 from robots import SMALL
 
 from symfric.cli import main
-from symfric.cli.codegen_shown import bits, compared, show_verification
+from symfric.cli.codegen import bits, compared, show_verification
 from symfric.codegen.proof.verify import Check, Verification
 
 compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")

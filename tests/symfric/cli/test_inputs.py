@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from symfric import Linear
-from symfric.cli.inputs import input_from_text, read_column
+from symfric.cli.machines import input_from_text, read_column
 
 
 def write(folder: Path, text: str) -> Path:

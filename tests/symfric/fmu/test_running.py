@@ -5,7 +5,7 @@ import pytest
 from backends import needs_compiler
 
 from symfric import BrownMcPhee
-from symfric.bench import codegen_fmu
+from symfric.bench import codegen_runs
 from symfric.fmu import export_fmu
 from symfric.fmu.running import running
 from symfric.scenes import ALL_SCENES, Drive
@@ -36,14 +36,14 @@ def test_sources_alone_cannot_be_run(tmp_path, monkeypatch):
 @pytest.mark.heavy
 @needs_compiler
 def test_the_table_has_a_row_for_what_simulate_finishes_and_goals_are_met(monkeypatch):
-    monkeypatch.setattr(codegen_fmu, "QUICK", ("drive",))
+    monkeypatch.setattr(codegen_runs, "QUICK", ("drive",))
     monkeypatch.setattr(ALL_SCENES["drive"], "t_end", 0.5)
-    section = codegen_fmu.measure(quick=True)
-    assert len(section.rows) == len(codegen_fmu.LAWS)
+    section = codegen_runs.units(quick=True)
+    assert len(section.rows) == len(codegen_runs.LAWS)
     assert all(goal.met for goal in section.goals)
     assert all(row[-2] < 0.1 for row in section.rows)  # attempts of a tiny communication step
 
 
 def test_without_a_compiler_there_are_no_rows(monkeypatch):
-    monkeypatch.setattr(codegen_fmu, "find_compiler", lambda: None)
-    assert "no C compiler" in codegen_fmu.measure(quick=True).notes[0]
+    monkeypatch.setattr(codegen_runs, "find_compiler", lambda: None)
+    assert "no C compiler" in codegen_runs.units(quick=True).notes[0]

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 import symfric
-from symfric.cli.commands import COMMANDS
+from symfric.cli.commands import COMMANDS, MODULES
 
 ROOT = Path(symfric.__file__).parent
 LAZY = [p for p in ROOT.rglob("__init__.py") if "hand_out(" in p.read_text(encoding="utf-8")]
@@ -100,5 +100,5 @@ def test_what_is_not_there() -> None:
 def test_the_list_of_commands_says_what_they_say() -> None:
     for name, line in COMMANDS.items():
         own = name.replace("-", "_")
-        function = getattr(importlib.import_module(f"symfric.cli.{own}"), own)
+        function = getattr(importlib.import_module(f"symfric.cli.{MODULES.get(own, own)}"), own)
         assert (function.__doc__ or "").splitlines()[0] == line

@@ -9,7 +9,7 @@ from mechanics import pendulum_period
 
 from symfric import SolveError, Status, simulate
 from symfric.bench.ivp import correct_digits
-from symfric.bench.problems import squeezer
+from symfric.bench.ivp_mechanisms import ABSOLUTE, JOINT
 from symfric.multibody import Mechanism
 
 
@@ -75,7 +75,7 @@ def test_governor_keeps_its_momentum_and_loses_what_its_dampers_take() -> None:
 
 
 def test_squeezer_of_joints_meets_the_published_digits() -> None:
-    problem = squeezer.PROBLEM
+    problem = JOINT
     run = simulate(problem.model(), problem.t_end, samples=2, backend="vm")
     digits, worst = correct_digits(problem, run)
     assert digits > 7, worst
@@ -86,7 +86,7 @@ def test_squeezer_of_joints_meets_the_published_digits() -> None:
 @pytest.mark.parametrize("name", ["bricard", "governor", "squeezer"])
 def test_absolute_coordinates_agree(name: str) -> None:
     if name == "squeezer":
-        problem = squeezer.ABSOLUTE
+        problem = ABSOLUTE
         run = simulate(problem.model(), problem.t_end, rtol=1e-8, samples=2, backend="vm")
         assert correct_digits(problem, run)[0] > 6.5
         return

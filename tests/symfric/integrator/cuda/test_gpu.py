@@ -11,8 +11,8 @@ import pytest
 from device_cases import CASES
 
 from symfric import BrownMcPhee, LuGre, rabinowicz, simulate_many
-from symfric.bench.cuda import measure_cuda
-from symfric.cli import bench_tables
+from symfric.bench.ensemble import measure_cuda, on_graphics_processor
+from symfric.cli.bench import show
 from symfric.integrator.cuda.cupy_device import CupyDevice
 from symfric.integrator.cuda.device import DeviceError
 
@@ -59,6 +59,6 @@ def test_single_precision_meets_its_tolerance(law: object) -> None:
 def test_a_million_members(capsys: pytest.CaptureFixture[str]) -> None:
     rows = measure_cuda()
     with capsys.disabled():
-        bench_tables.on_graphics_processor(rows)
+        show(on_graphics_processor(rows))
     for row in rows:
         assert row.difference < (1e-4 if row.real == "double" else 1e-2)

@@ -1,101 +1,10 @@
-"""Rabinowicz's stick-slip with Brown-McPhee friction in C by hand: what nothing general can beat.
-
-RADAU5 as in Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8, written for this
-one equation of two states: derivatives by hand, 2 by 2 systems solved in closed form, one of them
-complex, derivatives kept while Newton's method converges fast, the collocation polynomial as dense
-output and as first guess of the next step, Gustafsson's controller. Nothing is checked, named or
-kept.
-"""
-
-import ctypes
-from string import Template
-
-import numpy as np
-from numpy.typing import NDArray
-
-from symfric.bench.contenders import FASTEST
-from symfric.integrator.compiled.compiler import library
-from symfric.laws import BrownMcPhee
-from symfric.scenes import Rabinowicz
-
-Array = NDArray[np.float64]
-
-
-class ByHand:
-    """The equation with the numbers of one scene, compiled.
-
-    Raises:
-        CompileError: there is no compiler, or it failed.
-    """
-
-    def __init__(self, scene: Rabinowicz) -> None:
-        law = scene.law
-        if not isinstance(law, BrownMcPhee) or law.mu_v:
-            raise ValueError(f"by_hand: expected BrownMcPhee without viscous part, got {law!r}")
-        given = {name: getattr(law, name) for name in ("mu_s", "mu_d", "v_t")}
-        given |= {name: getattr(scene, name) for name in ("m", "k", "v_belt", "g")}
-        numbers = {name: repr(float(value)) for name, value in (given | collocation()).items()}
-        path = library(Template(_C).substitute(numbers), "by_hand", flags=FASTEST)
-        self._run = ctypes.CDLL(str(path)).by_hand
-        self._run.restype = ctypes.c_longlong
-        self._run.argtypes = [
-            *[ctypes.c_double] * 3, ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 2,
-        ]  # fmt: skip
-
-    def __call__(self, v: float, times: Array, rtol: float) -> tuple[Array, int]:
-        """Position [m] and velocity [m/s] at `times` > 0 [s], shape (2, times), and steps.
-
-        Args:
-            v: velocity at the start [m/s]; the position is 0.
-            times: increasing.
-            rtol: relative tolerance; absolute ones are 0.1 rtol times 0.1 m and 0.1 m/s.
-        """
-        found, steps = np.empty((2, times.size)), np.zeros(1, dtype=np.int64)
-        if self._run(
-            v, rtol, 0.01 * rtol, times.ctypes.data, times.size, found.ctypes.data,
-            steps.ctypes.data,
-        ):  # fmt: skip
-            raise RuntimeError("by_hand: expected a solution, got steps that shrink to nothing")
-        return found, int(steps[0])
-
-
-def collocation() -> dict[str, float]:
-    """Constants of the three-stage method of Radau: T^-1 A^-1 T is one real and one complex block.
-
-    Source: Hairer and Wanner, IV.8.
-    """
-    r = np.sqrt(6.0)
-    A = np.array(
-        [
-            [(88 - 7 * r) / 360, (296 - 169 * r) / 1800, (-2 + 3 * r) / 225],
-            [(296 + 169 * r) / 1800, (88 + 7 * r) / 360, (-2 - 3 * r) / 225],
-            [(16 - r) / 36, (16 + r) / 36, 1 / 9],
-        ]
-    )
-    values, vectors = np.linalg.eig(np.linalg.inv(A))
-    real, pair = int(np.argmin(np.abs(np.imag(values)))), int(np.argmax(np.imag(values)))
-    # (a + ib)(w2 + i w3) in the plane of Re and -Im of the eigenvector of a + ib
-    plane = vectors[:, pair]
-    T = np.column_stack([np.real(vectors[:, real]), np.real(plane), -np.imag(plane)])
-    TI = np.linalg.inv(T)
-    found: dict[str, float] = {
-        "gamma": np.real(values[real]),
-        "alpha": np.real(values[pair]),
-        "beta": np.imag(values[pair]),
-    }
-    found |= {f"T{i}{j}": T[i, j] for i in range(3) for j in range(3)}
-    found |= {f"TI{i}{j}": TI[i, j] for i in range(3) for j in range(3)}
-    return {name: float(value) for name, value in found.items()} | {
-        "c1": float((4 - r) / 10), "c2": float((4 + r) / 10),
-        "e1": float(-(13 + 7 * r) / 3), "e2": float((-13 + 7 * r) / 3), "e3": -1 / 3,
-    }  # fmt: skip
-
-
-_C = """
+/* RADAU5 for Rabinowicz's stick-slip with Brown-McPhee friction: one equation of two states, by hand.
+   Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8. `contenders.ByHand` defines the
+   numbers P_... of scene and method in front of it. */
 #include <complex.h>
 #include <math.h>
-static const double m = $m, k = $k, N = $m * $g, v_belt = $v_belt, v_t = $v_t;
-static const double mu_s = $mu_s, mu_d = $mu_d;
+static const double m = P_m, k = P_k, N = P_m * P_g, v_belt = P_v_belt, v_t = P_v_t;
+static const double mu_s = P_mu_s, mu_d = P_mu_d;
 static double acceleration(double x, double v)
 {
   const double s = (v - v_belt) / v_t, q = 1. / (0.25 * s * s + 0.75);
@@ -110,7 +19,7 @@ static double slope(double v)
 long long by_hand(double v, double rtol, double atol, const double *times, long long count,
                   double *found, long long *steps)
 {
-  const double c1 = $c1, c2 = $c2, newton = fmax(1e-15 / rtol, fmin(0.03, sqrt(rtol)));
+  const double c1 = P_c1, c2 = P_c2, newton = fmax(1e-15 / rtol, fmin(0.03, sqrt(rtol)));
   const double end = times[count - 1];
   double t = 0., x = 0., h = 1e-8 * end, a0 = acceleration(x, v), a21 = -k / m, a22 = 0.;
   double z[3][2] = {{0.}}, w[3][2], cont[4][2], h_old = h, h_acc = h, err_acc = 1e-2;
@@ -122,8 +31,8 @@ long long by_hand(double v, double rtol, double atol, const double *times, long 
     if (!(h > 1e-15 * end)) return 1;
     if (!fresh) { a22 = slope(v); fresh = 1; factored = 0; }
     if (!factored) {
-      g = $gamma / h;
-      b = ($alpha + I * $beta) / h;
+      g = P_gamma / h;
+      b = (P_alpha + I * P_beta) / h;
       det = 1. / (g * (g - a22) - a21);
       det2 = 1. / (b * (b - a22) - a21);
       factored = 1;
@@ -138,9 +47,9 @@ long long by_hand(double v, double rtol, double atol, const double *times, long 
           z[i][j] = s * (cont[1][j] + (s - c2 + 1.) * (cont[2][j] + (s - c1 + 1.) * cont[3][j]));
       }
       for (j = 0; j < 2; ++j) {
-        w[0][j] = $TI00 * z[0][j] + $TI01 * z[1][j] + $TI02 * z[2][j];
-        w[1][j] = $TI10 * z[0][j] + $TI11 * z[1][j] + $TI12 * z[2][j];
-        w[2][j] = $TI20 * z[0][j] + $TI21 * z[1][j] + $TI22 * z[2][j];
+        w[0][j] = P_TI00 * z[0][j] + P_TI01 * z[1][j] + P_TI02 * z[2][j];
+        w[1][j] = P_TI10 * z[0][j] + P_TI11 * z[1][j] + P_TI12 * z[2][j];
+        w[2][j] = P_TI20 * z[0][j] + P_TI21 * z[1][j] + P_TI22 * z[2][j];
       }
     }
     const double sx = 1. / (atol + rtol * fabs(x)), sv = 1. / (atol + rtol * fabs(v));
@@ -154,9 +63,9 @@ long long by_hand(double v, double rtol, double atol, const double *times, long 
         f[i][1] = acceleration(x + z[i][0], v + z[i][1]);
       }
       for (j = 0; j < 2; ++j) {
-        r[0][j] = $TI00 * f[0][j] + $TI01 * f[1][j] + $TI02 * f[2][j] - g * w[0][j];
-        r[1][j] = $TI10 * f[0][j] + $TI11 * f[1][j] + $TI12 * f[2][j];
-        r[2][j] = $TI20 * f[0][j] + $TI21 * f[1][j] + $TI22 * f[2][j];
+        r[0][j] = P_TI00 * f[0][j] + P_TI01 * f[1][j] + P_TI02 * f[2][j] - g * w[0][j];
+        r[1][j] = P_TI10 * f[0][j] + P_TI11 * f[1][j] + P_TI12 * f[2][j];
+        r[2][j] = P_TI20 * f[0][j] + P_TI21 * f[1][j] + P_TI22 * f[2][j];
       }
       const double d0 = ((g - a22) * r[0][0] + r[0][1]) * det;
       const double d1 = (a21 * r[0][0] + g * r[0][1]) * det;
@@ -179,16 +88,16 @@ long long by_hand(double v, double rtol, double atol, const double *times, long 
       w[0][0] += d0; w[1][0] += creal(q0); w[2][0] += cimag(q0);
       w[0][1] += d1; w[1][1] += creal(q1); w[2][1] += cimag(q1);
       for (j = 0; j < 2; ++j) {
-        z[0][j] = $T00 * w[0][j] + $T01 * w[1][j] + $T02 * w[2][j];
-        z[1][j] = $T10 * w[0][j] + $T11 * w[1][j] + $T12 * w[2][j];
-        z[2][j] = $T20 * w[0][j] + $T21 * w[1][j] + $T22 * w[2][j];
+        z[0][j] = P_T00 * w[0][j] + P_T01 * w[1][j] + P_T02 * w[2][j];
+        z[1][j] = P_T10 * w[0][j] + P_T11 * w[1][j] + P_T12 * w[2][j];
+        z[2][j] = P_T20 * w[0][j] + P_T21 * w[1][j] + P_T22 * w[2][j];
       }
       if (faccon * size <= newton) { good = 1; break; }
     }
     ++made;
     if (!good) { h *= 0.5; factored = 0; reject = 1; fresh = fresh == 1; continue; }
-    const double ex = ($e1 * z[0][0] + $e2 * z[1][0] + $e3 * z[2][0]) / h;
-    const double ev = ($e1 * z[0][1] + $e2 * z[1][1] + $e3 * z[2][1]) / h;
+    const double ex = (P_e1 * z[0][0] + P_e2 * z[1][0] + P_e3 * z[2][0]) / h;
+    const double ev = (P_e1 * z[0][1] + P_e2 * z[1][1] + P_e3 * z[2][1]) / h;
     double rx = ex + v, rv = ev + a0;
     double dx = ((g - a22) * rx + rv) * det, dv = (a21 * rx + g * rv) * det;
     double err = fmax(sqrt((dx * dx * sx * sx + dv * dv * sv * sv) / 2.), 1e-10);
@@ -242,4 +151,3 @@ long long by_hand(double v, double rtol, double atol, const double *times, long 
   }
   return 0;
 }
-"""
