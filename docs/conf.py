@@ -17,7 +17,6 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx_copybutton",
-    "docs.machine.sphinx_math",
     "docs.machine.sphinx_pages",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}

@@ -1,18 +1,19 @@
-"""The reference of Python, a page for each module that hands out names."""
+"""The reference of Python, a page for each module that exports names; where names are described."""
 
 import ast
 import inspect
+import re
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from typing import Any
 
 from docs.machine import rst
-from docs.machine.docstrings import first_line
-from docs.machine.docstrings import text as sentence
-from docs.machine.law_pages import MADE_OF_LAWS
-from docs.machine.names import FRONTS, Public, catalogue, linked, source_of
+from docs.machine.items import MADE_OF_LAWS
+from docs.machine.names import FRONTS, Public, catalogue, known, linked, source_of
+from docs.machine.rst import first_line, sentence
 from symfric import ALL_LAWS, POPULATIONS
+from symfric.cli.commands import COMMANDS
 from symfric.scenes import ALL_SCENES
 
 
@@ -97,3 +98,27 @@ def data_docs(module: str) -> dict[str, str]:
             names: Iterable[str] = (t.id for t in targets if isinstance(t, ast.Name))
             found |= dict.fromkeys(names, str(behind.value.value))  # pyright: ignore
     return found
+
+
+Place = tuple[str, str, str]
+"""Domain, type and target of a link of Sphinx."""
+COMMAND = re.compile(r"symfric ([\w-]+)\b")
+
+
+def place(text: str) -> Place | None:
+    """Where what stands between backticks is documented; None where it is no name of ours."""
+    bare = text.removesuffix("()")
+    if bare in ALL_LAWS or bare in POPULATIONS or bare in MADE_OF_LAWS:
+        return "std", "doc", f"/laws/{bare}"
+    if bare in ALL_SCENES:
+        return "std", "doc", f"/scenes/{bare}"
+    command = COMMAND.match(text)
+    if command is not None and command[1] in COMMANDS:
+        return "std", "ref", f"symfric-{command[1]}"
+    if bare in FRONTS:
+        return "std", "doc", f"/reference/{bare}"
+    public = known().get(bare.rpartition(".")[2])
+    if public is None or bare not in (public.name, public.full) or not callable(public.object):
+        return None
+    own = own_pages().get(id(public.object))
+    return ("std", "doc", own) if own else ("py", "obj", public.full)

@@ -1,19 +1,68 @@
-"""Pages of the documentation: pictures that blocks make, and pages made of the code itself."""
+"""Pages of the documentation: pictures that blocks make, and pages made of the code itself.
+
+Formulas are MathML, which browsers draw themselves: no script, no fonts, no network.
+"""
 
 import re
 import sys
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.addnodes import pending_xref
 from sphinx.util import logging
+from sphinx.util.math import get_node_equation_number
 
-from docs.machine.docstrings import to_rst
+from docs.machine.api_pages import Place
+from docs.machine.api_pages import place as documented
 from docs.machine.generated import make_all
-from docs.machine.making import MADE, make_page_pictures, place
-from docs.machine.mentioned import link
+from docs.machine.made import MADE, make_page_pictures, place
 from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE
+from docs.machine.rst import to_rst
+
+log = logging.getLogger(__name__)
+SIZED = re.compile(r"\\[bB]igg?[lrm]?(?![A-Za-z])")
+"""Sizes of brackets, which a browser chooses itself."""
+ACCENTED = re.compile(r"(\\(?:d?dot|hat|bar|tilde|vec)\s*(?:\{[^{}]*\}|[A-Za-z]))_")
+
+
+BAR = '<mo stretchy="false">|</mo>'
+"""The bar of an absolute value, which browsers take for a sign between two things, with blanks."""
+BARS = re.compile(r"\\[lr]vert(?![A-Za-z])\s?")
+
+
+def mathml(node: nodes.Element, as_block: bool) -> str:
+    """A formula as MathML; a subscript stands beside its letter, also below a dot."""
+    formula = SIZED.sub("", ACCENTED.sub(r"\1{}_", node.astext())).replace(r"\dots", r"\ldots")
+    try:
+        found = str(tex2mathml(BARS.sub("|", formula), as_block=as_block))
+        return found.replace(BAR, BAR.replace(">", ' lspace="0" rspace="0">', 1))
+    except MathError as error:
+        log.warning("formula %r: %s", node.astext(), error, location=node)
+        return f"<code>{escape(node.astext())}</code>"
+
+
+def visit_inline(writer: Any, node: nodes.math) -> None:
+    """A formula within a line."""
+    writer.body.append(mathml(node, as_block=False))
+    raise nodes.SkipNode
+
+
+def visit_block(writer: Any, node: nodes.math_block) -> None:
+    """A formula on its own, with its number where it has a label."""
+    writer.body.append(writer.starttag(node, "div", CLASS="math"))
+    if node["number"]:
+        number = get_node_equation_number(writer, node)
+        writer.body.append(f'<span class="eqno">({number})</span>')
+    writer.body.append(mathml(node, as_block=True))
+    writer.body.append("</div>\n")
+    raise nodes.SkipNode
+
 
 LINK = re.compile(r"(\]\()([\w./-]+\.md)([#)])")
 log = logging.getLogger(__name__)
@@ -97,6 +146,8 @@ def forget(app: Any, error: Exception | None) -> None:
 def setup(app: Any) -> dict[str, bool]:
     """Connect the above."""
     MADE.mkdir(exist_ok=True)
+    app.add_html_math_renderer("mathml", (visit_inline, None), (visit_block, None))
+    app.config.html_math_renderer = "mathml"
     app.connect("builder-inited", make)
     app.connect("source-read", show_made)
     app.connect("doctree-read", link)
@@ -105,3 +156,37 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("missing-reference", find_type)
     app.connect("build-finished", forget)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def link(app: Any, tree: nodes.document) -> None:
+    """Make links of the names in a page that somebody wrote."""
+    name = app.env.docname
+    if not str(app.env.doc2path(name)).endswith(".md") or name == "changelog":
+        return
+    seen: set[tuple[int, Place]] = set()
+    for literal in [*tree.findall(nodes.literal)]:
+        found = documented(literal.astext())
+        above = [*ancestors(literal)]
+        closed = (nodes.reference, nodes.title, pending_xref, nodes.term)
+        if found is None or any(isinstance(node, closed) for node in above):
+            continue
+        section = next((id(node) for node in above if isinstance(node, nodes.section)), 0)
+        if (section, found) in seen:
+            continue
+        seen.add((section, found))
+        domain, kind, target = found
+        at = pending_xref(
+            "", refdomain=domain, reftype=kind, reftarget=target, refexplicit=True, refwarn=True,
+            refdoc=name,
+        )  # fmt: skip
+        literal.replace_self(at)
+        at += literal
+
+
+def ancestors(node: nodes.Node) -> list[nodes.Node]:
+    """What holds a node, the nearest first."""
+    found: list[nodes.Node] = []
+    while node.parent is not None:
+        node = node.parent
+        found.append(node)
+    return found

@@ -303,7 +303,7 @@ def laws(quick: bool) -> Iterator[Row]:
     status SOLVED or DOUBTFUL. The records have no licence and are no part of the package.
     """
     if not (EMPS / ESTIMATION).is_file():
-        note = "data absent (../shared/data/EMPS / ESTIMATION)"
+        note = "data absent (../shared/data/EMPS)"
         yield Row(
             "laws", "laws that neither fit nor are refused", float("nan"), 0.0, "<=", 0.0, note
         )

@@ -33,7 +33,7 @@ TRUTH = {
     "sigma_0": 1e5, "sigma_1": float(np.sqrt(1e5)), "sigma_2": 0.4,
 }  # fmt: skip
 NOISE, SWEEP_NOISE = 0.5e-6, 0.05
-"""Standard deviations of the positions [m] and of the driven of the sweep [N]."""
+"""Standard deviations of the positions [m] and of the forces of the sweep [N]."""
 STEP = 1e-3
 OFF = 3.0
 """Largest factor by which stiffness and damping of the start are off their guess."""
@@ -47,7 +47,7 @@ SEEDS, AGAINST = 100, 4
 
 
 def driven() -> list[tuple[Array, Array]]:
-    """Times [s] and driven [N] of the three records."""
+    """Times [s] and forces [N] of the three records."""
     t1, t = np.arange(0, 0.6, STEP), np.arange(0, 1.0, STEP)
     rising = 0.4 + 0.6 * t1 / t1[-1]
     first = 1.05 * np.sin(10 * np.pi * t1) * rising + 0.2 * np.sin(74 * np.pi * t1)

@@ -190,7 +190,7 @@ def coloured(noise: np.random.Generator, n: int, rho: float) -> Array:
 
 FAR_SEEDS, FAR_QUICK = 20, 4
 NEAR, ERRORS = 0.05, 5.0
-"""Relative error, and error over its standard error, of a parameter that was was_found."""
+"""Relative error, and error over its standard error, of a parameter that was found."""
 HYSTERESIS = {"m": 2.0, "c": 10.0, "k": 5e4, "alpha": 5e4, "beta": 800.0, "gamma": 1100.0}
 """Of the oscillator, in SI units."""
 SAMPLES, RATE, BAND = 2048, 750.0, (5.0, 150.0)
@@ -280,7 +280,7 @@ def starts(quick: bool = False) -> Iterator[Row]:
     """How many of 20 fits find the truth, and what the slowest of them takes.
 
     Each seed has other noise and another start, all parameters multiplied by factors drawn
-    uniformly in their logarithm. A fit has was_found the truth where it says so (its status is
+    uniformly in their logarithm. A fit has found the truth where it says so (its status is
     good) and is within 5 % and five of its standard errors of every parameter.
     """
     seeds = range(FAR_QUICK if quick else FAR_SEEDS)
@@ -312,7 +312,7 @@ def _counted(what: str, fits: Iterator[Fit], truth: Mapping[str, float]) -> Iter
     note = f"{sum(good)} of {len(good)}; CPU a fit: median {np.median(times):.1f} s, largest "
     yield Row(
         "starts",
-        f"{what}: was_found [%]",
+        f"{what}: found [%]",
         share,
         100.0,
         ">=",

@@ -157,6 +157,6 @@ def _parameter_shown(parameter: Any) -> str:
 
 
 def _value_given(error: Any) -> str:
-    """What was given, from the usage_sentence or from the error behind it."""
+    """What was given, from the sentence or from the error behind it."""
     told = search(r"^'(.*)' is not", error.message)
     return told[1] if told else str(error.__cause__.errors()[0]["input"])

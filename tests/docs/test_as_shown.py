@@ -5,7 +5,7 @@ from importlib.util import find_spec
 import pytest
 
 from docs.machine import rst
-from docs.machine.gallery_pages import without_docstring
+from docs.machine.generated import without_docstring
 
 needs_sphinx = pytest.mark.skipif(find_spec("sphinx") is None, reason="needs Sphinx (extra docs)")
 
@@ -14,7 +14,7 @@ needs_sphinx = pytest.mark.skipif(find_spec("sphinx") is None, reason="needs Sph
 def test_bars_stand_close_to_what_they_hold() -> None:
     from docutils import nodes  # noqa: PLC0415
 
-    from docs.machine.sphinx_math import mathml  # noqa: PLC0415
+    from docs.machine.sphinx_pages import mathml  # noqa: PLC0415
 
     for written in (r"|a| + |b|", r"\lvert a\rvert + \lvert b \rvert"):
         found = mathml(nodes.math(written, written), as_block=False)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine.browser import KINDS, main, searched
-from docs.machine.chromium import NAMES, Browser
+from docs.machine.browser import KINDS, NAMES, Browser, main, searched
 
 pytestmark = [
     pytest.mark.heavy,

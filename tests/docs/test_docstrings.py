@@ -1,6 +1,6 @@
 """Docstrings become markup that says the same."""
 
-from docs.machine.docstrings import entries, first_line, text, to_rst
+from docs.machine.rst import entries, first_line, sentence, to_rst
 
 DOC = """Does a thing with |v| and x_ of `Law`.
 
@@ -53,7 +53,7 @@ def test_tables_in_text_stay_as_they_are() -> None:
 
 
 def test_names_touching_words_are_parted_by_nothing() -> None:
-    assert text("`a`s and (`b`)") == r"``a``\ s and (``b``)"
+    assert sentence("`a`s and (`b`)") == r"``a``\ s and (``b``)"
 
 
 def test_pieces() -> None:

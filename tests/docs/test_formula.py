@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from docs.machine.docstrings import to_rst
 from docs.machine.formula import latex
-from docs.machine.law_pages import MADE_OF_LAWS
+from docs.machine.items import MADE_OF_LAWS
+from docs.machine.rst import to_rst
 from symfric import ALL_LAWS
 from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip
 

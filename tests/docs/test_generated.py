@@ -4,41 +4,30 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine import (
-    bench_pages,
-    command_pages,
-    example_pages,
-    interop_page,
-    law_pages,
-    limit_pages,
-    literature_pages,
-)
+from docs.machine import bench_pages, items, lists
 from docs.machine.api_pages import pages as api_pages
+from docs.machine.api_pages import place
 from docs.machine.generated import stale, write
 from docs.machine.names import catalogue, known, linked
-from docs.machine.places import place
-from docs.machine.scene_pages import pages as scene_pages
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
 from symfric.cli.commands import COMMANDS, prose_and_examples
 from symfric.scenes import ALL_SCENES
 
 
 def test_every_law_has_a_page_with_formula_picture_and_parameters() -> None:
-    pages = law_pages.pages()
-    assert {*ALL_LAWS, *POPULATIONS, *law_pages.MADE_OF_LAWS, "index"} == {*pages}
+    pages = items.law_pages()
+    assert {*ALL_LAWS, *POPULATIONS, *items.MADE_OF_LAWS, "index"} == {*pages}
     for name in ALL_LAWS:
         assert ".. math::" in pages[name], name
         assert f"/made/laws/{name}.png" in pages[name]
         assert f".. py:class:: symfric.{ALL_LAWS[name].__name__}(" in pages[name]
     assert all(f"``{p}``" in pages["lugre"] for p in parameters(LuGre()))
-    families = law_pages.every().values()
-    assert {law_pages.family(law) for law in families} == {*law_pages.FAMILIES} - {
-        "Made of laws and data"
-    }
+    families = items.every().values()
+    assert {items.family(law) for law in families} == {*items.FAMILIES} - {"Made of laws and data"}
 
 
 def test_every_scene_has_a_page_with_its_parameters_and_presets() -> None:
-    pages = scene_pages()
+    pages = items.scene_pages()
     assert {*ALL_SCENES, "index"} == {*pages}
     for name, kind in ALL_SCENES.items():
         assert all(f"``{preset}``" in pages[name] for preset in kind.presets)
@@ -46,7 +35,7 @@ def test_every_scene_has_a_page_with_its_parameters_and_presets() -> None:
 
 
 def test_every_command_stands_with_its_options() -> None:
-    page = command_pages.page()
+    page = lists.command_page()
     assert all(f"\nsymfric {name}\n" in page for name in COMMANDS)
     assert "``--law NAME``" in page and "required" in page
     assert prose_and_examples("A.\n\nExample: x y\nz") == ("A.", ["x y z"])
@@ -69,8 +58,8 @@ def test_names_are_linked_where_they_are_documented() -> None:
 
 
 def test_every_example_has_its_docstring_and_code() -> None:
-    pages = example_pages.pages()
-    assert len(pages) == len(example_pages.EXAMPLES) + 1
+    pages = lists.example_pages()
+    assert len(pages) == len(lists.EXAMPLES) + 1
     assert "J = 40 + 0.5 / (1 - 4 tanh(1/4)) N^2 s" in pages["out_and_back"]
     assert "def problem()" in pages["out_and_back"]
 
@@ -90,9 +79,9 @@ def test_stored_measurements_say_by_what_where_and_when() -> None:
 
 
 def test_tools_stand_side_by_side_as_they_were_measured() -> None:
-    shown = interop_page.tables()
+    shown = bench_pages.tables()
     measured = {one["columns"][0]: one for one in bench_pages.stored()["interop"]["tables"]}
-    moves = interop_page.rows(measured["tool"])
+    moves = bench_pages.rows(measured["tool"])
     for line in moves:
         if not line[""]:
             miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")
@@ -115,21 +104,21 @@ def test_names_in_pages_lead_to_where_they_are_documented() -> None:
 
 def test_publications_are_gathered_from_where_they_are_used() -> None:
     said = "T.\n\nSource: A, J. X 1(2), 1999, p. 3; B,\nThesis 2001 (part); with words.\n\nMore: C."
-    assert [*literature_pages.sources(said)] == [
+    assert [*lists.sources(said)] == [
         "A, J. X 1(2), 1999, p. 3",
         "B, Thesis 2001 (part); with words",
     ]
-    methods = dict(literature_pages.methods())
+    methods = dict(lists.methods())
     assert any(where == "symfric.integrator.step.tangent" for where in methods.values())
-    named = [name for names in literature_pages.laws().values() for name in names]
+    named = [name for names in lists.laws().values() for name in names]
     assert sorted(named) == sorted(ALL_LAWS | POPULATIONS)
-    page = literature_pages.page()
+    page = lists.literature_page()
     assert "Jing and Mi, Investigation of Selection Mechanism" in page and "@software" in page
 
 
 def test_limits_of_laws_are_gathered() -> None:
-    assert "drifts under vibration" in limit_pages.limits(LuGre)
-    page = limit_pages.page()
+    assert "drifts under vibration" in lists.limits(LuGre)
+    page = lists.limit_page()
     assert all(f":doc:`{name} </laws/{name}>`" in page for name in ALL_LAWS)
 
 

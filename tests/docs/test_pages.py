@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine.pages import DOCS, ROOT, agrees, blocks, commands, mark, written_pages
-from docs.machine.run import run
+from docs.machine.pages import DOCS, ROOT, agrees, blocks, commands, mark, run, written_pages
 
 
 def marks(page: Path) -> list[pytest.MarkDecorator]:

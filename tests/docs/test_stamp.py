@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine import gallery_pages, stamp
+from docs.machine import generated, made
 from symfric.gallery import scripts
 from symfric.gallery.rendering import Gallery, Record
 
@@ -22,7 +22,7 @@ def test_docstrings_comments_and_places_are_no_code(tmp_path: Path) -> None:
     found = dict[str, str]()
     for name, text in texts.items():
         (tmp_path / name).write_text(text, "utf-8")
-        found[name] = stamp.code_of(tmp_path / name)
+        found[name] = made.code_of(tmp_path / name)
     assert found["one"] == found["same"]
     assert len({*found.values()}) == 3
 
@@ -31,12 +31,12 @@ def test_what_was_made_with_another_key_is_stale(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("SYMFRIC_DOCS", raising=False)
-    assert not stamp.is_fresh(tmp_path, "a")
-    stamp.stamped(tmp_path, "a")
-    assert stamp.is_fresh(tmp_path, "a")
-    assert not stamp.is_fresh(tmp_path, "b")
+    assert not made.is_fresh(tmp_path, "a")
+    made.stamped(tmp_path, "a")
+    assert made.is_fresh(tmp_path, "a")
+    assert not made.is_fresh(tmp_path, "b")
     monkeypatch.setenv("SYMFRIC_DOCS", "keep")
-    assert stamp.is_fresh(tmp_path, "b")
+    assert made.is_fresh(tmp_path, "b")
 
 
 @pytest.mark.parametrize(
@@ -57,10 +57,10 @@ def test_a_plate_depends_on_its_script_its_paper_and_what_the_gallery_shares(
     changed: str, papers: str | tuple[str, ...] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`papers` begins the names of the plates that are computed anew, None for all."""
-    before = gallery_pages.keys()
-    place = gallery_pages.ROOT / changed
+    before = generated.keys()
+    place = generated.ROOT / changed
     assert place.is_file()
-    read, of = Path.read_text, stamp.code_of
+    read, of = Path.read_text, made.code_of
 
     def edited(path: Path, *how: str) -> str:
         return read(path, *how) + ("\nCHANGED = 1\n" if path == place else "")
@@ -69,8 +69,8 @@ def test_a_plate_depends_on_its_script_its_paper_and_what_the_gallery_shares(
         return of.__wrapped__(path) if path == place else of(path)
 
     monkeypatch.setattr(Path, "read_text", edited)
-    monkeypatch.setattr(gallery_pages, "code_of", anew_for_the_place)
-    after = gallery_pages.keys()
+    monkeypatch.setattr(generated, "code_of", anew_for_the_place)
+    after = generated.keys()
     anew = {name for name in before if before[name] != after[name]}
     expected = {n for n in scripts() if papers is None or (papers and n.startswith(papers))}
     assert anew == expected
@@ -80,11 +80,11 @@ def test_a_plate_that_failed_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("SYMFRIC_DOCS", raising=False)
-    monkeypatch.setattr(gallery_pages, "FOLDER", tmp_path)
-    monkeypatch.setattr(gallery_pages, "KEYS", tmp_path / "keys.json")
-    monkeypatch.setattr(gallery_pages, "keys", lambda: {"good": "1", "bad": "2"})
+    monkeypatch.setattr(generated, "FOLDER", tmp_path)
+    monkeypatch.setattr(generated, "KEYS", tmp_path / "keys.json")
+    monkeypatch.setattr(generated, "keys", lambda: {"good": "1", "bad": "2"})
     there = dict[str, object]()
-    monkeypatch.setattr(gallery_pages, "read", lambda _: there)  # pyright: ignore
+    monkeypatch.setattr(generated, "read", lambda _: there)  # pyright: ignore
     asked = list[list[str]]()
 
     def render(folder: Path, names: list[str], **_: object) -> Gallery:
@@ -93,9 +93,9 @@ def test_a_plate_that_failed_is_tried_again(
         made: dict[str, Record] = {name: {} for name in names if name == "good"}
         return Gallery(folder, tuple(names), made, {"bad": "no"}, 0.0)
 
-    monkeypatch.setattr(gallery_pages, "render", render)
+    monkeypatch.setattr(generated, "render", render)
     said = list[str]()
-    assert gallery_pages.make(said.append) == ["gallery 'bad': no"]
+    assert generated.make_gallery(said.append) == ["gallery 'bad': no"]
     assert json.loads((tmp_path / "keys.json").read_text("utf-8")) == {"good": "1"}
-    gallery_pages.make(said.append)
+    generated.make_gallery(said.append)
     assert asked == [["good", "bad"], ["bad"]]

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from steady import NUDGES, Piece, findings, printed, runs_of, unit
 
 from docs.machine.pages import ROOT, written_pages
-from docs.machine.steady import NUDGES, Piece, findings, printed, runs_of, unit
 from symfric import LuGre, rabinowicz, simulate
 
 HERE, BITS, LOOSER = "as it is", "last bits", "rtol + 4 %"

@@ -166,19 +166,19 @@ TOLD = (
         "(page.parent / unquote(parts.path))", "(page.parent / parts.path)", T_LINKS,
     ),
     Mutant(
-        "a changed docstring draws all pictures anew", PAGES + "stamp.py",
+        "a changed docstring draws all pictures anew", PAGES + "made.py",
         "kept = [e for e in body if not _is_text(e)]", "kept = [*body]", T_STAMP,
     ),
     Mutant(
-        "pictures stay whatever changes", PAGES + "stamp.py",
+        "pictures stay whatever changes", PAGES + "made.py",
         "(kept() or stamp.read_text() == key)", "(True or stamp.read_text() == key)", T_STAMP,
     ),
     Mutant(
-        "a plate does not depend on what the gallery shares", PAGES + "gallery_pages.py",
+        "a plate does not depend on what the gallery shares", PAGES + "generated.py",
         "digest([code_hash(), *shared,", "digest([code_hash(),", T_STAMP,
     ),
     Mutant(
-        "a plate that failed is not tried again", PAGES + "gallery_pages.py",
+        "a plate that failed is not tried again", PAGES + "generated.py",
         "if n not in changed or n in done.records}", "if n}", T_STAMP,
     ),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from bad_values import NAN, Thing, flag, number
 
 from ocp import Phase, Problem, Radau, Shooting, integral, solve
 from ocp.friction.sharpen import sharpened
-from symfric import BrownMcPhee, Contact, ExactCoulomb, LuGre, drive
+from symfric import BrownMcPhee, ExactCoulomb, LuGre, drive
 
 HUGE = 10**400
 MESHES = [0, -1, NAN, "a", 1.5, [], [0, 1, 0.5], True, HUGE, [HUGE, 1], {}, Thing(), [[0, 1]] * 2]
@@ -72,8 +72,3 @@ def test_fractions_say_how_many_intervals_layers_begin_with(
     for intervals in (None, 25, np.int64(25), np.linspace(0, 1, 31), [[0.0, 0.5, 1.0]]):
         solve(move(NARROW), intervals=intervals, max_time=1e-3, throw=False)
     assert asked == [60, 25, 25, 30, 2]
-
-
-def test_a_contact_says_what_an_applied_force_is() -> None:
-    with pytest.raises(ValueError, match=r"F_e is the sum of all other forces along the slip"):
-        Contact("rail", NARROW.x[1], 1.0, ExactCoulomb())

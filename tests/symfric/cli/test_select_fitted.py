@@ -35,7 +35,7 @@ def test_fits_are_handed_over_with_their_errors_as_shares(
     ]
     fits = import_module("identification.select")  # the module, not the function of its name
     monkeypatch.setattr(fits, "select", lambda *_, **__: SimpleNamespace(rows=rows))  # pyright: ignore
-    monkeypatch.setattr(command, "kind_of_residuals", lambda *_: None)  # pyright: ignore
+    monkeypatch.setattr(command, "residuals_of", lambda *_: None)  # pyright: ignore
     read: Any = SimpleNamespace(read=lambda _: None)  # pyright: ignore
     given: dict[str, Law] = {"lugre": LuGre(), "dahl": BrownMcPhee()}
     held, misfits = command.fitted(given, read, [str(tmp_path)], "inverse", 1.0)

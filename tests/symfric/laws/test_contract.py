@@ -24,7 +24,7 @@ from law_cases import (
     symbolic,
 )
 
-from docs.machine.law_pages import MADE_OF_LAWS
+from docs.machine.items import MADE_OF_LAWS
 from symfric import (
     ALL_LAWS,
     BrownMcPhee,

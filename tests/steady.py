@@ -1,4 +1,4 @@
-"""Which printed numbers of the pages hang on rounding: `python -m docs.machine.steady [PAGE ...]`.
+"""Which printed numbers of the pages hang on rounding: `python tests/steady.py [PAGE ...]`.
 
 Other interpreters, libraries and processors round otherwise, and error control makes other steps
 of it. A page is run again under nudges: tolerances of all simulations a few per cent off, or in
@@ -30,8 +30,7 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.machine.pages import ROOT, agrees, blocks, written_pages
-from docs.machine.run import run
+from docs.machine.pages import ROOT, agrees, blocks, run, written_pages
 from symfric.integrator.step.layout import Given
 
 SAFETY = 0.5
@@ -58,7 +57,7 @@ class Piece:
     """What one block of a page printed.
 
     Attributes:
-        code, printed, expected: as `docs.machine.run.run` tells.
+        code, printed, expected: as `docs.machine.pages.run` tells.
         values: numbers that its Python formatted, each as text and as it is.
     """
 
@@ -201,7 +200,7 @@ def runs_of(page: Path) -> dict[str, list[Piece]]:
     for name, (factor, environment) in NUDGES.items():
         with tempfile.TemporaryDirectory() as folder:
             told = Path(folder) / "told.json"
-            command = [sys.executable, "-m", "docs.machine.steady", str(page)]
+            command = [sys.executable, __file__, str(page)]
             path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
             done = subprocess.run(
                 [*command, "--factor", str(factor), "--to", str(told)],
