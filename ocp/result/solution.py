@@ -41,17 +41,21 @@ class Verdict(Protocol):
     @property
     def ok(self) -> bool:
         """Whether nothing missed by more than the tolerance."""
+        ...
 
     @property
     def largest(self) -> float:
         """The largest relative miss."""
+        ...
 
     @property
     def trajectories(self) -> Sequence[Trajectory]:
         """The re-simulated motion of each span that was simulated, in order."""
+        ...
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
+        ...
 
 
 @final
@@ -391,7 +395,6 @@ def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Sol
         own: your classes in it, such as a law of yours.
 
     Raises:
-        ValueError: no such file, one that something else wrote, a damaged one, one of another
-            version, or classes that are not known.
+        ValueError: no such file, a foreign, damaged or newer one, or classes that are not known.
     """
     return SOLUTION.load(path, own)

@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -144,28 +144,49 @@ def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
     return bool(moves and not closer and not cheaper)
 
 
-@final
-class IterationHook(ca.Callback):
-    """Shows every iterate of a solver that has a callback (Ipopt, SQP) to the current `watch`."""
+class Shaped(ca.Callback):
+    """A function of CasADi that calls Python, with arguments and one result of given shapes."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(
+        self, name: str, inputs: Mapping[str, ca.Sparsity], output: str, shape: ca.Sparsity
+    ) -> None:
         super().__init__()
-        n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
-        self._rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
-        self.watch: Watch | None = None
-        self.construct("watch", {})
+        self._inputs, self._output, self._shape = [*inputs.items()], output, shape
+        self.construct(name, {})
 
     def get_n_in(self) -> int:  # noqa: D102
-        return ca.nlpsol_n_out()
+        return len(self._inputs)
 
     def get_n_out(self) -> int:  # noqa: D102
         return 1
 
     def get_name_in(self, i: int) -> str:  # noqa: D102
-        return ca.nlpsol_out(i)
+        return self._inputs[i][0]
+
+    def get_name_out(self, i: int) -> str:  # noqa: D102
+        del i
+        return self._output
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return ca.Sparsity.dense(self._rows[ca.nlpsol_out(i)], 1)
+        return self._inputs[i][1]
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
+        del i
+        return self._shape
+
+
+@final
+class IterationHook(Shaped):
+    """Shows every iterate of a solver that has a callback (Ipopt, SQP) to the current `watch`."""
+
+    def __init__(self, program: Program) -> None:
+        n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
+        rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
+        names = [ca.nlpsol_out(i) for i in range(ca.nlpsol_n_out())]
+        self.watch: Watch | None = None
+        super().__init__(
+            "watch", {n: ca.Sparsity.dense(rows[n], 1) for n in names}, "stop", ca.Sparsity.dense(1)
+        )
 
     def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
         if self.watch is None:
@@ -176,39 +197,18 @@ class IterationHook(ca.Callback):
 
 
 @final
-class GradientHook(ca.Callback):
+class GradientHook(Shaped):
     """The gradient of the cost, through which a solver without callback (fatrop) is watched.
 
-    It is asked for once an iteration, at the new iterate. To stop the solver, it returns NaN.
+    It is evaluated once an iteration, at the new iterate. To stop the solver, it returns NaN.
     """
 
-    def __init__(self, program: Program, n: int) -> None:
-        super().__init__()
+    def __init__(self, program: Program) -> None:
         self._gradient = program.gradient
-        self._sizes = (n, program.p.numel())
         self._values = ca.Function("values", [program.w, program.p], [program.f, program.g])
         self.watch: Watch | None = None
-        self.construct("nlp_grad_f", {})
-
-    def get_n_in(self) -> int:  # noqa: D102
-        return 2
-
-    def get_n_out(self) -> int:  # noqa: D102
-        return 1
-
-    def get_name_in(self, i: int) -> str:  # noqa: D102
-        return ("x", "p")[i]
-
-    def get_name_out(self, i: int) -> str:  # noqa: D102
-        del i
-        return "grad_f_x"
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return ca.Sparsity.dense(self._sizes[i], 1)
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
-        del i
-        return ca.Sparsity.dense(self._sizes[0], 1)
+        x, p = (ca.Sparsity.dense(part.numel(), 1) for part in (program.w, program.p))
+        super().__init__("nlp_grad_f", {"x": x, "p": p}, "grad_f_x", x)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         slope = ca.densify(self._gradient(*arg)[1])
