@@ -25,7 +25,7 @@ SAME = 1e-6
 @final
 @dataclass(frozen=True)
 class Stretch:
-    """When a phase is.
+    """Begin and duration of a phase.
 
     Attributes:
         name: of the phase.
@@ -46,7 +46,7 @@ class Stretch:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
-    """What moves in one scenario.
+    """Motion of one scenario.
 
     `motion["v"]` is a signal at the times `motion.t`.
 
@@ -172,7 +172,7 @@ def motion_of(
 
 
 def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
-    """Whether a state jumps at the joint, or is not in both phases."""
+    """True if a state jumps at the joint, or is not in both phases."""
     there = {v.name: k for k, v in enumerate(before.model.x)}
     if [*there] != [v.name for v in after.model.x]:
         return True

@@ -57,7 +57,7 @@ def lagrangian(program: Program) -> ca.Function:
 def gradients(program: Program) -> ca.Function:
     """(x, p, lam_f, lam_g) -> f, g and the gradients of lam_f f + lam_g' g in x and in p.
 
-    Those in p are zero: nobody asks for them, and CasADi wants a function that has them.
+    Those in p are zero: they are not used, but CasADi needs them.
     """
     x, p, lam_f, lam_g = _symbols(program)
     f, slope = program.gradient(x, p)

@@ -31,7 +31,7 @@ RESTING = 1e-6
 
 
 class Halt(Enum):
-    """Who stopped the solver."""
+    """Reasons to stop a solver."""
 
     USER = "the user"
     TIME = "the time limit"
@@ -53,7 +53,7 @@ class Seen:
 
     @property
     def finite(self) -> bool:
-        """Whether cost and rows are numbers."""
+        """True if cost and rows are numbers."""
         return bool(np.isfinite(self.f) and np.isfinite(self.violation))
 
     def better_than(self, other: "Seen | None") -> bool:
@@ -117,12 +117,12 @@ class Watch:
 
     @property
     def cycles(self) -> bool:
-        """Whether the last iterations went round (see `goes_round`)."""
+        """True if the last iterations went round (see `goes_round`)."""
         return goes_round(self.trace)
 
 
 def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
-    """Whether neither cost nor violation got better in the last iterations, while w kept moving.
+    """True if neither cost nor violation got better in the last iterations, while w kept moving.
 
     This is what a Newton method does at a kink that is smoothed over less than one step: it jumps
     from one side to the other.
@@ -277,20 +277,20 @@ def sentence(
     values: Array,
     at: At,
 ) -> str:
-    """How the solve ended, what is worst at `point`, and what to try."""
+    """End of the solve, worst row at `point`, and what to try."""
     if status.ok:
         return status.value
     count = watch.iterations
-    said = _reason(watch, status, answer, solver, max_time)
+    reason = _reason(watch, status, answer, solver, max_time)
     if watch.halt is None:
-        said += f" ({solver} after {count} iterations: {answer}.)"
+        reason += f" ({solver} after {count} iterations: {answer}.)"
     if status is Status.NOT_FINITE:
         tried = [seen for seen in (watch.last, point) if seen is not None]
         named = (not_finite(program, seen.w, values, at) for seen in tried)
-        return f"{said} {next(filter(None, named), TRIED)}"
+        return f"{reason} {next(filter(None, named), TRIED)}"
     if watch.cycles:
-        said += " The last iterations go round without getting better, as they do at a kink."
-    return f"{said} {worst(program, point, at)}"
+        reason += " The last iterations go round without getting better, as they do at a kink."
+    return f"{reason} {worst(program, point, at)}"
 
 
 def _reason(watch: Watch, status: Status, answer: str, solver: str, max_time: float | None) -> str:
@@ -328,7 +328,7 @@ def worst(program: Program, point: Seen, at: At) -> str:
 
 
 def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
-    """Which equation, or derivative of one, is NaN or infinite at `w`; empty if none is."""
+    """Equation, or derivative of one, that is NaN or infinite at `w`; empty if none is."""
     cost, slope = program.gradient(w, values)
     g, jacobian = program.jacobian(w, values)
     rows, columns = (np.array(part) for part in jacobian.sparsity().get_triplet())
@@ -351,6 +351,6 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
 
 
 def plainly(w: Array, place: Place) -> str:
-    """When a place is, where no durations are known."""
+    """Time of a place as a fraction, without known durations."""
     del w
     return f"at {place.fraction:.4g} of the duration"

@@ -19,7 +19,7 @@ from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Sele
 @final
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Where the shares of one cost go.
+    """Place of the shares of one cost.
 
     Attributes:
         weight: factor in the objective; 0 where a row bounds the cost instead.
@@ -253,10 +253,10 @@ class _Sum:
         a, b = _pairs(first, second, entries.rows.size)
         source, left, right = first[a], left[:, a], right[:, b]
         weights = by_left[:, a] * by_right[:, b]
-        beside = (entries.rows != entries.columns)[source]
-        # An entry beside the diagonal of H stands for two: both meet where its unknowns share one.
-        weights = weights * np.where(beside & (left == right), 2.0, 1.0)
-        weights = weights * (beside | (left <= right))
+        off = (entries.rows != entries.columns)[source]
+        # An entry off the diagonal of H stands for two: both meet where its unknowns share one.
+        weights = weights * np.where(off & (left == right), 2.0, 1.0)
+        weights = weights * (off | (left <= right))
         upper = np.minimum(left, right), np.maximum(left, right)
         self._put(entries, source, *upper, weights, values)
 

@@ -16,7 +16,7 @@ from symfric.foundation import checks
 
 SAME_NODE = 1e-9
 MOST_INTERVALS = 10**6
-"""Beyond these a program has no room in any memory."""
+"""Programs with more intervals exceed any memory."""
 
 WHAT = "their number or increasing fractions of T from 0 to 1"
 
@@ -76,7 +76,7 @@ def _first(intervals: object) -> Any:
 
 
 def _counts(intervals: Sequence[object], phases: int) -> bool:
-    """Whether these are numbers of intervals, one a phase, and no fractions."""
+    """True if these are numbers of intervals, one a phase, and no fractions."""
     return len(intervals) == phases and all(
         (number := checks.as_number(value)) is not None and number >= 1 for value in intervals
     )
