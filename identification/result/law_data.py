@@ -13,7 +13,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Parametric
 from symfric.laws import ALL_LAWS, Asymmetric, Element, Law, Slider, Sum, Table
-from symfric.laws.names import WRAPPERS
+from symfric.laws.catalogue import WRAPPERS
 from symfric.scenes import Drive
 
 KINDS: dict[str, type[Parametric]] = {

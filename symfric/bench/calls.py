@@ -27,7 +27,7 @@ from symfric.integrator.running.run import Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
-from symfric.laws.dynamic.gms import Element
+from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Arm, Drive, FourBar, Rabinowicz

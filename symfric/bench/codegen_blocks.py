@@ -6,7 +6,7 @@ from typing import final
 
 from symfric.codegen import Block, inverse_dynamics_block, law_block, plant_block
 from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
-from symfric.laws.dynamic.gms import Element
+from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import Arm, rabinowicz
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))

@@ -18,7 +18,7 @@ from symfric.compensation import (
 )
 from symfric.embedded import measure as on_core
 from symfric.laws import GMS, ElastoPlastic, ExactCoulomb, Law, LuGre
-from symfric.laws.dynamic.gms import Element
+from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import drive
 
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}

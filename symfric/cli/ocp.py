@@ -59,6 +59,14 @@ def ocp(
             "--tolerance", metavar="NUMBER", help="Largest relative miss of what is asked for."
         ),
     ] = 1e-3,
+    resting_margin: Annotated[
+        float,
+        typer.Option(
+            "--resting-margin",
+            metavar="NUMBER",
+            help="Share of its static level (dimensionless) that a contact at rest keeps from it.",
+        ),
+    ] = 1e-4,
     max_time: Annotated[
         float | None,
         typer.Option("--max-time", metavar="SECONDS", help="Time after which to stop."),
@@ -92,6 +100,7 @@ def ocp(
     check_names("--friction", [friction], get_args(Friction))
     values = numbers("--set", settings)
     ready, asked = problem_of(problem, values)
+    margin = checks.number("--resting-margin", resting_margin, above=0.0, upper=0.1)
     how: dict[str, Any] = {} if intervals is None else {"intervals": intervals}
     if max_time is not None:
         how["max_time"] = checks.number("--max-time", max_time, unit="s", above=0.0)
@@ -104,6 +113,7 @@ def ocp(
             solver=SOLVERS[solver](),
             friction=cast("Friction", friction),
             tolerance=tolerance,
+            resting_margin=margin,
             progress=lambda now: tell(min(1.0, now.iteration / 1000)),
             throw=False,
             **how,

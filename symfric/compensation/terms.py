@@ -11,8 +11,8 @@ from symfric.codegen import Block
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import GMS, Law
-from symfric.laws.composed.wrapper import Wrapper
-from symfric.laws.dynamic.bristle import Bristle
+from symfric.laws.composed.wrap import Wrapper
+from symfric.laws.dynamic.lugre import Bristle
 from symfric.model import Variables
 
 TERMS = {

@@ -15,46 +15,45 @@ if TYPE_CHECKING:
     from symfric.laws.base.law import State as State
     from symfric.laws.base.law import StaticLaw as StaticLaw
     from symfric.laws.catalogue import ALL_LAWS as ALL_LAWS
+    from symfric.laws.catalogue import POPULATIONS as POPULATIONS
+    from symfric.laws.catalogue import any_from_text as any_from_text
+    from symfric.laws.catalogue import law_from_text as law_from_text
+    from symfric.laws.catalogue import law_name as law_name
     from symfric.laws.composed.compose import Asymmetric as Asymmetric
     from symfric.laws.composed.compose import LoadDependent as LoadDependent
     from symfric.laws.composed.compose import Sum as Sum
     from symfric.laws.composed.isotropic import PlanarSlip as PlanarSlip
     from symfric.laws.composed.isotropic import SpatialSlip as SpatialSlip
-    from symfric.laws.composed.normalised import LoadNormalised as LoadNormalised
     from symfric.laws.composed.populations import AnyLaw as AnyLaw
     from symfric.laws.composed.populations import GenericAsperity as GenericAsperity
     from symfric.laws.composed.populations import Population as Population
     from symfric.laws.composed.populations import RandomBristles as RandomBristles
     from symfric.laws.composed.wrap import Lagged as Lagged
+    from symfric.laws.composed.wrap import LoadNormalised as LoadNormalised
     from symfric.laws.composed.wrap import TemperatureDependent as TemperatureDependent
-    from symfric.laws.dynamic.armstrong import Armstrong as Armstrong
-    from symfric.laws.dynamic.bliman_sorine import BlimanSorine as BlimanSorine
-    from symfric.laws.dynamic.bouc_wen import BoucWen as BoucWen
-    from symfric.laws.dynamic.bristle_2d import Bristle2D as Bristle2D
+    from symfric.laws.dynamic.dahl import BlimanSorine as BlimanSorine
+    from symfric.laws.dynamic.dahl import BoucWen as BoucWen
     from symfric.laws.dynamic.dahl import Dahl as Dahl
-    from symfric.laws.dynamic.elasto_plastic import ElastoPlastic as ElastoPlastic
+    from symfric.laws.dynamic.dwell import Armstrong as Armstrong
+    from symfric.laws.dynamic.dwell import Gonthier as Gonthier
+    from symfric.laws.dynamic.dwell import RateAndState as RateAndState
     from symfric.laws.dynamic.exact_coulomb import ExactCoulomb as ExactCoulomb
-    from symfric.laws.dynamic.gms import GMS as GMS
-    from symfric.laws.dynamic.gms import Element as Element
-    from symfric.laws.dynamic.gonthier import Gonthier as Gonthier
-    from symfric.laws.dynamic.haessig_friedland import HaessigFriedland as HaessigFriedland
-    from symfric.laws.dynamic.leuven import Leuven as Leuven
+    from symfric.laws.dynamic.lugre import ElastoPlastic as ElastoPlastic
     from symfric.laws.dynamic.lugre import LuGre as LuGre
     from symfric.laws.dynamic.lugre import LuGreNormalised as LuGreNormalised
     from symfric.laws.dynamic.lugre import LuGrePassive as LuGrePassive
+    from symfric.laws.dynamic.maxwell_slip import GMS as GMS
+    from symfric.laws.dynamic.maxwell_slip import Element as Element
+    from symfric.laws.dynamic.maxwell_slip import Leuven as Leuven
     from symfric.laws.dynamic.maxwell_slip import MaxwellSlip as MaxwellSlip
     from symfric.laws.dynamic.maxwell_slip import Slider as Slider
-    from symfric.laws.dynamic.rate_and_state import RateAndState as RateAndState
+    from symfric.laws.dynamic.stick_slip import Bristle2D as Bristle2D
+    from symfric.laws.dynamic.stick_slip import HaessigFriedland as HaessigFriedland
     from symfric.laws.dynamic.stick_slip import StickSlip as StickSlip
-    from symfric.laws.names import POPULATIONS as POPULATIONS
-    from symfric.laws.names import any_from_text as any_from_text
-    from symfric.laws.names import law_from_text as law_from_text
-    from symfric.laws.names import law_name as law_name
     from symfric.laws.static.applied_force import Awrejcewicz as Awrejcewicz
     from symfric.laws.static.applied_force import Karnopp as Karnopp
     from symfric.laws.static.applied_force import LeineSwitch as LeineSwitch
     from symfric.laws.static.applied_force import Wojewoda as Wojewoda
-    from symfric.laws.static.brown_mcphee import BrownMcPhee as BrownMcPhee
     from symfric.laws.static.coulomb import Coulomb as Coulomb
     from symfric.laws.static.coulomb import PowerLawViscous as PowerLawViscous
     from symfric.laws.static.coulomb import Viscous as Viscous
@@ -63,9 +62,8 @@ if TYPE_CHECKING:
     from symfric.laws.static.exponential import Berger as Berger
     from symfric.laws.static.exponential import DuanSingh as DuanSingh
     from symfric.laws.static.exponential import SteadyStateLuGre as SteadyStateLuGre
+    from symfric.laws.static.exponential import Stribeck as Stribeck
     from symfric.laws.static.exponential import Tustin as Tustin
-    from symfric.laws.static.falling import Lorentzian as Lorentzian
-    from symfric.laws.static.falling import PoppStelter as PoppStelter
     from symfric.laws.static.joints import BAM as BAM
     from symfric.laws.static.joints import Bittencourt as Bittencourt
     from symfric.laws.static.joints import Capstan as Capstan
@@ -73,20 +71,22 @@ if TYPE_CHECKING:
     from symfric.laws.static.piecewise import BengisuAkay as BengisuAkay
     from symfric.laws.static.piecewise import Exudyn as Exudyn
     from symfric.laws.static.piecewise import Hollars as Hollars
+    from symfric.laws.static.piecewise import ModifiedThrelfall as ModifiedThrelfall
     from symfric.laws.static.piecewise import Step5 as Step5
+    from symfric.laws.static.piecewise import Threlfall as Threlfall
     from symfric.laws.static.piecewise import VelocityBased as VelocityBased
     from symfric.laws.static.quarter_car import QuarterCarGeneral as QuarterCarGeneral
     from symfric.laws.static.quarter_car import QuarterCarSimple as QuarterCarSimple
-    from symfric.laws.static.rui_wang import RuiWang as RuiWang
     from symfric.laws.static.self_tuning import BrittleSelfTuning as BrittleSelfTuning
+    from symfric.laws.static.self_tuning import RuiWang as RuiWang
     from symfric.laws.static.self_tuning import SelfTuning as SelfTuning
+    from symfric.laws.static.smooth_peak import BrownMcPhee as BrownMcPhee
+    from symfric.laws.static.smooth_peak import Lorentzian as Lorentzian
     from symfric.laws.static.smooth_peak import MakkarDixon as MakkarDixon
+    from symfric.laws.static.smooth_peak import PoppStelter as PoppStelter
     from symfric.laws.static.smooth_peak import SimscapeBreakaway as SimscapeBreakaway
     from symfric.laws.static.smooth_peak import Specker as Specker
-    from symfric.laws.static.stribeck import Stribeck as Stribeck
     from symfric.laws.static.table import Table as Table
-    from symfric.laws.static.threlfall import ModifiedThrelfall as ModifiedThrelfall
-    from symfric.laws.static.threlfall import Threlfall as Threlfall
     from symfric.laws.steady import steady_force as steady_force
     from symfric.laws.steady import steady_inputs as steady_inputs
 else:
@@ -94,46 +94,34 @@ else:
         __name__,
         {
             "symfric.laws.base.law": "Facts Input Law PHENOMENA State StaticLaw",
-            "symfric.laws.catalogue": "ALL_LAWS",
+            "symfric.laws.catalogue": "ALL_LAWS POPULATIONS any_from_text law_from_text law_name",
             "symfric.laws.composed.compose": "Asymmetric LoadDependent Sum",
             "symfric.laws.composed.isotropic": "PlanarSlip SpatialSlip",
-            "symfric.laws.composed.normalised": "LoadNormalised",
             "symfric.laws.composed.populations": "AnyLaw GenericAsperity Population RandomBristles",
-            "symfric.laws.composed.wrap": "Lagged TemperatureDependent",
-            "symfric.laws.dynamic.armstrong": "Armstrong",
-            "symfric.laws.dynamic.bliman_sorine": "BlimanSorine",
-            "symfric.laws.dynamic.bouc_wen": "BoucWen",
-            "symfric.laws.dynamic.bristle_2d": "Bristle2D",
-            "symfric.laws.dynamic.dahl": "Dahl",
-            "symfric.laws.dynamic.elasto_plastic": "ElastoPlastic",
+            "symfric.laws.composed.wrap": "Lagged LoadNormalised TemperatureDependent",
+            "symfric.laws.dynamic.dahl": "BlimanSorine BoucWen Dahl",
+            "symfric.laws.dynamic.dwell": "Armstrong Gonthier RateAndState",
             "symfric.laws.dynamic.exact_coulomb": "ExactCoulomb",
-            "symfric.laws.dynamic.gms": "Element GMS",
-            "symfric.laws.dynamic.gonthier": "Gonthier",
-            "symfric.laws.dynamic.haessig_friedland": "HaessigFriedland",
-            "symfric.laws.dynamic.leuven": "Leuven",
-            "symfric.laws.dynamic.lugre": "LuGre LuGreNormalised LuGrePassive",
-            "symfric.laws.dynamic.maxwell_slip": "MaxwellSlip Slider",
-            "symfric.laws.dynamic.rate_and_state": "RateAndState",
-            "symfric.laws.dynamic.stick_slip": "StickSlip",
-            "symfric.laws.names": "POPULATIONS any_from_text law_from_text law_name",
+            "symfric.laws.dynamic.lugre": "ElastoPlastic LuGre LuGreNormalised LuGrePassive",
+            "symfric.laws.dynamic.maxwell_slip": "Element GMS Leuven MaxwellSlip Slider",
+            "symfric.laws.dynamic.stick_slip": "Bristle2D HaessigFriedland StickSlip",
             "symfric.laws.static.applied_force": "Awrejcewicz Karnopp LeineSwitch Wojewoda",
-            "symfric.laws.static.brown_mcphee": "BrownMcPhee",
             "symfric.laws.static.coulomb": "Coulomb PowerLawViscous Viscous",
             "symfric.laws.static.exponential": """
-                Andersson Benson Berger DuanSingh SteadyStateLuGre Tustin
+                Andersson Benson Berger DuanSingh SteadyStateLuGre Stribeck Tustin
             """,
-            "symfric.laws.static.falling": "Lorentzian PoppStelter",
             "symfric.laws.static.joints": "BAM Bittencourt Capstan",
             "symfric.laws.static.piecewise": """
-                Ambrosio BengisuAkay Exudyn Hollars Step5 VelocityBased
+                Ambrosio BengisuAkay Exudyn Hollars ModifiedThrelfall Step5
+                Threlfall VelocityBased
             """,
             "symfric.laws.static.quarter_car": "QuarterCarGeneral QuarterCarSimple",
-            "symfric.laws.static.rui_wang": "RuiWang",
-            "symfric.laws.static.self_tuning": "BrittleSelfTuning SelfTuning",
-            "symfric.laws.static.smooth_peak": "MakkarDixon SimscapeBreakaway Specker",
-            "symfric.laws.static.stribeck": "Stribeck",
+            "symfric.laws.static.self_tuning": "BrittleSelfTuning RuiWang SelfTuning",
+            "symfric.laws.static.smooth_peak": """
+                BrownMcPhee Lorentzian MakkarDixon PoppStelter SimscapeBreakaway
+                Specker
+            """,
             "symfric.laws.static.table": "Table",
-            "symfric.laws.static.threlfall": "ModifiedThrelfall Threlfall",
             "symfric.laws.steady": "steady_force steady_inputs",
         },
     )

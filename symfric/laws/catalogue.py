@@ -1,109 +1,200 @@
-"""Every law that stands alone, by the name that a user types."""
+"""Every law by the name that a user types, and the laws that a text names."""
 
-from symfric.laws.base.law import Law
-from symfric.laws.dynamic.armstrong import Armstrong
-from symfric.laws.dynamic.bliman_sorine import BlimanSorine
-from symfric.laws.dynamic.bouc_wen import BoucWen
-from symfric.laws.dynamic.bristle_2d import Bristle2D
-from symfric.laws.dynamic.dahl import Dahl
-from symfric.laws.dynamic.elasto_plastic import ElastoPlastic
-from symfric.laws.dynamic.exact_coulomb import ExactCoulomb
-from symfric.laws.dynamic.gms import GMS
-from symfric.laws.dynamic.gonthier import Gonthier
-from symfric.laws.dynamic.haessig_friedland import HaessigFriedland
-from symfric.laws.dynamic.leuven import Leuven
-from symfric.laws.dynamic.lugre import LuGre, LuGreNormalised, LuGrePassive
-from symfric.laws.dynamic.maxwell_slip import MaxwellSlip
-from symfric.laws.dynamic.rate_and_state import RateAndState
-from symfric.laws.dynamic.stick_slip import StickSlip
-from symfric.laws.static.applied_force import Awrejcewicz, Karnopp, LeineSwitch, Wojewoda
-from symfric.laws.static.brown_mcphee import BrownMcPhee
-from symfric.laws.static.coulomb import Coulomb, PowerLawViscous, Viscous
-from symfric.laws.static.exponential import (
-    Andersson,
-    Benson,
-    Berger,
-    DuanSingh,
-    SteadyStateLuGre,
-    Tustin,
+from re import fullmatch
+
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names
+from symfric.laws.base.law import Law, check_law
+from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
+from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
+from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
+from symfric.laws.dynamic import dahl, dwell, exact_coulomb, lugre, maxwell_slip, stick_slip
+from symfric.laws.static import (
+    applied_force,
+    coulomb,
+    exponential,
+    joints,
+    piecewise,
+    quarter_car,
+    self_tuning,
+    smooth_peak,
 )
-from symfric.laws.static.falling import Lorentzian, PoppStelter
-from symfric.laws.static.joints import BAM, Bittencourt, Capstan
-from symfric.laws.static.piecewise import (
-    Ambrosio,
-    BengisuAkay,
-    Exudyn,
-    Hollars,
-    Step5,
-    VelocityBased,
-)
-from symfric.laws.static.quarter_car import QuarterCarGeneral, QuarterCarSimple
-from symfric.laws.static.rui_wang import RuiWang
-from symfric.laws.static.self_tuning import BrittleSelfTuning, SelfTuning
-from symfric.laws.static.smooth_peak import MakkarDixon, SimscapeBreakaway, Specker
-from symfric.laws.static.stribeck import Stribeck
-from symfric.laws.static.threlfall import ModifiedThrelfall, Threlfall
 
 STATIC_LAWS: dict[str, type[Law]] = {
-    "coulomb": Coulomb,
-    "viscous": Viscous,
-    "power_law_viscous": PowerLawViscous,
-    "stribeck": Stribeck,
-    "tustin": Tustin,
-    "lorentzian": Lorentzian,
-    "steady_state_lugre": SteadyStateLuGre,
-    "brown_mcphee": BrownMcPhee,
-    "simscape_breakaway": SimscapeBreakaway,
-    "specker": Specker,
-    "self_tuning": SelfTuning,
-    "brittle_self_tuning": BrittleSelfTuning,
-    "rui_wang": RuiWang,
-    "threlfall": Threlfall,
-    "modified_threlfall": ModifiedThrelfall,
-    "bengisu_akay": BengisuAkay,
-    "velocity_based": VelocityBased,
-    "ambrosio": Ambrosio,
-    "hollars": Hollars,
-    "exudyn": Exudyn,
-    "step5": Step5,
-    "benson": Benson,
-    "andersson": Andersson,
-    "duan_singh": DuanSingh,
-    "berger": Berger,
-    "popp_stelter": PoppStelter,
-    "makkar_dixon": MakkarDixon,
-    "karnopp": Karnopp,
-    "awrejcewicz": Awrejcewicz,
-    "leine_switch": LeineSwitch,
-    "wojewoda": Wojewoda,
-    "quarter_car_general": QuarterCarGeneral,
-    "quarter_car_simple": QuarterCarSimple,
-    "bittencourt": Bittencourt,
-    "bam": BAM,
-    "capstan": Capstan,
+    "coulomb": coulomb.Coulomb,
+    "viscous": coulomb.Viscous,
+    "power_law_viscous": coulomb.PowerLawViscous,
+    "stribeck": exponential.Stribeck,
+    "tustin": exponential.Tustin,
+    "lorentzian": smooth_peak.Lorentzian,
+    "steady_state_lugre": exponential.SteadyStateLuGre,
+    "brown_mcphee": smooth_peak.BrownMcPhee,
+    "simscape_breakaway": smooth_peak.SimscapeBreakaway,
+    "specker": smooth_peak.Specker,
+    "self_tuning": self_tuning.SelfTuning,
+    "brittle_self_tuning": self_tuning.BrittleSelfTuning,
+    "rui_wang": self_tuning.RuiWang,
+    "threlfall": piecewise.Threlfall,
+    "modified_threlfall": piecewise.ModifiedThrelfall,
+    "bengisu_akay": piecewise.BengisuAkay,
+    "velocity_based": piecewise.VelocityBased,
+    "ambrosio": piecewise.Ambrosio,
+    "hollars": piecewise.Hollars,
+    "exudyn": piecewise.Exudyn,
+    "step5": piecewise.Step5,
+    "benson": exponential.Benson,
+    "andersson": exponential.Andersson,
+    "duan_singh": exponential.DuanSingh,
+    "berger": exponential.Berger,
+    "popp_stelter": smooth_peak.PoppStelter,
+    "makkar_dixon": smooth_peak.MakkarDixon,
+    "karnopp": applied_force.Karnopp,
+    "awrejcewicz": applied_force.Awrejcewicz,
+    "leine_switch": applied_force.LeineSwitch,
+    "wojewoda": applied_force.Wojewoda,
+    "quarter_car_general": quarter_car.QuarterCarGeneral,
+    "quarter_car_simple": quarter_car.QuarterCarSimple,
+    "bittencourt": joints.Bittencourt,
+    "bam": joints.BAM,
+    "capstan": joints.Capstan,
 }
 """Memoryless laws by name, the widely used ones first."""
 
 DYNAMIC_LAWS: dict[str, type[Law]] = {
-    "dahl": Dahl,
-    "bliman_sorine": BlimanSorine,
-    "haessig_friedland": HaessigFriedland,
-    "lugre": LuGre,
-    "lugre_normalised": LuGreNormalised,
-    "lugre_passive": LuGrePassive,
-    "elasto_plastic": ElastoPlastic,
-    "leuven": Leuven,
-    "maxwell_slip": MaxwellSlip,
-    "gms": GMS,
-    "stick_slip": StickSlip,
-    "gonthier": Gonthier,
-    "bristle_2d": Bristle2D,
-    "bouc_wen": BoucWen,
-    "rate_and_state": RateAndState,
-    "armstrong": Armstrong,
-    "exact_coulomb": ExactCoulomb,
+    "dahl": dahl.Dahl,
+    "bliman_sorine": dahl.BlimanSorine,
+    "haessig_friedland": stick_slip.HaessigFriedland,
+    "lugre": lugre.LuGre,
+    "lugre_normalised": lugre.LuGreNormalised,
+    "lugre_passive": lugre.LuGrePassive,
+    "elasto_plastic": lugre.ElastoPlastic,
+    "leuven": maxwell_slip.Leuven,
+    "maxwell_slip": maxwell_slip.MaxwellSlip,
+    "gms": maxwell_slip.GMS,
+    "stick_slip": stick_slip.StickSlip,
+    "gonthier": dwell.Gonthier,
+    "bristle_2d": stick_slip.Bristle2D,
+    "bouc_wen": dahl.BoucWen,
+    "rate_and_state": dwell.RateAndState,
+    "armstrong": dwell.Armstrong,
+    "exact_coulomb": exact_coulomb.ExactCoulomb,
 }
 """Every law with states that stands alone, by name."""
 
 ALL_LAWS: dict[str, type[Law]] = {**STATIC_LAWS, **DYNAMIC_LAWS}
 """Every law that stands alone, by name; the contract tests run over them."""
+
+
+POPULATIONS: dict[str, type[GenericAsperity | RandomBristles]] = {
+    "generic_asperity": GenericAsperity,
+    "random_bristles": RandomBristles,
+}
+"""References of many random contacts by name: figures and a force along a motion, no equations."""
+
+ALIASES = {
+    "bo_pavelescu": "stribeck",
+    "adams": "velocity_based",
+    "smooth_coulomb": "coulomb",
+    "leine": "leine_switch",
+    "simscape": "simscape_breakaway",
+    "seven_parameter": "armstrong",
+    "iwan": "maxwell_slip",
+    "reset_integrator": "haessig_friedland",
+    "set_valued_coulomb": "exact_coulomb",
+    "dieterich_ruina": "rate_and_state",
+    "haessig_friedland_bristles": "random_bristles",
+}
+"""Other names of the same law, as papers and programs use them."""
+
+WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDependent]] = {
+    "load_dependent": LoadDependent,
+    "load_normalised": LoadNormalised,
+    "lagged": Lagged,
+    "temperature_dependent": TemperatureDependent,
+}
+"""Laws around one law, by the name that stands before its parentheses."""
+
+
+DEEPEST = 20
+"""Laws in each other; deeper texts are no laws, and exhaust the stack."""
+
+
+def law_name(law: AnyLaw) -> str:
+    """The text that `any_from_text` turns into a law of this kind; the class name of your own."""
+    if not isinstance(law, Law | Population):  # pyright: ignore[reportUnnecessaryIsInstance]
+        check_law("law_name", law)
+    if isinstance(law, Sum):
+        return "+".join(law_name(term) for term in law.laws)
+    if isinstance(law, Asymmetric):
+        return f"asymmetric({law_name(law.positive)})"
+    if isinstance(law, LoadDependent | LoadNormalised | Lagged | TemperatureDependent):
+        name = next(name for name, kind in WRAPPERS.items() if kind is type(law))
+        return f"{name}({law_name(law.law)})"
+    known = (name for name, kind in (ALL_LAWS | POPULATIONS).items() if kind is type(law))
+    return next(known, type(law).__name__)
+
+
+def any_from_text(text: str) -> AnyLaw:
+    """The law or population with default parameters that `text` names; raises `law_from_text`'s."""
+    checks.text("law", text, "the name of a law, such as lugre")
+    name = ALIASES.get(text.strip(), text.strip())
+    return POPULATIONS[name]() if name in POPULATIONS else law_from_text(text)
+
+
+def law_from_text(text: str) -> Law:
+    """The law with default parameters that `text` names.
+
+    `brown_mcphee`, another name of a law as `adams`, sums `coulomb+viscous`, wrappers
+    `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `load_normalised(lugre)`,
+    `lagged(stribeck)` and `temperature_dependent(lugre)`.
+
+    Raises:
+        ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.
+    """
+    checks.text("law", text, "the name of a law, such as lugre")
+    terms = _split_terms(text)
+    laws = tuple(_single(term, text) for term in terms)
+    return laws[0] if len(laws) == 1 else Sum(laws)
+
+
+def _single(term: str, text: str) -> Law:
+    wrapped = fullmatch(rf"(asymmetric|{'|'.join(WRAPPERS)})\((.+)\)", term)
+    if wrapped:
+        inner = law_from_text(wrapped[2])
+        return (
+            Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else WRAPPERS[wrapped[1]](inner)
+        )
+    name = ALIASES.get(term, term)
+    if name in POPULATIONS:
+        raise ValueError(
+            f"law '{text}': expected a law with equations, got {name}, a population of random "
+            "contacts; it has figures and `force(t, x, N)`; gms is the law next to it"
+        )
+    if name in ("asymmetric", *WRAPPERS):
+        raise ValueError(f"law '{text}': expected a law to wrap, as in {name}(stribeck), got none")
+    check_names(f"law {checks.shown(text)}", [name], ALL_LAWS, "`symfric laws` lists them")
+    return ALL_LAWS[name]()
+
+
+def _split_terms(text: str) -> list[str]:
+    """Split at the plus signs outside parentheses."""
+    where = f"law {checks.shown(text)}"
+    terms, depth = [""], 0
+    for letter in text.replace(" ", ""):
+        depth += (letter == "(") - (letter == ")")
+        if depth < 0:
+            break
+        if depth > DEEPEST:
+            raise ValueError(f"{where}: expected at most {DEEPEST} laws in each other, got more")
+        if letter == "+" and depth == 0:
+            terms.append("")
+        else:
+            terms[-1] += letter
+    if depth != 0:
+        raise ValueError(f"{where}: expected balanced parentheses, got {abs(depth)} too many")
+    if not all(terms):
+        raise ValueError(
+            f"{where}: expected the name of a law, got an empty term; "
+            "write one as in coulomb+viscous"
+        )
+    return terms

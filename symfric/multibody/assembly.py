@@ -22,8 +22,8 @@ from symfric.foundation.checks import listed
 from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
+from symfric.laws.catalogue import law_name
 from symfric.laws.composed.isotropic import SpatialSlip
-from symfric.laws.names import law_name
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
@@ -31,10 +31,9 @@ from symfric.multibody.applied import Rest, rests
 from symfric.multibody.equations import Equations, normals_with
 from symfric.multibody.friction import Contact as Rubbing
 from symfric.multibody.mass import solve_mass
-from symfric.multibody.results import Put
+from symfric.multibody.results import Put, constraint_units, multiplier_units
 from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
 from symfric.multibody.topology import Topology
-from symfric.multibody.units import constraint_units, multiplier_units
 
 AT_REST = 1e-9
 """Sliding velocity [m/s] below which a law that rests by modes does so in pictures: it is exact but

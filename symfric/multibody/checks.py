@@ -13,11 +13,11 @@ from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.symbols import strays
 from symfric.model import Variables
-from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.joint import Joint
+from symfric.multibody.spatial import GROUND, Body
 from symfric.multibody.topology import Topology, body_of
 
 Array = NDArray[np.float64]

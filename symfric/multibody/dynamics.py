@@ -17,12 +17,11 @@ from typing import final
 import casadi as ca
 
 from symfric.foundation.symbols import stacked
-from symfric.multibody.body import GROUND, Body
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.joint import Joint
 from symfric.multibody.joints import Floating
 from symfric.multibody.kinematics import Kinematics, Motion, Relative
-from symfric.multibody.spatial import skew
+from symfric.multibody.spatial import GROUND, Body, skew
 from symfric.multibody.topology import Link, body_of, frame_at
 
 Wrench = tuple[ca.SX, ca.SX]

@@ -10,7 +10,6 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.symbols import stacked
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.constraints import Constraint, Held
-from symfric.multibody.cuts import Cuts
 from symfric.multibody.dynamics import (
     Loop,
     Wrench,
@@ -22,10 +21,9 @@ from symfric.multibody.dynamics import (
 from symfric.multibody.forces import Axial, Force, Gravity, Load
 from symfric.multibody.friction import Contact
 from symfric.multibody.joint import Joint
-from symfric.multibody.kinematics import Kinematics, kinematics
+from symfric.multibody.kinematics import Cuts, Kinematics, Turn, Turns, kinematics
 from symfric.multibody.spatial import vector
 from symfric.multibody.topology import Topology, body_of, frame_at
-from symfric.multibody.turns import Turn, Turns
 
 
 @final

@@ -14,10 +14,9 @@ import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
-from symfric.multibody.body import GROUND
 from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics
-from symfric.multibody.spatial import Vector, is_finite, is_vector, vector
+from symfric.multibody.spatial import GROUND, Vector, is_finite, is_vector, vector
 from symfric.multibody.topology import body_of
 
 ZERO = ca.SX(3, 1)

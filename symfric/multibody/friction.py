@@ -10,7 +10,7 @@ child's frame, presses the bearing at two stations a apart on z:
     prismatic:   N = |f_x1 + T_z/b| + |f_y1| + |f_x2| + |f_y2| + |T_z/b|    (guide of width b)
     universal:   of each of its two axes as a revolute joint; the cross between them is massless
     spherical:   N = |F|
-    joints that only close loops: see `symfric.multibody.closing`
+    joints that only close loops: see `symfric.multibody.joints`
 
 Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it. The ball
 of a spherical joint slips with v = R w, a vector in the axes of the socket, the parent's frame: the

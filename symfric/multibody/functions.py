@@ -4,10 +4,10 @@ import casadi as ca
 
 from symfric.foundation.symbols import stacked, starts_of, symbols_of
 from symfric.model import Variables
-from symfric.multibody.body import GROUND
+from symfric.multibody.kinematics import angles
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.slips import slips
-from symfric.multibody.turns import angles
+from symfric.multibody.spatial import GROUND
 
 
 def functions(

@@ -1,4 +1,4 @@
-"""What every joint is: its pose and motion subspace, its constraints, and how it is shown.
+"""The base of all joints: pose and motion subspace, its constraints, and how it is shown.
 
 A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
 p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
@@ -10,8 +10,8 @@ coordinates. The axis of a joint is z of both frames.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 import numpy as np
@@ -19,7 +19,33 @@ import numpy as np
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.model.sketch import Symbol
 from symfric.multibody.friction import JointFriction
-from symfric.multibody.keywords import Keywords
+
+HINTS = {
+    "axis": "the axis of a joint is the z axis of both frames, m.frame('arm.pin', z=(0, 1, 0))",
+    "friction": "friction acts in joints, such as Revolute(..., friction=JointFriction(law))",
+    "damping": "damping is a part of its own, m.force(JointSpringDamper(...))",
+}
+"""What to do instead of giving a keyword that other tools have."""
+
+
+class Keywords:
+    """A dataclass that answers an unknown keyword with those that it has."""
+
+    def __new__(cls, *_: object, **given: object) -> Self:
+        """Refuse unknown keywords.
+
+        Raises:
+            ValueError: a keyword that is not a field.
+        """
+        kind: Any = cls
+        known = [item.name for item in fields(kind) if item.init]
+        if wrong := [name for name in given if name not in known]:
+            hints = "".join(f"; {HINTS[name]}" for name in wrong if name in HINTS)
+            raise ValueError(
+                f"{cls.__name__}: expected {', '.join(known)}, got {', '.join(wrong)}{hints}"
+            )
+        return super().__new__(cls)
+
 
 Pair = tuple[ca.SX, ca.SX]
 FORCE = ("Fx", "Fy", "Fz")

@@ -3,36 +3,164 @@
 See `symfric.multibody.joint` for what these are.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.model.sketch import Symbol
-from symfric.multibody.closing import (
-    Distance,
-    PinInSlot,
-    PlanarPrismatic,
-    PlanarRevolute,
-    PointOnLine,
-)
+from symfric.multibody.friction import JointFriction
 from symfric.multibody.joint import FORCE, Joint, Pair, unit
-from symfric.multibody.spatial import (
-    euler_g,
-    rotation,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-)
+from symfric.multibody.spatial import euler_g, rotation, rotation_x, rotation_y, rotation_z
 
-NONE = ca.SX(3, 0)
+
+@dataclass(frozen=True, eq=False)
+class Closing(Joint):
+    """A joint that only closes loops: no coordinates, and no more constraints than a loop needs.
+
+    A planar loop that is closed by a hinge or a guide of 5 constraints fixes three times what the
+    plane fixes already, and leaves the reactions out of the plane open: friction that depends on
+    them is refused. The planar joints here have what is left of a hinge or a guide in the plane, so
+    that every joint of the loop can rub. The motion is the same whichever of them closes the loop.
+
+        joint             constraints                        rubs            normal force N
+        PlanarRevolute    p_x = p_y = 0; plane x, y          turn about z    |(F_x, F_y)|
+        PlanarPrismatic   p_x = 0, no turn; plane x, z       slide along z   at two stations
+        PinInSlot         p_x = 0; plane x, z                slide along z   |F_x|
+        PointOnLine       p_x = p_y = 0, in space            slide along z   |(F_x, F_y)|
+
+    p is the origin of the child's frame in the parent's. Sliding is measured in the parent's frame,
+    which may move: v = p_z'. F is the reaction in the parent's axes, of the multipliers alone.
+    Limits: in a mechanism that is not planar they hold what the table says, and no more.
+    """
+
+    closes = True
+
+    def linear(self, direction: str) -> bool:
+        """Whether motion in this direction is a translation."""
+        return direction == "slide"
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Not asked for: the joint always closes a loop and has no coordinates."""
+        raise NotImplementedError
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Not asked for: the joint always closes a loop and has no coordinates."""
+        raise NotImplementedError
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Distance(Closing):
+    """A massless rod with ball joints at both ends: (d'd - length^2) / 2 = 0; 1 constraint.
+
+    Its multiplier [N/m] times the length is the force in the rod, positive under tension.
+    """
+
+    constrains = 1
+    transmits = FORCE
+    symbol = Symbol(line="rod", anchored=True)
+
+    length: Scalar = 1.0
+
+    def problems(self) -> Iterator[str]:
+        """A length that is none."""
+        if not is_symbolic(self.length) and not (is_number(self.length) and self.length > 0):
+            yield f"length: expected > 0 m, got {self.length!r}"
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """(p'p - length^2)/2 = 0: the squared distance has a gradient everywhere."""
+        return (ca.dot(p, p) - self.length * self.length) / 2
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PointOnLine(Closing):
+    """The origin of the child's frame stays on the parent's axis z; 2 constraints.
+
+    A bead on a wire: it rubs along the line. The pin that closes a planar loop, which has the same
+    constraints, is `PlanarRevolute`; it rubs as it turns.
+    """
+
+    constrains = 2
+    rubs = ("slide",)
+    directions: ClassVar[Mapping[str, int]] = {"slide": 0}
+    transmits = FORCE
+    symbol = Symbol("o", axes=(("a", 2),), anchored=True)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """p_x = p_y = 0: the point is on the z axis of the line."""
+        return ca.vertcat(p[0], p[1])
+
+    def normal_force(self, friction: JointFriction, F: ca.SX, T: ca.SX) -> ca.SX:
+        """The size of the reaction: the wire is round."""
+        return friction.normal_force(("ball",), F, T)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PlanarRevolute(Closing):
+    """The hinge that closes a planar loop: a pin that turns about z; 2 constraints.
+
+    z is normal to the plane.
+    """
+
+    constrains = 2
+    rubs = ("turn",)
+    directions: ClassVar[Mapping[str, int]] = {"turn": 0}
+    plane = 2
+    transmits = ("Fx", "Fy")
+    symbol = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """p_x = p_y = 0: one point of the plane in common."""
+        return ca.vertcat(p[0], p[1])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PlanarPrismatic(Closing):
+    """The guide that closes a planar loop: slides along z without turning; 2 constraints.
+
+    y is normal to the plane. With `JointFriction.length` the moment presses at two stations.
+    """
+
+    constrains = 2
+    rubs = ("slide",)
+    directions: ClassVar[Mapping[str, int]] = {"slide": 0}
+    plane = 1
+    transmits = ("Fx", "Fz", "My")
+    symbol = Symbol("s", guide=True)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """On one line, and the child's z has no component along the parent's x."""
+        return ca.vertcat(p[0], R[0, 2])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PinInSlot(Closing):
+    """A pin of the child in a straight slot of the parent along z, in a plane; 1 constraint.
+
+    y is normal to the plane. The pin may turn in the slot, without friction.
+    """
+
+    constrains = 1
+    rubs = ("slide",)
+    directions: ClassVar[Mapping[str, int]] = {"slide": 0}
+    plane = 1
+    transmits = ("Fx", "Fz")
+    symbol = Symbol("o", slot=True)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """p_x = 0: between the walls of the slot."""
+        return ca.SX(p[0])
+
+
 ANGLE, LENGTH = ("", "rad"), ("", "m")
 EULER = tuple((f"e{i}", "1") for i in range(4))
-
-
-def _z() -> ca.SX:
-    return unit(2)
 
 
 def _parallel(R: ca.SX) -> ca.SX:
@@ -45,12 +173,12 @@ def _parallel(R: ca.SX) -> ca.SX:
 class Revolute(Joint):
     """Turns about z; 5 constraints."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (ANGLE,)
-    constrains: ClassVar[int] = 5
-    rubs: ClassVar[tuple[str, ...]] = ("turn",)
+    coordinates = (ANGLE,)
+    constrains = 5
+    rubs = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
-    transmits: ClassVar[tuple[str, ...]] = (*FORCE, "Mx", "My")
-    symbol: ClassVar[Symbol] = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
+    transmits = (*FORCE, "Mx", "My")
+    symbol = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Turned by q about z."""
@@ -58,7 +186,7 @@ class Revolute(Joint):
 
     def subspace(self, q: ca.SX) -> Pair:
         """Angular velocity along z of the joint, no velocity of its point."""
-        return _z(), ca.SX(3, 1)
+        return unit(2), ca.SX(3, 1)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """One point in common, parallel axes."""
@@ -70,12 +198,12 @@ class Revolute(Joint):
 class Prismatic(Joint):
     """Slides along z without turning; 5 constraints."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (LENGTH,)
-    constrains: ClassVar[int] = 5
-    rubs: ClassVar[tuple[str, ...]] = ("slide",)
+    coordinates = (LENGTH,)
+    constrains = 5
+    rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
-    transmits: ClassVar[tuple[str, ...]] = ("Fx", "Fy", "Mx", "My", "Mz")
-    symbol: ClassVar[Symbol] = Symbol("s", guide=True)
+    transmits = ("Fx", "Fy", "Mx", "My", "Mz")
+    symbol = Symbol("s", guide=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q along z."""
@@ -83,7 +211,7 @@ class Prismatic(Joint):
 
     def subspace(self, q: ca.SX) -> Pair:
         """No angular velocity, velocity along z of the joint."""
-        return ca.SX(3, 1), _z()
+        return ca.SX(3, 1), unit(2)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """On one line, parallel axes, no turn."""
@@ -95,12 +223,12 @@ class Prismatic(Joint):
 class Cylindrical(Joint):
     """Slides along z and turns about it; 4 constraints."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("slide", "m"), ("angle", "rad"))
-    constrains: ClassVar[int] = 4
-    rubs: ClassVar[tuple[str, ...]] = ("slide", "turn")
+    coordinates = (("slide", "m"), ("angle", "rad"))
+    constrains = 4
+    rubs = ("slide", "turn")
     directions: ClassVar[Mapping[str, int]] = {"slide": 0, "turn": 1}
-    transmits: ClassVar[tuple[str, ...]] = ("Fx", "Fy", "Mx", "My")
-    symbol: ClassVar[Symbol] = Symbol("s", axes=(("a", 2),), guide=True)
+    transmits = ("Fx", "Fy", "Mx", "My")
+    symbol = Symbol("s", axes=(("a", 2),), guide=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[0] along z and turned by q[1] about it."""
@@ -108,7 +236,7 @@ class Cylindrical(Joint):
 
     def subspace(self, q: ca.SX) -> Pair:
         """Translation along z, rotation about z."""
-        return ca.horzcat(ca.SX(3, 1), _z()), ca.horzcat(_z(), ca.SX(3, 1))
+        return ca.horzcat(ca.SX(3, 1), unit(2)), ca.horzcat(unit(2), ca.SX(3, 1))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """On one line, parallel axes."""
@@ -120,12 +248,12 @@ class Cylindrical(Joint):
 class Spherical(Joint):
     """Turns about a point; Euler parameters as coordinates; 3 constraints."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = EULER
-    constrains: ClassVar[int] = 3
-    rubs: ClassVar[tuple[str, ...]] = ("ball",)
-    quaternion: ClassVar[int | None] = 0
-    transmits: ClassVar[tuple[str, ...]] = FORCE
-    symbol: ClassVar[Symbol] = Symbol("o", anchored=True)
+    coordinates = EULER
+    constrains = 3
+    rubs = ("ball",)
+    quaternion = 0
+    transmits = FORCE
+    symbol = Symbol("o", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """R of the Euler parameters q."""
@@ -145,12 +273,12 @@ class Spherical(Joint):
 class Universal(Joint):
     """Turns about x of the parent and y of the child, which stay orthogonal; 4 constraints."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "rad"), ("y", "rad"))
-    constrains: ClassVar[int] = 4
-    rubs: ClassVar[tuple[str, ...]] = ("x", "y")
+    coordinates = (("x", "rad"), ("y", "rad"))
+    constrains = 4
+    rubs = ("x", "y")
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1}
-    transmits: ClassVar[tuple[str, ...]] = (*FORCE, "Mx", "Mz")
-    symbol: ClassVar[Symbol] = Symbol("o", axes=(("a", 0), ("b", 1)), anchored=True)
+    transmits = (*FORCE, "Mx", "Mz")
+    symbol = Symbol("o", axes=(("a", 0), ("b", 1)), anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Turned by q[0] about x, then by q[1] about the new y."""
@@ -185,11 +313,11 @@ class Universal(Joint):
 class Planar(Joint):
     """Moves in the plane x, y and turns about z; 3 constraints."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "m"), ("y", "m"), ("angle", "rad"))
-    constrains: ClassVar[int] = 3
+    coordinates = (("x", "m"), ("y", "m"), ("angle", "rad"))
+    constrains = 3
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1, "turn": 2}
-    transmits: ClassVar[tuple[str, ...]] = ("Fz", "Mx", "My")
-    symbol: ClassVar[Symbol] = Symbol("D", plate=True)
+    transmits = ("Fz", "Mx", "My")
+    symbol = Symbol("D", plate=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[0], q[1] in the plane and turned by q[2] about its normal."""
@@ -197,7 +325,7 @@ class Planar(Joint):
 
     def subspace(self, q: ca.SX) -> Pair:
         """Translation along x and y, rotation about z."""
-        return ca.horzcat(ca.SX(3, 2), _z()), ca.horzcat(ca.SX.eye(3)[:, :2], ca.SX(3, 1))
+        return ca.horzcat(ca.SX(3, 2), unit(2)), ca.horzcat(ca.SX.eye(3)[:, :2], ca.SX(3, 1))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """In one plane, parallel normals."""
@@ -209,8 +337,8 @@ class Planar(Joint):
 class Fixed(Joint):
     """Holds two bodies together; 6 constraints."""
 
-    constrains: ClassVar[int] = 6
-    symbol: ClassVar[Symbol] = Symbol("s", anchored=True)
+    constrains = 6
+    symbol = Symbol("s", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """The frames coincide: identity and zero."""
@@ -218,7 +346,7 @@ class Fixed(Joint):
 
     def subspace(self, q: ca.SX) -> Pair:
         """No column: nothing moves."""
-        return NONE, NONE
+        return ca.SX(3, 0), ca.SX(3, 0)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """One point in common, all axes parallel."""
@@ -230,14 +358,9 @@ class Fixed(Joint):
 class Floating(Joint):
     """Lets a body move freely; Euler parameters for its rotation; no constraint."""
 
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (
-        ("x", "m"),
-        ("y", "m"),
-        ("z", "m"),
-        *EULER,
-    )
-    quaternion: ClassVar[int | None] = 3
-    transmits: ClassVar[tuple[str, ...]] = ()
+    coordinates = (("x", "m"), ("y", "m"), ("z", "m"), *EULER)
+    quaternion = 3
+    transmits = ()
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[:3], R of the Euler parameters q[3:]."""
@@ -245,10 +368,8 @@ class Floating(Joint):
 
     def subspace(self, q: ca.SX) -> Pair:
         """V = q[:3]', w' = 2 G q[3:]'."""
-        return (
-            ca.horzcat(ca.SX(3, 3), 2 * euler_g(q[3:])),
-            ca.horzcat(ca.SX.eye(3), ca.SX(3, 4)),
-        )
+        turning = ca.horzcat(ca.SX(3, 3), 2 * euler_g(q[3:]))
+        return turning, ca.horzcat(ca.SX.eye(3), ca.SX(3, 4))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """No row: all six directions are free."""

@@ -1,16 +1,144 @@
 """Positions, velocities and accelerations of all bodies: one recursion outwards from the ground."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from math import pi
 from typing import final
 
 import casadi as ca
+import numpy as np
 
-from symfric.foundation.symbols import stacked
-from symfric.multibody.body import GROUND
-from symfric.multibody.cuts import Cuts
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import stacked, symbols_of
+from symfric.model.kinds import POSITION
 from symfric.multibody.joint import Joint
+from symfric.multibody.spatial import GROUND
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
-from symfric.multibody.turns import Moved, Turns
+
+
+@final
+class Cuts:
+    """Collects symbols l and their values in the order of the recursions; mutable.
+
+    Written out, the balance of every link depends on the coordinates of all others, and its
+    derivatives fill a matrix. With a symbol for what a body passes on (its orientation, its
+    velocities and accelerations outwards, its wrench inwards), every equation knows its neighbours
+    only, and eliminating link by link, from the tips to the ground, takes a number of operations
+    that grows with the links alone: what the articulated-body algorithm does for accelerations,
+    here for all unknowns of an implicit step.
+
+    Attributes:
+        symbols: l, shape (k, 1).
+        values: of l, each in terms of coordinates and of l before it.
+        links: the link that each of l belongs to.
+    """
+
+    def __init__(self) -> None:
+        self.symbols, self.values = ca.SX(0, 1), ca.SX(0, 1)
+        self.links: list[int] = []
+
+    def __call__(self, link: int, expression: ca.SX) -> ca.SX:
+        """`expression` with a symbol for every entry that is more than a number or a symbol."""
+        cut = ca.SX(expression)
+        for k in range(cut.nnz()):
+            value = ca.SX(cut.nz[k])
+            if not (value.is_constant() or value.is_symbolic()):
+                symbol = ca.SX.sym(f"l_{len(self.links)}")
+                self.symbols = ca.vertcat(self.symbols, symbol)
+                self.values = ca.vertcat(self.values, value)
+                self.links.append(link)
+                cut.nz[k] = symbol
+        return cut
+
+    def needed(self, expression: ca.SX) -> list[int]:
+        """Numbers of those l that `expression` depends on, directly or through others."""
+        found = np.zeros(len(self.links), dtype=bool)
+        found[ca.jacobian_sparsity(expression, self.symbols).get_triplet()[1]] = True
+        own = ca.jacobian_sparsity(self.values, self.symbols)
+        rows, columns = (np.array(part, dtype=int) for part in own.get_triplet())
+        for k in range(found.size - 1, -1, -1):
+            if found[k]:
+                found[columns[rows == k]] = True
+        return [int(k) for k in np.flatnonzero(found)]
+
+
+PARALLEL = 1e-9
+"""Differences of the derivatives of a rate from one position to another that are rounding."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """An angle as a state, and its rate [rad/s]."""
+
+    angle: Variable
+    rate: ca.SX
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Coordinates and rates of the tree and where it starts, SX (n, 1)."""
+
+    q: ca.SX
+    qd: ca.SX
+    start: ca.SX
+
+    def turned(self, rate: ca.SX) -> tuple[ca.SX, ca.SX] | None:
+        """How far a joint of this rate has turned, and had at the start; None in space."""
+        slopes = ca.densify(ca.jacobian(rate, self.qd))
+        at = ca.symvar(slopes)
+        anywhere = np.random.default_rng(0)
+        numbers = ca.Function("slopes", [stacked(at)], [slopes])
+        found = [numbers(anywhere.uniform(-1, 1, len(at))).full() for _ in range(3)]
+        if np.ptp(found, axis=0).max(initial=0.0) > PARALLEL:
+            return None
+        a = ca.sparsify(ca.DM(found[0].round(9)))
+        return a @ self.q, a @ self.start
+
+
+@final
+class Turns:
+    """Collects the angles, over full turns, of joints that close loops; mutable.
+
+    The pose of two bodies gives the angle between them modulo 2 pi. A force that grows with the
+    angle needs all of it: the angle becomes a state phi of the model, with the relative angular
+    velocity as its rate. It starts at the angle of the pose, with as many turns as the start of the
+    joint has, and as the other joints of its loop have made where all axes are parallel:
+
+        phi' = a' q'  with constant a,   so that   phi - phi_0 = a' (q - q_0)
+    """
+
+    def __init__(self) -> None:
+        self._found: dict[str, Turn] = {}
+
+    def __call__(
+        self, joint: Joint, direction: str, angle: ca.SX, rate: ca.SX, moved: "Moved"
+    ) -> ca.SX:
+        """The angle of a joint as a symbol, given that of its pose, its rate and what moves it."""
+        k = joint.directions[direction]
+        name = joint.coordinate(k)
+        if name not in self._found:
+            made, near = moved.turned(rate), joint.starts[k]
+            if made is not None:
+                near = made[0] if joint.start is None else near + made[0] - made[1]
+            start = angle + 2 * pi * ca.floor((near - angle) / (2 * pi) + 0.5)
+            state = Variable(
+                name, "rad", start=start, doc="angle of a joint that closes a loop", kind=POSITION
+            )
+            self._found[name] = Turn(state, rate)
+        return self._found[name].angle.symbol
+
+    @property
+    def found(self) -> tuple[Turn, ...]:
+        """All that were asked for."""
+        return tuple(self._found.values())
+
+
+def angles(turns: Sequence[Turn]) -> ca.SX:
+    """Their symbols, shape (k, 1)."""
+    return symbols_of(turn.angle for turn in turns)
+
 
 ZERO = ca.SX(3, 1)
 

@@ -8,10 +8,9 @@ friction force takes away while all other forces stay.
 
 import casadi as ca
 
-from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.joints import Floating
-from symfric.multibody.spatial import euler_e
+from symfric.multibody.spatial import GROUND, euler_e
 
 
 def mirrored(M: ca.SX) -> ca.SX:

@@ -19,7 +19,6 @@ from symfric.foundation.symbols import starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble, coordinates
-from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force, Gravity
 from symfric.multibody.joint import Joint
@@ -35,9 +34,9 @@ from symfric.multibody.prepare import (
     written,
 )
 from symfric.multibody.results import results
-from symfric.multibody.shown import shown as shown_of
-from symfric.multibody.sketch import sketch
-from symfric.multibody.spatial import Frame, Vector, is_vector
+from symfric.multibody.sketch import shown as shown_of
+from symfric.multibody.sketch import sketch, thumbnail
+from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
 
 if TYPE_CHECKING:
@@ -83,13 +82,19 @@ class Mechanism(Showing):
 
     def shown(self) -> Shown:
         """What was added so far."""
-        return shown_of(self)
+        return shown_of(
+            self.name, self.bodies, self.joints, self.forces, self.constraints, self.inputs
+        )
 
     def thumbnail(self) -> "Figure | None":
         """The machine at its start, small; nothing where it cannot be built yet."""
-        from symfric.multibody.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
-
-        return picture(self)
+        try:
+            made = self.prepare()
+        except ValueError:
+            return None
+        drawn = sketch(made.eq, self.joints, self.forces, {})
+        places = ca.Function("places", [made.eq.q], [drawn.places])(made.q0)
+        return thumbnail(drawn, places.full())
 
     def to_pack(self) -> dict[str, Any]:
         """All that was added."""

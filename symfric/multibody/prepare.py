@@ -13,13 +13,12 @@ from symfric.model import Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import coordinates
 from symfric.multibody.constraints import Constraint
-from symfric.multibody.cuts import Cuts
 from symfric.multibody.equations import Equations, equations
 from symfric.multibody.forces import Axial, Force
 from symfric.multibody.joint import Joint
+from symfric.multibody.kinematics import Cuts, angles
 from symfric.multibody.spatial import euler_parameters
 from symfric.multibody.topology import Topology
-from symfric.multibody.turns import angles
 
 Array = NDArray[np.float64]
 LONG, LONG_WITH_FRICTION = 16, 12

@@ -7,10 +7,9 @@ from typing import final
 
 import casadi as ca
 
-from symfric.multibody.body import GROUND, Body
 from symfric.multibody.joint import Joint, Pair
 from symfric.multibody.joints import Floating
-from symfric.multibody.spatial import Frame, skew
+from symfric.multibody.spatial import GROUND, Body, Frame, skew
 
 
 def body_of(place: str) -> str:

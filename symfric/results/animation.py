@@ -5,7 +5,7 @@ from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -21,10 +21,8 @@ from symfric.foundation.panels import blank, grid
 from symfric.foundation.prefixes import readable
 from symfric.foundation.style import EDGE, colour
 from symfric.model.sketch import Sketch
+from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
-
-if TYPE_CHECKING:
-    from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 ENDINGS = (".gif", ".html", ".mp4")
@@ -43,7 +41,7 @@ FLATTEST = 0.4
 
 
 def animate(
-    trajectory: "Trajectory",
+    trajectory: Signals,
     path: str | Path,
     *,
     fps: float = 20.0,
@@ -159,7 +157,7 @@ show(0);
 
 
 def picture(
-    trajectory: "Trajectory", times: Array, speed: float = 1.0
+    trajectory: Signals, times: Array, speed: float = 1.0
 ) -> tuple[Figure, Callable[[int], None]]:
     """A figure of a mechanism, and what makes it show its pose at times[k].
 
@@ -199,7 +197,7 @@ def picture(
     return figure, show
 
 
-def _sticks(trajectory: "Trajectory", sketch: Sketch, times: Array) -> dict[str, Flags]:
+def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flags]:
     """Joint -> whether all its contacts move slower than the scale of their law."""
     marks = [mark for mark in sketch.marks if mark.slips]
     if not marks:

@@ -1,7 +1,7 @@
 """The balance of energy of a mechanism, its work by quadrature over the accepted steps."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -11,9 +11,7 @@ from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.symbols import stacked
 from symfric.model.kinds import WORK
 from symfric.results.quadrature import integrals
-
-if TYPE_CHECKING:
-    from symfric.results.trajectory import Trajectory
+from symfric.results.signals import Signals
 
 Array = NDArray[np.float64]
 
@@ -73,7 +71,7 @@ class EnergyBalance(Showing):
         }
 
 
-def energy_balance(trajectory: "Trajectory") -> EnergyBalance:
+def energy_balance(trajectory: Signals) -> EnergyBalance:
     """The balance of a model that has the detail "conserved" and powers of the kind `WORK`.
 
     Raises:

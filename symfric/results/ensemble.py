@@ -1,6 +1,6 @@
 """The result of many runs: signals of all members, what was varied, and what became of each."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
-from symfric.foundation.shown import Showing, Shown
+from symfric.foundation.shown import Showing, Shown, Table, among, counted, valued
 from symfric.foundation.status import Status
 from symfric.foundation.typed import agree
-from symfric.results import tables_many
 from symfric.results.stored import Format
+from symfric.results.tables import module
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+PLACES = ("end", "least", "greatest")
+MOST = 5_000_000
+"""Numbers that are read without being asked for; of a file every page, for its last column."""
 
 
 @final
@@ -82,15 +85,16 @@ class Ensemble(Showing):
 
     def shown(self) -> Shown:
         """Members, failures, what was varied, and where signals end."""
-        from symfric.results.shown_many import shown  # noqa: PLC0415  (only who looks needs it)
-
-        return shown(self)
+        return _shown(self)
 
     def thumbnail(self) -> "Figure | None":
-        """The first signal of members, small."""
-        from symfric.results.shown_many import picture  # noqa: PLC0415  (only who looks needs it)
+        """The first signal of the first members over time, small; None for ends alone."""
+        from symfric.results.ensemble_pictures import thumbnail  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return picture(self)
+        if self.t.ndim > 1 or self.t.size < 2:
+            return None
+        name, values = next(iter(self.signals.items()))
+        return thumbnail(self.t, values, f"{name} [{self.units[name]}]")
 
     def __getitem__(self, name: str) -> Array:
         if name in self.varied:
@@ -152,13 +156,37 @@ class Ensemble(Showing):
         Raises:
             ValueError: unknown names.
         """
-        if over:
-            from symfric.results.over import plot_over  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results import ensemble_pictures as pictures  # noqa: PLC0415  (matplotlib is slow to import)
 
-            return plot_over(self, names, over, at, path)
-        from symfric.results.bands import plot_many  # noqa: PLC0415  (matplotlib is slow to import)
+        if not over:
+            return pictures.plot_many(self.scene, self.t, self.signals, self.units, names, path)
+        where = f"ensemble of '{self.scene}': plot"
+        checks.check_names(f"{where}: over", [over], self.varied)
+        shown = self._chosen(names)[: None if names else pictures.SHOWN]
+        said, values = self._at(f"{where}: at", shown, at)
+        signals = {name: (self.units[name], values[name]) for name in shown}
+        others = {n: (self.unit(n), v) for n, v in self.varied.items() if n != over}
+        return pictures.plot_over(
+            self.scene, said, signals, (over, self.unit(over), self.varied[over]), others, path
+        )
 
-        return plot_many(self.scene, self.t, self.signals, self.units, names, path)
+    def _at(
+        self, where: str, names: Sequence[str], at: float | str
+    ) -> tuple[str, dict[str, Array]]:
+        """What the place `at` is called, and name -> values there, shape (members,)."""
+        if isinstance(at, str):
+            checks.choice(where, at, PLACES)
+            if at == "end":
+                said = "at the end" if self.t.ndim > 1 else f"at t = {self.t[-1]:.4g} s"
+                return said, {name: self.signals[name][:, -1] for name in names}
+            which = PLACES.index(at) - 1
+            return f"{at} of each run", {name: self.extremes[name][which] for name in names}
+        if self.t.ndim > 1:
+            raise checks.refused(where, "'end', where each member has its own", at)
+        first, last = float(self.t[0]), float(self.t[-1])
+        time = checks.number(where, at, unit="s", lower=first, upper=last)
+        k = int(np.abs(self.t - time).argmin())
+        return f"at t = {self.t[k]:.4g} s", {name: self.signals[name][:, k] for name in names}
 
     def save(self, path: str | Path) -> None:
         """Write everything to one file, which `symfric.load_ensemble` reads to the bit.
@@ -178,11 +206,11 @@ class Ensemble(Showing):
             path: file.
             names: signals; all if none is given.
         """
-        columns = tables_many.columns(self, names)
-        header = ["member"]
-        header += [f"{name} [{unit}]" for name, unit in tables_many.units(self, columns).items()]
-        members = enumerate(tables_many.by_member(self, columns))
-        write_table(path, header, ([m, *row] for m, rows in members for row in rows.tolist()))
+        columns = self._columns(names)
+        header = ["member", *(f"{name} [{unit}]" for name, unit in self._units(columns).items())]
+        rows = ([m, *row] for m in range(len(self))
+                for row in np.column_stack([v[m] for v in columns.values()]).tolist())  # fmt: skip
+        write_table(path, header, rows)
 
     def to_dataframe(self, *names: str) -> Any:
         """A row for each member and time, as a pandas table with what was varied as columns.
@@ -195,7 +223,20 @@ class Ensemble(Showing):
         Raises:
             ImportError: no pandas.
         """
-        return tables_many.dataframe(self, names)
+        pandas = module("to_dataframe", "pandas")
+        columns = self._columns(names)
+        flat = {name: values.ravel() for name, values in columns.items()}
+        members = np.arange(len(self))
+        if self.t.shape[-1] == 1:
+            index = pandas.Index(members, name="member")
+            if self.t.ndim == 1:
+                del flat["t"]
+        else:
+            del flat["t"]
+            index = pandas.MultiIndex.from_product([members, self.t], names=["member", "t"])
+        frame = pandas.DataFrame(flat, index=index)
+        frame.attrs.update(self._about | {"units": self._units(columns)})
+        return frame
 
     def to_xarray(self, *names: str) -> Any:
         """Signals over member and t as an xarray data set, with what was varied as coordinates.
@@ -203,7 +244,39 @@ class Ensemble(Showing):
         Raises:
             ImportError: no xarray.
         """
-        return tables_many.dataset(self, names)
+        xarray = module("to_xarray", "xarray")
+        over_t, unit = self.t.ndim == 1, {"units": "s"}
+        coordinates: dict[str, Any] = {"member": np.arange(len(self))}
+        coordinates["t"] = ("t", self.t, unit) if over_t else ("member", self.t[:, 0], unit)
+        for name, values in self.varied.items():
+            coordinates[name] = ("member", values, {"units": self.unit(name)})
+        arrays = {
+            name: (("member", "t"), self.signals[name], {"units": self.units[name]})
+            if over_t
+            else ("member", self.signals[name][:, 0], {"units": self.units[name]})
+            for name in self._chosen(names)
+        }
+        return xarray.Dataset(arrays, coords=coordinates, attrs=self._about)
+
+    def _chosen(self, names: Sequence[str]) -> list[str]:
+        """The signals that are named; all if none is."""
+        checks.check_names(f"ensemble of '{self.scene}'", names, self.signals)
+        return list(names) or list(self.signals)
+
+    def _columns(self, names: Sequence[str]) -> dict[str, Array]:
+        """Times, what was varied and signals, by name; shape (members, times), broadcast."""
+        wanted, shape = self._chosen(names), (len(self), self.t.shape[-1])
+        found = {"t": np.broadcast_to(self.t, shape)}
+        found |= {n: np.broadcast_to(v[:, None], shape) for n, v in self.varied.items()}
+        return found | {name: self.signals[name] for name in wanted}
+
+    def _units(self, names: Iterable[str]) -> dict[str, str]:
+        return {name: "s" if name == "t" else self.unit(name) for name in names}
+
+    @property
+    def _about(self) -> dict[str, Any]:
+        """Scene, how it ended, and numbers that all members share."""
+        return {"scene": self.scene, "status": self.status.name, **self.fixed}
 
 
 ENSEMBLE = Format("symfric ensemble", 2, "load_ensemble", "a saved ensemble", Ensemble)
@@ -217,3 +290,52 @@ def load_ensemble(path: str | Path) -> Ensemble:
             version.
     """
     return ENSEMBLE.load(path)
+
+
+def _shown(runs: Ensemble) -> Shown:
+    """How many members, how they ended, and least, middle and greatest value at the last time."""
+    members, times = runs.attempts.size, runs.t.shape[-1]
+    first, last = np.min(runs.t), np.max(runs.t)
+    span = f"{counted(times, 'time')} from {first:g} to {last:g} s" if times > 1 else f"{last:g} s"
+    done = int(np.isfinite(runs.reached).sum())
+    left = f", {members - done} members not started" if done < members else ""
+    lines = [f"{runs.status.name}: {counted(runs.attempts.sum(), 'attempt')} in all{left}"]
+    if runs.varied:
+        lines.append("varied: " + ", ".join(_range(runs, name) for name in runs.varied))
+    if runs.fixed:
+        known = ((n, v, runs.unit(n)) for n, v in runs.fixed.items())
+        lines.append(f"fixed: {valued(known)}")
+    for number, why in list(runs.failed.items())[:3]:
+        lines.append(f"member {number} failed: {why}")
+    if runs.doubtful:
+        first, why = next(iter(runs.doubtful.items()))
+        lines.append(f"doubtful: {len(runs.doubtful)}, the first is {first}: {why}")
+    if len(runs.failed) > 3:
+        lines.append(f"failed: {len(runs.failed)}, members {among(map(str, runs.failed))}")
+    rows = list[tuple[str, ...]]()
+    mapped = any(isinstance(values, np.memmap) for values in runs.signals.values())
+    read = (members * times if mapped else members) <= MOST
+    for name in runs.signals:
+        rows.append((name, runs.units[name], *(_ends(runs, name) if read else ("", "", ""))))
+    header = ("signal", "unit", "least", "median", "greatest")
+    return Shown(
+        f"ensemble of '{runs.scene}': {counted(members, 'member')} at {span}",
+        tuple(lines),
+        Table(header, tuple(rows), numbers=(2, 3, 4)),
+        ("over the members, at the last time",) if read else (),
+    )
+
+
+def _range(runs: Ensemble, name: str) -> str:
+    values, unit = runs.varied[name], runs.unit(name)
+    said = "" if unit in ("", "1") else f" {unit}"
+    return f"{name} from {values.min():.6g} to {values.max():.6g}{said}"
+
+
+def _ends(runs: Ensemble, name: str) -> tuple[str, str, str]:
+    values = np.asarray(runs.signals[name][:, -1])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return "", "", ""
+    low, middle, high = (f"{x:.6g}" for x in (values.min(), np.median(values), values.max()))
+    return low, middle, high

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,11 +15,9 @@ from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.panels import save
 from symfric.foundation.prefixes import clock, readable
 from symfric.foundation.style import COLOURS, EDGE, colour, line
-from symfric.model.kinds import ENERGY
-from symfric.results.kinds import Group, every, friction_laws, main
-
-if TYPE_CHECKING:
-    from symfric.results.trajectory import Trajectory
+from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION
+from symfric.results.kinds import Group, every, friction_laws, kinds, main
+from symfric.results.signals import Signals
 
 Array = NDArray[np.float64]
 CHOICES = ("main", "all")
@@ -30,9 +27,12 @@ BLACK = COLOURS.index(EDGE)
 FLAT = 1e-6
 """Change, relative to the magnitude, below which a signal counts as constant on an axis."""
 
+PANELS, POINTS = 3, 1500
+"""Signals of the small picture, and times of each."""
+
 
 def plot_trajectories(
-    trajectories: "Mapping[str, Trajectory]",
+    trajectories: Mapping[str, Signals],
     names: Sequence[str] = (),
     path: str | Path | None = None,
     panels: str = "main",
@@ -96,7 +96,7 @@ def split(groups: Sequence[Group]) -> list[Group]:
 
 
 def _check_log(
-    log: Sequence[str], groups: Sequence[Group], trajectories: "Mapping[str, Trajectory]"
+    log: Sequence[str], groups: Sequence[Group], trajectories: Mapping[str, Signals]
 ) -> None:
     """Refuse logarithmic axes of what is not shown, or never above zero."""
     checks.check_names("plot: log", log, [name for group in groups for name in group.names])
@@ -111,7 +111,7 @@ def _check_log(
 def _panel(
     axis: Axes,
     group: Group,
-    trajectories: "Mapping[str, Trajectory]",
+    trajectories: Mapping[str, Signals],
     alone: bool,
     by_t: float,
     log: bool,
@@ -160,7 +160,7 @@ def level(axis: Axes, values: Sequence[Array]) -> None:
         axis.set_ylim(middle - (0.2 * size or 1.0), middle + (0.2 * size or 1.0))
 
 
-def _title(trajectories: "Mapping[str, Trajectory]") -> str:
+def _title(trajectories: Mapping[str, Signals]) -> str:
     """The scene, and the laws where these are the same in all."""
     first = next(iter(trajectories.values()))
     laws = {friction_laws(run.model) for run in trajectories.values()}
@@ -168,7 +168,7 @@ def _title(trajectories: "Mapping[str, Trajectory]") -> str:
     return f"{first.scene} with {law}" if law else first.scene
 
 
-def _legend(figure: Figure, trajectories: "Mapping[str, Trajectory]", alone: bool) -> None:
+def _legend(figure: Figure, trajectories: Mapping[str, Signals], alone: bool) -> None:
     """What line belongs to what simulation, below the panels; nothing for one without a name."""
     first = next(iter(trajectories.values()))
     if list(trajectories) == [first.scene]:
@@ -181,3 +181,40 @@ def _legend(figure: Figure, trajectories: "Mapping[str, Trajectory]", alone: boo
         handles=handles, loc="outside lower center", frameon=False, fontsize="small",
         ncols=min(4, len(handles)),
     )  # fmt: skip
+
+
+def thumbnail(run: Signals) -> Figure:
+    """Some signals over time, small: the first position, its rate and the first friction force."""
+    names, (by_t, unit_t) = _few(run), clock(run.span)
+    figure = Figure(figsize=(5.2, 0.5 + 1.05 * len(names)), layout="constrained")
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, name in zip(axes, names, strict=True):
+        t, values = _thinned(run.t, run[name])
+        axis.plot(by_t * t, values, linewidth=1.0, color=COLOURS[0])
+        axis.set_ylabel(f"{name} [{run.units[name]}]", fontsize=7)
+        axis.tick_params(labelsize=7)
+        axis.grid(alpha=0.3)
+    axes[-1].set_xlabel(f"t [{unit_t}]", fontsize=7)
+    figure.align_ylabels(list(axes))
+    return figure
+
+
+def _few(run: Signals) -> list[str]:
+    """The signals of the small picture."""
+    found, kind = list(run.units), kinds(run.model)
+    states = [v.name for v in run.model.x][:2]
+    rubs = [n for n in found if kind.get(n) == FRICTION or n == "friction"][:1]
+    rest = [n for n in found if n not in (*states, *rubs) and kind.get(n) != CONSTRAINTS]
+    return [*states, *rubs, *rest][:PANELS]
+
+
+def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
+    """Few points that keep the least and greatest value of every stretch."""
+    size = -(-t.size // POINTS)
+    if size < 3:
+        return t, values
+    count = t.size // size
+    rows = values[: count * size].reshape(count, size)
+    starts = size * np.arange(count)
+    kept = np.unique(np.r_[starts + rows.argmin(1), starts + rows.argmax(1), t.size - 1])
+    return t[kept], values[kept]

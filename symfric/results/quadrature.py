@@ -1,6 +1,9 @@
-"""Integrals of the signals of a run: over time, works, areas below curves and in loops."""
+"""Extremes and integrals of signals over all accepted steps of a run, not over samples alone.
 
-from collections.abc import Iterable
+A run may rest for years and slip for a second: its steps go there, equally spaced samples do not.
+"""
+
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import casadi as ca
@@ -8,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation.numeric import Scalar
-from symfric.model import Model
 
 Array = NDArray[np.float64]
+Evaluate = Callable[[Array], Mapping[str, Array]]
+ROUNDS, PARTS = 2, 16
+"""How often the neighbourhood of an extreme is looked at again, and in how many parts."""
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 """Of Gauss quadrature on (-1, 1): exact to degree 9, beyond any dense output."""
 EXACT, HALVINGS = 1e-12, 24
@@ -30,103 +35,35 @@ class Run(Protocol):
         ...
 
 
-class Quadrature:
-    """Integrals over the dense output of a run.
+def looks(t: Array, steps: Array, jumps: Array) -> Array:
+    """Times that show all of a run: `t`, ends and middles of `steps`, just before `jumps` [s]."""
+    middles = (steps[:-1] + steps[1:]) / 2
+    before = np.nextafter(jumps, -np.inf)
+    every = np.unique(np.concatenate([t, steps, middles, before]))
+    return every[(every >= steps[0]) & (every <= steps[-1])]
 
-    Attributes:
-        scene, t, span, model: of the run.
+
+def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> dict[str, Array]:
+    """Name -> least and greatest value, shape (2,), refined between the `times` of the `values`.
+
+    A signal that is NaN somewhere has NaN for both.
     """
-
-    scene: str
-    t: Array
-    span: tuple[float, float]
-    model: Model
-
-    @property
-    def step_times(self) -> Array:
-        """Ends of the accepted steps [s]."""
-        raise NotImplementedError
-
-    def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
-        """Values of an expression."""
-        raise NotImplementedError
-
-    def check(self, names: Iterable[str]) -> None:
-        """Refuse what is neither a signal nor a detail."""
-        raise NotImplementedError
-
-    def _inside(self, times: ArrayLike) -> Array:
-        raise NotImplementedError
-
-    def integral(self, name: str, times: ArrayLike | None = None) -> Array:
-        """Integral of a signal or detail over time from the start, such as energy from power.
-
-        By Gauss quadrature over the dense output of every accepted step, which costs the
-        simulation nothing: `trajectory.integral("friction_power")` is a work [J].
-
-        Args:
-            name: of a signal or detail.
-            times: up to where [s], shape (n,); `t` if not given.
-
-        Raises:
-            ValueError: unknown name, a time outside the span.
-        """
-        self.check([name])
-        at = self.t if times is None else self._inside(times)
-        return integrals(self, self.model.expression(name), at)[0]
-
-    def work(self, force: str, rate: str, between: tuple[float, float] | None = None) -> float:
-        """Integral of a force times a rate over time, such as the work of friction [J].
-
-        Over the dense output, steps halved until quadrature is exact to rounding. A sum over the
-        samples at `t` is off by what happens between them.
-
-        Args:
-            force: a signal or detail.
-            rate: another one, such as a velocity.
-            between: first and last time [s]; the whole span if not given.
-
-        Raises:
-            ValueError: unknown names, times outside the span or not in order.
-        """
-        self.check([force, rate])
-        product = self.model.expression(force) * self.model.expression(rate)
-        return self._integral_between(product, between)
-
-    def area(self, y: str, x: str, between: tuple[float, float] | None = None) -> float:
-        """Integral of y dx along the run: the area below a curve, or in a loop that closes.
-
-        Positive for a loop that is run clockwise in the plane of x and y. Found as `work` is; what
-        the reset of an event does to x at once is left out.
-
-        Args:
-            y: a signal or detail.
-            x: one of the states and time alone, of a model with explicit equations.
-            between: first and last time [s]; the whole span if not given.
-
-        Raises:
-            ValueError: unknown names, an x whose rate the equations do not give, times outside the
-                span or not in order.
-        """
-        self.check([y, x])
-        model, signal = self.model, ca.SX(self.model.expression(x))
-        free = ca.vertcat(model.vector("z"), model.vector("u"))
-        if model.ode is None or ca.depends_on(signal, free):
-            raise ValueError(
-                f"trajectory of '{self.scene}': area: expected an x of the states and time of "
-                f"explicit equations, got '{x}'; work(y, rate) takes its rate, where it is a signal"
-            )
-        rate = ca.jacobian(signal, model.vector("x")) @ model.ode + ca.jacobian(signal, model.t)
-        return self._integral_between(model.expression(y) * rate, between)
-
-    def _integral_between(self, expression: ca.SX, times: tuple[float, float] | None) -> float:
-        a, b = self.span if times is None else self._inside(times).tolist()
-        if not a <= b:
-            raise ValueError(
-                f"trajectory of '{self.scene}': between: expected a first and a later time [s], "
-                f"got {a:g} and {b:g} s"
-            )
-        return integral_between(self, expression, a, b)
+    names = list(values)
+    best = np.array([[v.min(), v.max()] for v in values.values()])
+    found = np.array([[np.argmin(v), np.argmax(v)] for v in values.values()])
+    low, high = times[np.maximum(found - 1, 0)], times[np.minimum(found + 1, times.size - 1)]
+    for _ in range(ROUNDS):
+        at = np.linspace(low, high, PARTS + 1)
+        every = evaluate(at.ravel())
+        looked = np.array([every[name].reshape(at.shape)[:, i] for i, name in enumerate(names)])
+        for i in range(len(names)):
+            for k, (pick, better) in enumerate(((np.argmin, np.less), (np.argmax, np.greater))):
+                row = looked[i, :, k]
+                j = int(pick(row))
+                low[i, k], high[i, k] = at[max(j - 1, 0), i, k], at[min(j + 1, PARTS), i, k]
+                if better(row[j], best[i, k]):
+                    best[i, k] = row[j]
+    return dict(zip(names, best, strict=True))
 
 
 def integrals(run: Run, expression: ca.SX, times: Array) -> Array:

@@ -1,36 +1,29 @@
-"""The result of a simulation: named signals over time that plot and write themselves."""
+"""The result of a simulation: named signals over time that plot, balance and save themselves."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from symfric.foundation import checks, packed
+from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
-from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import check_names
-from symfric.foundation.shown import Showing, Shown
-from symfric.foundation.status import Status
-from symfric.foundation.symbols import strays
-from symfric.model import Model
-from symfric.results import tables
-from symfric.results.derivatives import Derivatives
+from symfric.foundation.shown import Shown, Table, among, counted
+from symfric.model.shown import friction
 from symfric.results.energy import EnergyBalance, energy_balance
-from symfric.results.extremes import extremes, looks
-from symfric.results.quadrature import Quadrature
-from symfric.results.shown import shown
-from symfric.results.statistics import Statistics
+from symfric.results.signals import Signals
+from symfric.results.tables import module
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+CHEAP = 200_000
+"""Steps times signals of a run whose steps are looked at without being asked: some 20 ms."""
 
 
 class Kept(Protocol):
@@ -46,7 +39,7 @@ class Kept(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Showing, Derivatives, Quadrature):
+class Trajectory(Signals):
     """Named signals of a simulated model.
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
@@ -73,152 +66,19 @@ class Trajectory(Showing, Derivatives, Quadrature):
         keep: what a file and a pickle hold of it.
     """
 
-    hidden = Showing.hidden | {
-        "count", "delays", "ends", "evaluate", "express", "keep", "pull_back", "states",
-    }  # fmt: skip
+    hidden = Signals.hidden | {"keep"}
 
-    scene: str
-    t: Array
-    units: dict[str, str]
-    status: Status
-    message: str
-    count: Callable[[], Statistics]
-    span: tuple[float, float]
-    ends: Callable[[], Array]
-    states: Callable[[Array], dict[str, Array]]
-    evaluate: Callable[[Array], dict[str, Array]]
-    express: Callable[[ca.SX, Array], Array]
-    model: Model
-    happened: tuple[tuple[float, str], ...] = ()
-    differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
-    pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
-    delays: Callable[[], dict[str, Array]] | None = None
     keep: "Callable[[Trajectory], Kept] | None" = None
 
     def shown(self) -> Shown:
         """How it ended, and every signal with its extremes."""
-        return shown(self)
+        return _shown(self)
 
     def thumbnail(self) -> "Figure":
         """Some signals, small."""
-        from symfric.results.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.pictures import thumbnail  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return picture(self)
-
-    @property
-    def doubts(self) -> str:
-        """What its tolerances do not vouch for, in sentences; "" where nothing is known."""
-        return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
-
-    @cached_property
-    def statistics(self) -> Statistics:
-        """Steps, evaluations, times."""
-        return self.count()
-
-    @property
-    def step_times(self) -> Array:
-        """Ends of the accepted steps [s], shape (steps + 1,); `at(step_times)` has the signals.
-
-        A run whose steps would take much memory has not kept them, and is run again for them, as it
-        is for values between the times `t`.
-        """
-        return self._ends
-
-    @cached_property
-    def _ends(self) -> Array:
-        return self.ends()
-
-    @cached_property
-    def signals(self) -> dict[str, Array]:
-        """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
-        return self.evaluate(self.t)
-
-    @cached_property
-    def looks(self) -> Array:
-        """Times [s] that show every accepted step, however short, and `t`, shape (k,)."""
-        jumps = np.array([time for time, _ in self.happened], dtype=float)
-        return looks(self.t, self.step_times, jumps)
-
-    @cached_property
-    def _looked(self) -> dict[str, Array]:
-        return self.evaluate(self.looks)
-
-    def at_looks(self, name: str) -> Array:
-        """A signal or detail at `looks`: what pictures show."""
-        self.check([name])
-        if name in self._looked:
-            return self._looked[name]
-        return self.of(self.model.expression(name), self.looks)
-
-    @cached_property
-    def extremes(self) -> dict[str, tuple[float, float]]:
-        """Name -> least and greatest value of a signal over all accepted steps."""
-        found = extremes(self.looks, self._looked, self.evaluate)
-        return {name: (float(low), float(high)) for name, (low, high) in found.items()}
-
-    @cached_property
-    def _own_states(self) -> dict[str, Array]:
-        return self.states(self.t)
-
-    def __getitem__(self, name: str) -> Array:
-        if name == "t":
-            return self.t
-        if not isinstance(name, str) or name not in self.units:  # pyright: ignore[reportUnnecessaryIsInstance]
-            self.check([name])
-            return self._further[name]
-        states = self._own_states
-        return states[name] if name in states else self.signals[name]
-
-    @cached_property
-    def _further(self) -> dict[str, Array]:
-        """All details at `t`; one by one they would cost almost as much each."""
-        column = ca.vertcat(*(o.expression for o in self.model.further.values()), 0)
-        return dict(zip(self.model.further, self.of(column), strict=False))
-
-    @cached_property
-    def details(self) -> dict[str, str]:
-        """Name -> unit of the further results of the model, such as reactions."""
-        return {name: output.unit for name, output in self.model.further.items()}
-
-    def unit(self, name: str) -> str:
-        """The unit of a signal or detail."""
-        return self.units[name] if name in self.units else self.details[name]
-
-    def check(self, names: Iterable[str]) -> None:
-        """Refuse what is neither a signal nor a detail.
-
-        Raises:
-            ValueError: unknown names, with the nearest known one.
-        """
-        where = f"trajectory of '{self.scene}'"
-        names = [checks.text(where, name, "the name of a signal") for name in names]
-        known = self.units if all(n in self.units for n in names) else self.units | self.details
-        check_names(f"trajectory of '{self.scene}'", names, known)
-
-    def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
-        """Values of an expression in the symbols of the model: t, x, z, u, p.
-
-        Args:
-            expression: SX of one element, or a column (rows, 1).
-            times: where [s], shape (n,); `t` if not given.
-
-        Returns:
-            Shape (n,), or (rows, n) for a column.
-
-        Raises:
-            ValueError: a symbol that is none of the model's, a time outside the span.
-        """
-        where = f"trajectory of '{self.scene}': of"
-        column, model = ca.SX(checks.expression(where, expression)), self.model
-        known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
-        stray = strays(column, known)
-        if stray:
-            raise ValueError(
-                f"trajectory of '{self.scene}': expected an expression in the symbols of its "
-                f"model, got {', '.join(stray)}"
-            )
-        values = self.express(ca.vec(column), self.t if times is None else self._inside(times))
-        return values[0] if column.is_scalar() else values
+        return thumbnail(self)
 
     def energy_balance(self) -> EnergyBalance:
         """Where the energy of a mechanism went, and what the books do not explain.
@@ -227,32 +87,6 @@ class Trajectory(Showing, Derivatives, Quadrature):
             ValueError: a model that does not keep books of its energy.
         """
         return energy_balance(self)
-
-    def at(self, times: ArrayLike) -> dict[str, Array]:
-        """All signals at `times` [s] inside the simulated span, by dense output.
-
-        Raises:
-            ValueError: a time outside the span.
-        """
-        return self.evaluate(self._inside(times))
-
-    def _inside(self, times: ArrayLike) -> Array:
-        where = f"trajectory of '{self.scene}': times"
-        at = np.atleast_1d(checks.array(where, times, ndim=None, what="times [s]"))
-        if at.ndim > 1:
-            raise checks.refused(where, "a time or a sequence of times [s]", times)
-        first, last = self.span
-        if at.size and not (first <= at.min() and at.max() <= last):
-            raise ValueError(
-                f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
-                f"got {at.min():g} ... {at.max():g} s"
-            )
-        return at
-
-    @cached_property
-    def final(self) -> dict[str, float]:
-        """All signals at the last time reached."""
-        return {k: float(v[0]) for k, v in self.evaluate(np.array(self.span[1:])).items()}
 
     def plot(
         self,
@@ -340,17 +174,24 @@ class Trajectory(Showing, Derivatives, Quadrature):
             path: file.
             names: signals or details; all signals if none is given.
         """
-        columns = tables.columns(self, names)
+        columns = self._columns(names)
         header = ["t [s]", *(f"{name} [{self.unit(name)}]" for name in columns)]
         write_table(path, header, np.column_stack([self.t, *columns.values()]).tolist())
 
     def to_dataframe(self, *names: str) -> Any:
         """Signals or details, all signals if none is given, as a pandas table over t.
 
+        Units stand in its `attrs`.
+
         Raises:
             ImportError: no pandas.
         """
-        return tables.dataframe(self, names)
+        pandas = module("to_dataframe", "pandas")
+        columns = self._columns(names)
+        units = {"t": "s"} | {name: self.unit(name) for name in columns}
+        frame = pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
+        frame.attrs.update(self._about | {"units": units})
+        return frame
 
     def to_xarray(self, *names: str) -> Any:
         """The same as an xarray data set, with units as attributes.
@@ -358,7 +199,20 @@ class Trajectory(Showing, Derivatives, Quadrature):
         Raises:
             ImportError: no xarray.
         """
-        return tables.dataset(self, names)
+        xarray = module("to_xarray", "xarray")
+        columns = self._columns(names)
+        arrays = {name: ("t", v, {"units": self.unit(name)}) for name, v in columns.items()}
+        times = {"t": ("t", self.t, {"units": "s"})}
+        return xarray.Dataset(arrays, coords=times, attrs=self._about)
+
+    def _columns(self, names: Sequence[str]) -> dict[str, Array]:
+        """Signals and details by name; all signals if none is named."""
+        self.check(names)
+        return {name: self[name] for name in names} if names else dict(self.signals)
+
+    @property
+    def _about(self) -> dict[str, str]:
+        return {"scene": self.scene, "status": self.status.name, "message": self.message}
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data: scene, status, statistics, units, times and signals."""
@@ -375,3 +229,56 @@ class Trajectory(Showing, Derivatives, Quadrature):
     def to_json(self, path: str | Path) -> None:
         """Write `to_dict` as JSON."""
         write_text(path, json.dumps(self.to_dict()))
+
+
+def _shown(run: Signals) -> Shown:
+    """Scene, law, span, how it ended, and for each signal where it began, ended and went.
+
+    Extremes are those over all steps where these are known or cheap, else those at `t`.
+    """
+    counts, (first, last) = run.statistics, run.span
+    known = "extremes" in run.__dict__ or counts.steps * len(run.units) <= CHEAP
+    rubbing = friction(run.model)
+    took = f"{counted(counts.steps, 'step')} of {counts.method}"
+    happened = f", {counted(len(run.happened), 'event')}" if run.model.events else ""
+    lines = [
+        *([f"friction: {rubbing}"] if rubbing else []),
+        f"{run.status.name}: {run.message}",
+        f"{took}{happened}, {counted(run.t.size, 'time')} in t",
+        *_measured(run),
+    ]
+    after = [] if known else [f"least and greatest at {run.t.size} times; see extremes"]
+    if "further" in run.model.__dict__ and run.details:
+        after.append(f"further: {among(run.details)}")
+    return Shown(
+        f"run of '{run.scene}' from {first:g} to {last:g} s",
+        tuple(lines),
+        Table(
+            ("signal", "unit", "first", "last", "least", "greatest"),
+            tuple(_rows(run, known)),
+            numbers=(2, 3, 4, 5),
+        ),
+        tuple(after),
+    )
+
+
+def _measured(run: Signals) -> list[str]:
+    """What was measured of its errors."""
+    counts = run.statistics
+    if not isfinite(counts.error):
+        return []
+    slopes = among(f"{name} {x:.0e}" for name, x in counts.sensitivity_errors.items())
+    derivatives = f", of derivatives by {slopes}" if slopes else ""
+    return [f"measured error: {counts.error:.0e}{derivatives}"]
+
+
+def _rows(run: Signals, known: bool) -> list[tuple[str, ...]]:
+    if not run.t.size:
+        return [(name, unit, "", "", "", "") for name, unit in run.units.items()]
+    ends = run.extremes if known else {n: (v.min(), v.max()) for n, v in run.signals.items()}
+    rows = list[tuple[str, ...]]()
+    for name, unit in run.units.items():
+        values = run[name]
+        numbers = (values[0], values[-1], *ends[name])
+        rows.append((name, unit, *(f"{x:.6g}" for x in numbers)))
+    return rows

@@ -1,21 +1,14 @@
 """The ready machines by name."""
 
-from symfric.scenes.arm import Arm
 from symfric.scenes.base import Scene
-from symfric.scenes.clutch import Clutch
-from symfric.scenes.coupled_blocks import CoupledBlocks
-from symfric.scenes.drill_string import DrillString
 from symfric.scenes.drive import Drive
-from symfric.scenes.four_bar import FourBar
-from symfric.scenes.four_mass import FourMass
+from symfric.scenes.linkages import DoublePendulum, FourBar, Pendulum, PendulumBox
 from symfric.scenes.mechanism import MechanismScene
-from symfric.scenes.nip import Nip
-from symfric.scenes.pendulum import DoublePendulum, Pendulum
-from symfric.scenes.pendulum_box import PendulumBox
-from symfric.scenes.prescribed import Prescribed
-from symfric.scenes.quarter_car import QuarterCar
-from symfric.scenes.rabinowicz import Rabinowicz
+from symfric.scenes.rabinowicz import CoupledBlocks, Rabinowicz
+from symfric.scenes.rigs import Prescribed, QuarterCar
+from symfric.scenes.rotating import Clutch, DrillString, Nip
 from symfric.scenes.slider_crank import SliderCrank
+from symfric.scenes.spatial import Arm, FourMass
 
 MECHANISMS: dict[str, type[MechanismScene]] = {
     "pendulum": Pendulum,

@@ -13,6 +13,7 @@ from symfric.foundation.parameters import Variable, param, with_values
 from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.model.sketch import Sketch
+from symfric.scenes import fields
 from symfric.scenes.base import GivenInput, Scene, contact, in_turning, structure
 from symfric.scenes.drawn import Block, drawn
 
@@ -38,8 +39,8 @@ class Drive(Scene):
     t_end: ClassVar[float] = 4.0
     inputs: ClassVar[Mapping[str, GivenInput]] = {"force": GivenInput("2 sin(pi t)", sine)}
 
-    m: Scalar = param(0.8, unit="kg", role="mass", doc="moving mass", lower=1e-12)
-    N: Scalar = param(0.8 * 9.81, unit="N", role="load", doc="normal force", lower=0.0)
+    m: Scalar = fields.MASS(0.8, doc="moving mass")
+    N: Scalar = fields.LOAD(0.8 * 9.81, doc="normal force")
     offset: Scalar = param(0.0, unit="N", role="offset", doc="constant force opposing the input")
 
     turning: bool = structure(default=False, doc="whether the axis turns")

@@ -1,14 +1,12 @@
 """The laws' numbers in Jing and Mi, Selection Mechanism of Friction Models, tables 3 and 7."""
 
 from symfric.laws.dynamic.dahl import Dahl
-from symfric.laws.dynamic.elasto_plastic import ElastoPlastic
-from symfric.laws.dynamic.gonthier import Gonthier
-from symfric.laws.dynamic.lugre import LuGre
+from symfric.laws.dynamic.dwell import Gonthier
+from symfric.laws.dynamic.lugre import ElastoPlastic, LuGre
 from symfric.laws.dynamic.stick_slip import StickSlip
 from symfric.laws.static.applied_force import Awrejcewicz, Karnopp
 from symfric.laws.static.coulomb import Coulomb
-from symfric.laws.static.piecewise import BengisuAkay, VelocityBased
-from symfric.laws.static.threlfall import Threlfall
+from symfric.laws.static.piecewise import BengisuAkay, Threlfall, VelocityBased
 from symfric.scenes.presets import Numbers
 
 SOURCE = "Jing and Mi, Investigation of Selection Mechanism of Friction Models, tables "

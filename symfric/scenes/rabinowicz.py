@@ -1,4 +1,4 @@
-"""Rabinowicz's stick-slip test: a block on a moving belt, held by a spring."""
+"""Blocks on a moving belt, held by springs: one, and two that are coupled."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -7,13 +7,14 @@ from typing import ClassVar, final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar, equals
-from symfric.foundation.parameters import Variable, param, with_values
-from symfric.laws import BrownMcPhee, Law, LuGre
+from symfric.foundation.numeric import Scalar, equals, smallest
+from symfric.foundation.parameters import Variable, with_values
+from symfric.laws import BrownMcPhee, Law, LeineSwitch, LuGre
 from symfric.model import Model, Output, Variables
+from symfric.model.kinds import FRICTION
 from symfric.model.sketch import Sketch
-from symfric.scenes import jing_mi
-from symfric.scenes.base import Scene, contact
+from symfric.scenes import fields, jing_mi
+from symfric.scenes.base import Scene, contact, other_law
 from symfric.scenes.drawn import Block, around, drawn
 from symfric.scenes.presets import Numbers, Preset
 
@@ -61,10 +62,10 @@ class Rabinowicz(Scene):
         ),
     }
 
-    m: Scalar = param(0.8, unit="kg", role="mass", doc="mass of the block", lower=1e-12)
-    k: Scalar = param(2.1, unit="N/m", role="stiffness", doc="spring stiffness", lower=0.0)
-    v_belt: Scalar = param(0.1, unit="m/s", role="motion", doc="belt velocity")
-    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
+    m: Scalar = fields.MASS(0.8, doc="mass of the block")
+    k: Scalar = fields.SPRING(2.1, doc="spring stiffness")
+    v_belt: Scalar = fields.VELOCITY(0.1, doc="belt velocity")
+    g: Scalar = fields.GRAVITY(9.81)
 
     def equations(self, p: Variables) -> Model:
         """States x, v and those of the law; outputs v_rel, friction, power."""
@@ -108,3 +109,115 @@ def rabinowicz(law: Law, *, free: Iterable[str] = (), **parameters: Scalar) -> M
     `free` become symbols in `Model.p`.
     """
     return with_values(Rabinowicz(law), parameters).model(free)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CoupledBlocks(Scene):
+    """Two blocks on a belt, each held to the ground by a spring, with a spring between them.
+
+        m_1 v_1' = -k_1 x_1 + k_c (x_2 - x_1) - F(v_1 - v_belt, m_1 g)
+        m_2 v_2' = -k_2 x_2 - k_c (x_2 - x_1) - F_2(v_2 - v_belt, m_2 g)
+        x_1' = v_1,   x_2' = v_2
+
+    x_1 and x_2 are the elongations of the springs, signs as in `Rabinowicz`. A block that breaks
+    away pushes the other one: the smallest model of earthquakes, which slides in turns, together,
+    or without a rule. `block_2` is the law of the second block.
+
+    Defaults: two blocks of `Rabinowicz` of which one starts displaced.
+    Limits: motions without a rule agree between tolerances for a few break-aways only.
+    Source: Galvanetto and Bishop, Int. J. Mech. Sci. 36, 1994 (two-block model; not read).
+    """
+
+    t_end: ClassVar[float] = 20.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "galvanetto": Preset(
+            "two-block model without units: the second block breaks away at 1.3 times the force of "
+            "the first, both fall as 1/(1 + 3 |v|); mu_d of laws that have one is ours",
+            "Galvanetto and Bishop 1994, as quoted: alpha = 1.2, beta = 1.3, gamma = 3",
+            {"m_1": 1.0, "m_2": 1.0, "k_1": 1.0, "k_2": 1.0, "k_c": 1.2, "v_belt": 0.1, "g": 1.0},
+            {
+                "law": Numbers({"mu_s": 1.0, "mu_d": 0.7}, {LeineSwitch: {"delta": 3.0}}),
+                "block_2": Numbers({"mu_s": 1.3, "mu_d": 0.9}, {LeineSwitch: {"delta": 3.0}}),
+            },
+        )
+    }
+
+    block_2: Law | None = other_law("second block; `law` without")
+    m_1: Scalar = fields.MASS(0.8, doc="mass of the first block")
+    m_2: Scalar = fields.MASS(0.8, doc="mass of the second block")
+    k_1: Scalar = fields.SPRING(2.1, doc="its spring to the ground")
+    k_2: Scalar = fields.SPRING(2.1, doc="that of the second block")
+    k_c: Scalar = fields.SPRING(2.5, doc="spring between them")
+    v_belt: Scalar = fields.VELOCITY(0.1, doc="belt velocity")
+    start_1: Scalar = fields.START(0.0, doc="x_1 at the start")
+    start_2: Scalar = fields.START(0.2, doc="x_2 at the start")
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def equations(self, p: Variables) -> Model:
+        """States x_1, x_2, v_1, v_2 and those of the laws; friction and power of both."""
+        x_1, x_2 = (
+            Variable(f"x_{i}", "m", start=start, nominal=0.1, doc=f"elongation of spring {i}")
+            for i, start in ((1, self.start_1), (2, self.start_2))
+        )
+        v_1, v_2 = (
+            Variable(f"v_{i}", "m/s", nominal=0.1, doc=f"velocity of block {i}") for i in (1, 2)
+        )
+        between = self.k_c * (x_2.symbol - x_1.symbol)
+        pulls = (-self.k_1 * x_1.symbol + between, -self.k_2 * x_2.symbol - between)
+        sliding = tuple(v.symbol - self.v_belt for v in (v_1, v_2))
+        one, two = (
+            contact(
+                f"block_{i + 1}", law, sliding[i], mass * self.g,
+                rest={f"v_{i + 1}": self.v_belt}, bare=False, F_e=pulls[i],
+            )
+            for i, (law, mass) in enumerate(
+                ((self.law, self.m_1), (self.law_of("block_2"), self.m_2))
+            )
+        )  # fmt: skip
+        t = ca.SX.sym("t")
+        return Model(
+            name="coupled_blocks",
+            x=(x_1, x_2, v_1, v_2),
+            p=p,
+            ode=ca.vertcat(
+                v_1.symbol,
+                v_2.symbol,
+                (pulls[0] - one.force) / self.m_1,
+                (pulls[1] - two.force) / self.m_2,
+            ),
+            contacts=(one, two),
+            outputs={
+                "v_rel_1": Output(sliding[0], "m/s", "velocity of block 1 relative to the belt"),
+                "v_rel_2": Output(sliding[1], "m/s", "velocity of block 2 relative to the belt"),
+                "friction_1": Output(
+                    one.force, "N", "friction force opposing v_rel_1", kind=FRICTION
+                ),
+                "friction_2": Output(
+                    two.force, "N", "friction force opposing v_rel_2", kind=FRICTION
+                ),
+                "power_1": Output(one.force * sliding[0], "W", "power taken by contact 1"),
+                "power_2": Output(two.force * sliding[1], "W", "power taken by contact 2"),
+            },
+            t=t,
+            sketch=partial(self._sketch, x_1.symbol, x_2.symbol, t),
+        )
+
+    def _sketch(self, x_1: ca.SX, x_2: ca.SX, t: ca.SX) -> Sketch:
+        """The blocks on the belt, whose marks move with it; each hangs on a spring of its own."""
+        stiff = smallest(self.k_1, self.k_2)
+        way = 0.15 * self.m_1 * self.g / stiff if not equals(stiff, 0.0) else 1.0
+        marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]
+        return drawn(
+            {
+                "block_1": Block(x_1, 0.0, "x", "v_rel_1", self.law),
+                "block_2": Block(x_2 + 2 * way, 0.0, "x", "v_rel_2", self.law_of("block_2")),
+            },
+            {"wall_1": (-way, 0.5 * way), "wall_2": (way, 0.5 * way)},
+            [
+                ("spring", "wall_1", "block_1"),
+                ("spring", "wall_2", "block_2"),
+                ("spring", "block_1", "block_2"),
+            ],
+            ticks=marks,
+        )

@@ -8,6 +8,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
 from symfric.laws import BrownMcPhee, Law
 from symfric.multibody import Distance, JointFriction, Mechanism, Prismatic, Revolute
+from symfric.scenes import fields
 from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene, reach
 from symfric.scenes.presets import Numbers, Preset
@@ -53,24 +54,18 @@ class SliderCrank(MechanismScene):
     }
 
     guide: Law | None = other_law("guide of the slider; without friction where not given")
-    m_crank: Scalar = param(0.5, unit="kg", role="mass", doc="mass of the crank", lower=1e-12)
-    m_slider: Scalar = param(5.0, unit="kg", role="mass", doc="mass of the slider", lower=1e-12)
-    J: Scalar = param(
-        0.2, unit="kg m^2", role="inertia", doc="inertia of the crank about x", lower=1e-12
-    )
-    r: Scalar = param(0.08, unit="m", role="geometry", doc="crank radius", lower=1e-12)
-    l: Scalar = param(0.3, unit="m", role="geometry", doc="length of the rod", lower=1e-12)  # noqa: E741
+    m_crank: Scalar = fields.MASS(0.5, doc="mass of the crank")
+    m_slider: Scalar = fields.MASS(5.0, doc="mass of the slider")
+    J: Scalar = fields.INERTIA(0.2, doc="inertia of the crank about x")
+    r: Scalar = fields.SIZE(0.08, doc="crank radius")
+    l: Scalar = fields.SIZE(0.3, doc="length of the rod")  # noqa: E741
     b: Scalar = param(0.1, unit="m", role="geometry", doc="position of the crank along y")
     c: Scalar = param(0.12, unit="m", role="geometry", doc="position of the crank along z")
     e: Scalar = param(0.02, unit="m", role="geometry", doc="height of the rod's end on the slider")
-    a: Scalar = param(
-        0.1, unit="m", role="geometry", doc="distance of the bearing stations", lower=1e-12
-    )
-    R: Scalar = param(
-        0.1, unit="m", role="geometry", doc="radius of the crank's bearing", lower=1e-12
-    )
-    omega: Scalar = param(120.0, unit="rad/s", role="motion", doc="angular velocity at the start")
-    g: Scalar = param(9.8, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
+    a: Scalar = fields.STATIONS(0.1)
+    R: Scalar = fields.SIZE(0.1, doc="radius of the crank's bearing")
+    omega: Scalar = fields.TURN(120.0, doc="angular velocity at the start")
+    g: Scalar = fields.GRAVITY(9.8)
 
     def mechanism(self) -> Mechanism:
         """Two bodies, a bearing, a guide and a rod."""

@@ -22,7 +22,7 @@ DRY = (
     ),
     Mutant(
         "the quadratic rise of Popp and Stelter does not see the load",
-        "symfric/laws/static/falling.py",
+        "symfric/laws/static/smooth_peak.py",
         "            mu += self.kappa * v * v", "            mu += self.kappa * v * v / N", PRINTED,
     ),
     Mutant(
@@ -31,7 +31,7 @@ DRY = (
         "return (1 - w) * F_e + w * slip", ("tests/symfric/laws/test_driving.py",),
     ),
     Mutant(
-        "a law says that it is unverified, and not what that means", "symfric/laws/base/law.py",
+        "a law says that it is unverified, and not what that means", "symfric/laws/base/facts.py",
         'said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"', "said = self.confidence",
         ("tests/symfric/laws/test_contract.py",),
     ),

@@ -100,7 +100,7 @@ HELD = (
         'f"{escape(text)}</{mark}>"', 'f"{text}</{mark}>"', T_SHOWN,
     ),
     Mutant(
-        "a law takes more states than it has", "symfric/laws/base/given.py",
+        "a law takes more states than it has", "symfric/laws/base/law.py",
         "if rows != len(law.states):", "if rows < len(law.states):",
         ("tests/symfric/laws/base/test_given.py",),
     ),
@@ -109,7 +109,7 @@ HELD = (
         "Output(model.ode[r], unit", "Output(model.ode[k], unit", T_ACCELERATIONS,
     ),
     Mutant(
-        "deflections follow the load", "symfric/laws/composed/normalised.py",
+        "deflections follow the load", "symfric/laws/composed/wrap.py",
         "        return self.N_0\n", "        return N\n",
         ("tests/symfric/laws/composed/test_normalised.py",),
     ),
@@ -135,7 +135,7 @@ HELD = (
     ),
     Mutant(
         "behind a reversal Bliman and Sorine are taken to be overloaded",
-        "symfric/laws/dynamic/bliman_sorine.py",
+        "symfric/laws/dynamic/dahl.py",
         "else self.mu_1 + self.mu_2)", "else self.mu_1)", T_DOUBTS,
     ),
 )  # fmt: skip

@@ -4,11 +4,11 @@ from mutants.mutant import Mutant
 
 PRESETS = "symfric/scenes/presets.py"
 JING_MI = "symfric/scenes/jing_mi.py"
-CLUTCH = "symfric/scenes/clutch.py"
-BLOCKS = "symfric/scenes/coupled_blocks.py"
-DRILL = "symfric/scenes/drill_string.py"
-NIP = "symfric/scenes/nip.py"
-GIVEN = "symfric/scenes/prescribed.py"
+CLUTCH = "symfric/scenes/rotating.py"
+BLOCKS = "symfric/scenes/rabinowicz.py"
+DRILL = "symfric/scenes/rotating.py"
+NIP = "symfric/scenes/rotating.py"
+GIVEN = "symfric/scenes/rigs.py"
 RATES = "symfric/integrator/equations/rates.py"
 T_PRESETS = ("tests/symfric/scenes/test_presets.py",)
 T_CLUTCH = ("tests/symfric/scenes/test_clutch.py",)

@@ -2,8 +2,8 @@
 
 from mutants.mutant import Mutant
 
-RANDOM = "symfric/figures/random_motion.py"
-CAR = "symfric/scenes/quarter_car.py"
+RANDOM = "symfric/figures/motion.py"
+CAR = "symfric/scenes/rigs.py"
 
 PICTURED = (
     Mutant(

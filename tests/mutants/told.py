@@ -34,11 +34,11 @@ TOLD = (
         "*run.extremes[signal]))", "*run.extremes[signal][::-1]))", results("report"),
     ),
     Mutant(
-        "least and greatest of a long run change places", RESULTS + "shown.py",
+        "least and greatest of a long run change places", RESULTS + "trajectory.py",
         "(v.min(), v.max())", "(v.max(), v.min())", results("shown_runs"),
     ),
     Mutant(
-        "least values are looked for beside the greatest", RESULTS + "extremes.py",
+        "least values are looked for beside the greatest", RESULTS + "quadrature.py",
         "(np.argmin, np.less), (np.argmax, np.greater)",
         "(np.argmin, np.less), (np.argmin, np.greater)", results("extremes"),
     ),
@@ -47,9 +47,9 @@ TOLD = (
         "[{self.unit(name)}]", "[{self.units.get(name, '')}]", results("trajectory"),
     ),
     Mutant(
-        "a table holds all signals whatever is asked for", RESULTS + "tables.py",
-        "return {name: run[name] for name in names} if names else dict(run.signals)",
-        "return dict(run.signals)", results("trajectory"),
+        "a table holds all signals whatever is asked for", RESULTS + "trajectory.py",
+        "return {name: self[name] for name in names} if names else dict(self.signals)",
+        "return dict(self.signals)", results("trajectory"),
     ),
     Mutant(
         "an acceleration has the unit of its velocity", "symfric/model/accelerations.py",
@@ -106,7 +106,7 @@ TOLD = (
     ),
     Mutant(
         "figures of the same runs are computed one by one", GALLERY + "rendering.py",
-        "groups.setdefault(_runs(name) or name, [])", "groups.setdefault(name, [])", T_RENDERING,
+        "groups.setdefault(scripts()[name], [])", "groups.setdefault(name, [])", T_RENDERING,
     ),
     Mutant(
         "an interrupted gallery ends as one with failures", CLI + "gallery.py",

@@ -23,7 +23,7 @@ from bad_values import (
 import symfric as sf
 from symfric.figures import FIGURES, compare, figure
 from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
-from symfric.laws.names import ALL_LAWS, POPULATIONS, WRAPPERS
+from symfric.laws.catalogue import ALL_LAWS, POPULATIONS, WRAPPERS
 from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Rabinowicz
 

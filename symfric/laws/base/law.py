@@ -1,130 +1,51 @@
 """What a friction law is: parameters, a force and the rate of its internal states."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import inf
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, empty, equals
+from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters
-from symfric.laws.base.given import with_states
+from symfric.foundation.style import COLOURS
+from symfric.foundation.symbolic import plain
+from symfric.foundation.vector import Rows
+from symfric.laws.base import smooth
+from symfric.laws.base.facts import APPLIED_FORCE as APPLIED_FORCE
+from symfric.laws.base.facts import CONFIDENCE as CONFIDENCE
+from symfric.laws.base.facts import FORCE as FORCE
+from symfric.laws.base.facts import PHENOMENA as PHENOMENA
+from symfric.laws.base.facts import Facts as Facts
+from symfric.laws.base.facts import Input as Input
+from symfric.laws.base.facts import State as State
+from symfric.laws.base.facts import Switch as Switch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PHENOMENA = {
-    "D": "dynamic (kinetic) friction",
-    "S": "static friction (stiction or a break-away peak)",
-    "St": "Stribeck effect",
-    "V": "viscous friction",
-    "P": "pre-sliding displacement",
-    "M": "non-local memory (hysteresis loops inside loops close)",
-    "L": "frictional lag",
-    "B": "break-away force depends on the loading rate",
-    "N": "no drift under vibration below break-away",
-    "T": "static friction grows with the dwell time",
-}
-"""What a law can show, by the codes in `Facts.phenomena`."""
 
-CONFIDENCE = {
-    "two sources": "the formula was compared with two independent ones",
-    "one source": "the formula was compared with one",
-    "textbook": "the formula stands in every textbook",
-    "rebuilt": "the formula was lost or garbled, and rebuilt from what is said of it",
-    "constructed": "made here",
-    "unverified": "written from memory, compared with no publication and no public code",
-}
-"""How sure a formula is, by the words in `Facts.confidence`."""
+def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
+    """`method(law, v, N, z)` that takes states as people have them, and refuses others.
 
-
-@dataclass(frozen=True)
-class Facts:
-    """What is known about a law, as data.
-
-    Attributes:
-        phenomena: codes of `PHENOMENA`.
-        smoothness: differentiability class in the velocity, and where it breaks.
-        confidence: one of `CONFIDENCE`.
-        source: the publication, read or not.
-        odd: the force changes sign with v, states and further inputs together.
-        load: how the dry force follows the normal force: "proportional", "independent" or in
-            words.
-        checked: what the formula was compared with, or what else speaks for it.
+    Raises:
+        ValueError: another number of states than the law has; an integer that no float holds.
     """
 
-    phenomena: tuple[str, ...]
-    smoothness: str
-    confidence: str
-    source: str
-    odd: bool = True
-    load: str = "proportional"
-    checked: str = ""
+    @wraps(method)
+    def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
+        slip, load = plain(v), plain(N)
+        for name, value in (("v", slip), ("N", load)):
+            if type(value) is int and not is_number(value):
+                where = f"{type(law).__name__}.{method.__name__}: {name}"
+                raise checks.refused(where, "a number that a float can hold", value)
+        return method(law, slip, load, states_of(law, slip, plain(z)), *more, **inputs)
 
-    @property
-    def formula(self) -> str:
-        """How sure the formula is, in words."""
-        said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
-        return f"{said}: {self.checked}" if self.checked else said
-
-
-@dataclass(frozen=True)
-class State:
-    """An internal state of a law: name, unit, typical magnitude and what it is.
-
-    `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such
-    as deflections and forces, change sign with it. A `whole` state is a mode: -1, 0 or 1, and
-    results give these numbers.
-    """
-
-    name: str
-    unit: str
-    nominal: float
-    even: bool = False
-    doc: str = ""
-    whole: bool = False
-
-
-@dataclass(frozen=True)
-class Input:
-    """What a law takes besides v and N, as a keyword-only argument of its methods.
-
-    `nominal` is its typical magnitude, `steady` its value in pictures of steady sliding (v > 0).
-    """
-
-    name: str
-    unit: str
-    doc: str
-    nominal: float = 1.0
-    steady: float = 0.0
-
-
-FORCE = "F_e"
-APPLIED_FORCE = Input(FORCE, "N", "force that keeps the sliding velocity constant", steady=1.0)
-"""What the contact must carry for no acceleration: m dv/dt = F_e - F."""
-
-
-@dataclass(frozen=True, eq=False)
-class Switch:
-    """A change of mode: the states in `reset` jump when `expression` passes through zero.
-
-    Attributes:
-        expression: in v, N, z and the further inputs of the law.
-        direction: +1 only rising, -1 only falling, 0 both.
-        reset: state -> its value afterwards, in terms of the values before.
-        halts: the sliding velocity, zero at this instant, becomes zero without rounding.
-        at_start: it happens at the start, too, where the expression is beyond zero already.
-        rtol: largest relative tolerance that a run may have, where a law promises exact instants.
-    """
-
-    name: str
-    expression: Scalar
-    direction: int = 0
-    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
-    halts: bool = False
-    at_start: bool = False
-    rtol: float = inf
+    return checked
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +83,17 @@ class Law(Parametric, ABC):
         return ()
 
     @property
-    @abstractmethod
     def velocity_scale(self) -> Scalar:
-        """Sliding velocity [m/s] over which the force changes; inf where there is none."""
+        """Sliding velocity [m/s] over which the force changes; inf where there is none.
+
+        Unless the law says otherwise that of its first width that is not zero or, without one, its
+        first parameter with the role "velocity scale"; the inverse of a steepness [s/m].
+        """
+        known = parameters(self).values()
+        widths = [p for p in known if p.width and not equals(p.value, 0.0)]
+        for p in widths or [p for p in known if p.role == "velocity scale" and not p.width]:
+            return p.value if p.unit in ("m/s", "rad/s") else 1 / p.value
+        return inf
 
     @abstractmethod
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -248,10 +177,26 @@ class Law(Parametric, ABC):
         return ()
 
     def thumbnail(self) -> "Figure | None":
-        """The force in steady sliding, small; nothing for a law with symbols."""
-        from symfric.laws.base.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
+        """The force in steady sliding under 1 N, small; nothing for a law with symbols."""
+        from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return picture(self)
+        if any(is_symbolic(p.value) for p in parameters(self).values()):
+            return None
+        scale = checks.as_number(self.velocity_scale)
+        largest = 20 * scale if scale is not None and isfinite(scale) else 1.0
+        v = largest * np.linspace(-1.0, 1.0, 400)  # even: v = 0 is not among them
+        ahead = smooth.sign(v, 0.0) if self.facts.odd else 1.0
+        inputs = {i.name: i.steady * ahead for i in self.inputs}
+        with np.errstate(all="ignore"):
+            force = self.force(v, 1.0, self.steady_state(v, 1.0), **inputs)
+        figure = Figure(figsize=(4.2, 1.9), layout="constrained")
+        axis = figure.subplots()
+        axis.plot(1e3 * v, np.broadcast_to(force, v.shape), linewidth=1.2, color=COLOURS[0])
+        axis.set_xlabel("v [mm/s], steady", fontsize=7)
+        axis.set_ylabel("F [N] under 1 N", fontsize=7)
+        axis.tick_params(labelsize=7)
+        axis.grid(alpha=0.3)
+        return figure
 
 
 def one_sided(law: Law, reason: str) -> ValueError:
@@ -301,3 +246,40 @@ class StaticLaw(Law):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """No rows."""
         return empty(v)
+
+
+def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
+    """`z` with a row for each state of `law`.
+
+    Of a law of one state a number is its row, and so is an array beside one of velocities.
+    """
+    given = z
+    if is_casadi(z):
+        rows = z.shape[0] if z.numel() else 0  # what is cut of a scalar has shape (1, 0)
+    elif isinstance(z, Rows):
+        return z
+    elif is_number(z):
+        z, rows = np.array([z], float), 1
+    elif isinstance(z, tuple | list):
+        rows = len(z)  # pyright: ignore[reportUnknownArgumentType]
+    elif isinstance(z, np.ndarray):
+        if z.ndim == 1 and z.size != 1 and np.shape(v) == z.shape and len(law.states) == 1:
+            z = z[None]
+        rows = z.shape[0]
+    else:
+        rows = -1
+    if rows != len(law.states):
+        raise _wrong_states(law, given, rows)
+    return z
+
+
+def _wrong_states(law: Law, z: Scalar, rows: int) -> ValueError:
+    name, known = type(law).__name__, law.states
+    if not known:
+        hint, what = "leave z out", "no states"
+    else:
+        names = checks.listed(s.name for s in known)
+        what = f"z with {len(known)} {'state' if len(known) == 1 else 'states'}, {names}"
+        hint = "z = law.steady_state(v, N) are those of steady sliding"
+    got = "none" if rows == 0 else checks.shown(z)
+    return ValueError(f"{name}: expected {what}, got {got}; {hint}")

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from symfric.foundation.numeric import Scalar, column, empty
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import APPLIED_FORCE, Input, Law, State, Switch
 
 FINEST = 1e-7
@@ -20,6 +20,8 @@ class Sticking(Law):
 
     A form without modes (`has_mode` false) has no states.
     """
+
+    mu_s: Scalar = fields.MU_S(0.15)
 
     @property
     @abstractmethod
@@ -53,9 +55,9 @@ class Sticking(Law):
         share = beyond / (smooth.magnitude(F_e, 0.0) + APPLIED_FORCE.nominal)
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
 
-    @abstractmethod
     def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The largest force [N] that rest holds."""
+        """The force [N] of break-away, mu_s N: the largest that rest holds."""
+        return self.mu_s * N
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """The direction of sliding."""

@@ -1,5 +1,6 @@
 """Laws made of laws: sum, asymmetric and load-dependent. Wrap, never subclass."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import ClassVar, final
@@ -9,7 +10,7 @@ from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smalles
 from symfric.foundation.parameters import Parametric, distinct, param, parameters, with_values
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law, chosen
-from symfric.laws.composed.wrapper import Wrapper
+from symfric.laws.composed.wrap import Wrapper
 
 
 @final
@@ -25,7 +26,7 @@ class Sum(Law):
     Source: superposition, as in Coulomb + viscous friction.
     """
 
-    facts: ClassVar[Facts] = Facts((), "that of its terms", "constructed", "constructed")
+    facts = Facts((), "that of its terms", "constructed", "constructed")
 
     laws: tuple[Law, ...]
 
@@ -69,23 +70,19 @@ class Sum(Law):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
-        first, *rest = [law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z)]
-        return sum(rest, start=first)
+        return _added(law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z))
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
         """Sliding forces [N] of all terms on one side."""
-        first, *rest = [law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws]
-        return sum(rest, start=first)
+        return _added(law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Largest force [N] at rest: that of all terms together."""
-        first, *rest = [law.static_level(N, side, **chosen(law, inputs)) for law in self.laws]
-        return sum(rest, start=first)
+        return _added(law.static_level(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """That of all terms together."""
-        first, *rest = [law.most_held(N, side, **chosen(law, inputs)) for law in self.laws]
-        return sum(rest, start=first)
+        return _added(law.most_held(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of all states."""
@@ -144,7 +141,7 @@ class Asymmetric(Wrapper):
     Source: separate parameter sets per direction, usual for drives (Armstrong-Helouvry 1991).
     """
 
-    facts: ClassVar[Facts] = Facts((), "that of its law", "constructed", "separate sets")
+    facts = Facts((), "that of its law", "constructed", "separate sets")
     suffixes: ClassVar[tuple[str, ...]] = ("pos", "neg")
 
     positive: Law
@@ -154,15 +151,13 @@ class Asymmetric(Wrapper):
     )
 
     def __post_init__(self) -> None:
-        check_law("Asymmetric", self.positive)
-        check_law("Asymmetric", self.negative)
+        super().__post_init__()
         if _structure(self.positive) != _structure(self.negative):
             raise ValueError(
                 "Asymmetric: expected the same law on both sides, got "
                 f"{type(self.positive).__name__} and {type(self.negative).__name__}; "
                 "only parameters may differ, no options and no tables"
             )
-        super().__post_init__()
 
     @property
     def inner(self) -> Law:
@@ -211,27 +206,21 @@ class LoadDependent(Wrapper):
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
     """
 
-    facts: ClassVar[Facts] = Facts(
-        (), "that of its law", "unverified", "Bittencourt and Gunnarsson 2012"
-    )
+    facts = Facts((), "that of its law", "unverified", "Bittencourt and Gunnarsson 2012")
 
     law: Law
     N_0: Scalar = param(0.0, unit="N", role="load", doc="preload", lower=0.0)
     c: Scalar = param(1.0, unit="1", role="load", doc="share of the external load", lower=0.0)
     N_eps: Scalar = param(1e-3, unit="N", role="width", doc="smoothing of the lift-off", lower=0.0)
 
-    def __post_init__(self) -> None:
-        check_law("LoadDependent", self.law)
-        super().__post_init__()
-
-    @property
-    def inner(self) -> Law:
-        """The law whose load is scaled."""
-        return self.law
-
     def load(self, N: Scalar) -> Scalar:
         """The effective normal force [N]."""
         return self.N_0 + self.c * smooth.positive(N, self.N_eps)
+
+
+def _added(forces: Iterable[Scalar]) -> Scalar:
+    first, *rest = forces
+    return sum(rest, start=first)
 
 
 def _structure(value: object) -> object:

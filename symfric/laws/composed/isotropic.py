@@ -1,7 +1,8 @@
 """Any isotropic law for slip in a plane or in space."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
 from itertools import islice
 from typing import ClassVar, final
 
@@ -10,6 +11,7 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar, column, empty
 from symfric.foundation.parameters import Parametric, param
 from symfric.foundation.vector import NotIsotropicError, Vector, Vectors
+from symfric.laws.base import fields
 from symfric.laws.base.law import Input, Law, State, Switch, check_law, chosen
 from symfric.laws.composed.compose import Asymmetric, Sum
 from symfric.laws.composed.wrap import Lagged
@@ -45,9 +47,7 @@ class Isotropic(Parametric):
 
     law: Law
     v_eps: Scalar = param(1e-9, unit="m/s", role="width", doc="smoothing of the speed", lower=1e-15)
-    turn: Scalar = param(
-        1e-2, unit="1", role="width", doc="rounding from unloading to loading", lower=1e-9
-    )
+    turn: Scalar = fields.WIDTH(1e-2, doc="rounding from unloading to loading", lower=1e-9)
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -174,7 +174,7 @@ def anisotropy(law: Law) -> str:
 
 def _is_odd(law: Law) -> bool:
     """Whether mirrored motion mirrors the force of a law and of all laws it holds."""
-    held = [getattr(law, item.name) for item in fields(law)]
+    held = [getattr(law, item.name) for item in fields_of(law)]
     inner = [x for value in held for x in (value if isinstance(value, tuple) else (value,))]
     mirrored = law.facts.odd and not isinstance(law, Asymmetric)
     return mirrored and all(_is_odd(x) for x in inner if isinstance(x, Law))

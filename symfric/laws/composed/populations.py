@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, expm1, sin
 from symfric.foundation.parameters import Parametric, param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Input, Law, State
 
 Array = NDArray[np.float64]
@@ -208,22 +208,12 @@ class GenericAsperity(Population):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_0", "mu_inf"),)
     redraws: ClassVar[bool] = False
 
-    k: Scalar = param(
-        1e6, unit="N/m", role="stiffness", doc="stiffness of all asperities in contact", lower=1e-12
-    )
-    mu_0: Scalar = param(
-        0.05, unit="1", role="level", doc="friction coefficient of a new contact", lower=0.0
-    )
-    mu_inf: Scalar = param(
-        0.2, unit="1", role="level", doc="friction coefficient of an old contact", lower=0.0
-    )
-    tau_c: Scalar = param(
-        0.05, unit="s", role="time", doc="time in which a contact ages", lower=1e-12
-    )
-    lam: Scalar = param(2e-5, unit="m", role="length", doc="period of the counterface", lower=1e-15)
-    duty: Scalar = param(
-        0.6, unit="1", role="shape", doc="share of a period in contact", lower=1e-3, upper=1.0
-    )
+    k: Scalar = fields.STIFFNESS(1e6, doc="stiffness of all asperities in contact")
+    mu_0: Scalar = fields.COEFFICIENT(0.05, doc="friction coefficient of a new contact")
+    mu_inf: Scalar = fields.COEFFICIENT(0.2, doc="friction coefficient of an old contact")
+    tau_c: Scalar = fields.TIME(0.05, doc="time in which a contact ages")
+    lam: Scalar = fields.LENGTH(2e-5, doc="period of the counterface")
+    duty: Scalar = fields.SHAPE(0.6, doc="share of a period in contact", lower=1e-3, upper=1.0)
     count: int = param(1000, unit="1", role="sampling", doc="number of asperities", lower=1)
     seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
 
@@ -293,12 +283,8 @@ class RandomBristles(Population):
     )
     redraws: ClassVar[bool] = True
 
-    sigma_0: Scalar = param(
-        1e5, unit="N/m", role="stiffness", doc="stiffness of all bristles", lower=1e-12
-    )
-    delta_s: Scalar = param(
-        1e-5, unit="m", role="length", doc="stretch at which a bristle snaps", lower=1e-15
-    )
+    sigma_0: Scalar = fields.STIFFNESS(1e5, doc="stiffness of all bristles")
+    delta_s: Scalar = fields.LENGTH(1e-5, doc="stretch at which a bristle snaps")
     count: int = param(25, unit="1", role="sampling", doc="number of bristles", lower=1)
     seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
 

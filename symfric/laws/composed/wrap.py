@@ -1,12 +1,104 @@
-"""Laws around a law: its velocity lags, its coefficients follow a temperature."""
+"""Laws around a law: lagging, at a temperature, and normalised by the load."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from dataclasses import fields as fields_of
+from typing import final
 
 from symfric.foundation.numeric import Scalar, column, exp
 from symfric.foundation.parameters import param, parameters, with_values
-from symfric.laws.base.law import Facts, Law, State, check_law
-from symfric.laws.composed.wrapper import Wrapper
+from symfric.laws.base import fields
+from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
+
+
+class Wrapper(Law):
+    """A law in another law, with other numbers at a velocity or under another normal force.
+
+        F = F_inner(v)(v, load(N), z)
+
+    What a wrapper changes it overrides: `inner`, `inner_at`, `load`, or a method.
+    """
+
+    law: Law
+
+    def __post_init__(self) -> None:
+        for item in fields_of(self):
+            if "unit" not in item.metadata:
+                check_law(type(self).__name__, getattr(self, item.name))
+        super().__post_init__()
+
+    @property
+    def inner(self) -> Law:
+        """The law inside."""
+        return self.law
+
+    def inner_at(self, v: Scalar) -> Law:
+        """The law inside, with the numbers it has at the sliding velocity `v`."""
+        return self.inner
+
+    def inner_of(self, side: int) -> Law:
+        """The law inside, with the numbers it has on one side of v = 0."""
+        return self.inner
+
+    def load(self, N: Scalar) -> Scalar:
+        """The normal force [N] that the law inside sees."""
+        return N
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of the law inside."""
+        return self.inner.states
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of the law inside."""
+        return self.inner.inputs
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """That of the law inside [m/s]."""
+        return self.inner.velocity_scale
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Friction force [N]."""
+        return self.inner_at(v).force(v, self.load(N), z, **inputs)
+
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Sliding force [N] of the law inside on one side; of one that lags, when steady."""
+        return self.inner_of(side).sliding(v, self.load(N), side, **inputs)
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Largest force [N] at rest of the law inside, on its side."""
+        return self.inner_of(side).static_level(self.load(N), side, **inputs)
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That of the law inside, on its side."""
+        return self.inner_of(side).most_held(self.load(N), side, **inputs)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Rates of the states."""
+        return self.inner_at(v).rate(v, self.load(N), z, **inputs)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of the law inside."""
+        return self.inner_at(v).switches(v, self.load(N), z, **inputs)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of the law inside."""
+        return self.inner_at(v).steady_state(v, self.load(N))
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law inside."""
+        return self.inner_at(v).held_step(v, self.load(N), z, h)
+
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
+        """That of the law inside."""
+        return self.inner_at(v).held_rest(v, self.load(N), z)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the law inside."""
+        return self.inner.warnings()
 
 
 @final
@@ -25,24 +117,18 @@ class Lagged(Wrapper):
     Source: Hess and Soom, ASME J. Tribol. 112(1), 1990 (pure delay); first-order form constructed.
     """
 
-    facts: ClassVar[Facts] = Facts(("L",), "that of its law", "constructed", "Hess and Soom 1990")
+    facts = Facts(("L",), "that of its law", "constructed", "Hess and Soom 1990")
 
     law: Law
-    tau_L: Scalar = param(0.01, unit="s", role="time", doc="time constant of the lag", lower=1e-12)
+    tau_L: Scalar = fields.TIME(0.01, doc="time constant of the lag")
 
     def __post_init__(self) -> None:
-        check_law("Lagged", self.law)
         super().__post_init__()
         if self.law.states:
             raise ValueError(
                 "Lagged: expected a law without states, got "
                 f"{type(self.law).__name__}; laws with states have a lag of their own"
             )
-
-    @property
-    def inner(self) -> Law:
-        """The law that is wrapped."""
-        return self.law
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -81,9 +167,7 @@ class TemperatureDependent(Wrapper):
     Meas. Control 134(5), 2012, with other functions of T.
     """
 
-    facts: ClassVar[Facts] = Facts(
-        (), "that of its law", "constructed", "Reynolds' viscosity equation"
-    )
+    facts = Facts((), "that of its law", "constructed", "Reynolds' viscosity equation")
 
     law: Law
     T: Scalar = param(293.15, unit="K", role="temperature", doc="temperature", lower=0.0)
@@ -98,7 +182,6 @@ class TemperatureDependent(Wrapper):
     )
 
     def __post_init__(self) -> None:
-        check_law("TemperatureDependent", self.law)
         super().__post_init__()
         if not {"level", "viscous"} & {p.role for p in parameters(self.law).values()}:
             raise ValueError(
@@ -115,3 +198,58 @@ class TemperatureDependent(Wrapper):
         return with_values(
             self.law, {name: p.value * falls[p.role] for name, p in known if p.role in falls}
         )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LoadNormalised(Wrapper):
+    """A law under one load, whose force is scaled with the load there is.
+
+        F     = N / N_0 F_law(v, N_0, z)
+        dz/dt = rate_law(v, N_0, z)
+
+    Bristles of laws in newtons deflect with the load; where it falls they keep what they have, and
+    in joints with friction from reactions that ends in no solution. Here the deflection does not
+    depend on the load, the force follows the load at once, and N = 0 gives none.
+    Limits: N = N_0 is the law itself, and so is any N for a law whose force is proportional to the
+    load and without states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force
+    is scaled, viscous friction too. A load that grows over a bent bristle does work.
+    Source: LuGre in coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws
+    constructed.
+    """
+
+    facts = Facts((), "that of its law", "constructed", "Canudas de Wit and Tsiotras, CDC 1999")
+
+    law: Law
+    N_0: Scalar = param(
+        0.8 * 9.81, unit="N", role="load", doc="load at which it is the law itself", lower=1e-12
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.law.inputs:
+            raise ValueError(
+                "LoadNormalised: expected a law of v and N, got "
+                f"{type(self.law).__name__}, which needs {self.law.inputs[0].name}; it holds a "
+                "contact at rest whatever the load does"
+            )
+
+    def load(self, N: Scalar) -> Scalar:
+        """N_0 [N], whatever the load is."""
+        return self.N_0
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Friction force [N]."""
+        return N / self.N_0 * super().force(v, N, z)
+
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Sliding force [N] on one side."""
+        return N / self.N_0 * super().sliding(v, N, side)
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Largest force [N] at rest."""
+        return N / self.N_0 * super().static_level(N, side)
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That at N_0, scaled."""
+        return N / self.N_0 * super().most_held(N, side)

@@ -1,26 +1,102 @@
-"""The elastoplastic element that hysteresis laws are built of."""
+"""What laws with states are built of: Stribeck levels, elements side by side, yielding."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Any, ClassVar, final
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, is_number, sqrt
+from symfric.foundation.numeric import Scalar, column, is_number, sqrt
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.vector import ROUND, Vector, Vectors
 from symfric.laws.base import smooth
-from symfric.laws.base.law import Law
+from symfric.laws.base.law import Law, State, Switch
 
 
-def check_elements(law: Law, kind: type[Parametric]) -> None:
-    """Refuse a law without elements, or with elements of another kind, and make them a tuple."""
-    where, one = f"{type(law).__name__}: elements", f"{kind.__name__}()"
-    elements = checks.many(where, vars(law)["elements"], f"elements, such as {one}")
-    if not elements:
-        raise checks.refused(where, f"at least one element, such as {one}", elements)
-    for element in elements:
-        checks.kind(where, element, kind, f"an element, such as {one}")
-    object.__setattr__(law, "elements", elements)
+class StribeckLevel(Law):
+    """A law with states that slides at a Stribeck curve.
+
+    g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
+    """
+
+    mu_s: Scalar
+    mu_d: Scalar
+    v_s: Scalar
+    delta: Scalar
+    sigma_2: Scalar
+    v_eps: Scalar
+
+    def level(self, v: Scalar, N: Scalar) -> Scalar:
+        """The Stribeck curve g(v, N) > 0 [N] that the force of the states tends to."""
+        falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
+        return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
+        return mu * N + self.sigma_2 * speed
+
+
+class Elements(Law):
+    """A law of elements side by side, each a spring whose force F_i is a state.
+
+    In the event form each has a mode, 0 while it sticks and 1 while it slips.
+    """
+
+    kind: ClassVar[type[Parametric]]
+    """What an element is."""
+
+    elements: tuple[Any, ...]
+    form: str
+
+    def __post_init__(self) -> None:
+        where, one = f"{type(self).__name__}: elements", f"{self.kind.__name__}()"
+        elements = checks.many(where, self.elements, f"elements, such as {one}")
+        if not elements:
+            raise checks.refused(where, f"at least one element, such as {one}", elements)
+        for element in elements:
+            checks.kind(where, element, self.kind, f"an element, such as {one}")
+        object.__setattr__(self, "elements", elements)
+        super().__post_init__()
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The spring forces."""
+        count = range(1, len(self.elements) + 1)
+        return tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
+
+    def total(self, parts: Iterable[Scalar]) -> Scalar:
+        """The sum of something of all elements, in their order."""
+        first, *rest = parts
+        return sum(rest, start=first)
+
+    def springs(self, z: Scalar) -> Scalar:
+        """The sum of the spring forces [N]."""
+        return self.total(z[i] for i in range(len(self.elements)))
+
+    def slip_switches(
+        self, v: Scalar, z: Scalar, limits: Sequence[Scalar], resets: Sequence[dict[str, Scalar]]
+    ) -> tuple[Switch, ...]:
+        """Slip of each element at its limit [N], stick of all when v changes sign.
+
+        `resets` say what becomes of the states of each element, of its mode last.
+        """
+        direction = smooth.sign(v, 0.0)
+        slips = tuple(
+            Switch(
+                f"slip_{i + 1}",
+                smooth.choose(z[len(limits) + i] > 0.5, -1.0, direction * z[i] / limit - 1),
+                direction=1,
+                reset=reset,
+            )
+            for i, (limit, reset) in enumerate(zip(limits, resets, strict=True))
+        )
+        return (*slips, Switch("reversal", v, reset={list(reset)[-1]: 0.0 for reset in resets}))
+
+
+def held_columns(parts: Iterable[tuple[Scalar, Scalar, Scalar]]) -> tuple[Scalar, Scalar]:
+    """Columns of ends and means of a held step, from load, mean load and mode of each element."""
+    ends, means, modes = zip(*parts, strict=True)
+    return column(*ends, *modes), column(*means, *modes)
 
 
 TYPICAL, FIRM = 1e-5, 1e5

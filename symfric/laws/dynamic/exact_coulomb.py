@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import ClassVar, final
+from typing import final
 
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
+from symfric.foundation.parameters import option
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Switch
 from symfric.laws.base.sticking import Sticking, carried, stick_and_slip
 
@@ -32,22 +32,19 @@ class ExactCoulomb(Sticking):
     Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="set-valued at v = 0, exact by modes",
         confidence="two sources",
         checked="Modelica Standard Library; rleine/Keynote_Nonsmooth_Dynamics_ENOC2024",
         source="Coulomb 1785; Olsson et al., Eur. J. Control 4, 1998",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    mu_d: Scalar = fields.MU_D(0.1)
 
-    v_s: Scalar = param(
-        1e-2, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    v_s: Scalar = fields.V_S(1e-2)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
     form: str = option("jump", choices=("jump", "stribeck"), doc="fall at once, or over v_s")
 
     @property
@@ -59,10 +56,6 @@ class ExactCoulomb(Sticking):
     def velocity_scale(self) -> Scalar:
         """That of the fall [m/s]; what happens at v = 0 is an event."""
         return self.v_s if self.form == "stribeck" else inf
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away."""
-        return self.mu_s * N
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0."""

@@ -1,13 +1,60 @@
-"""LuGre friction, its load-normalised form and its passive form."""
+"""Bristles that slide at a Stribeck level: LuGre in three forms, and elasto-plastic."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from math import pi
+from typing import final
 
-from symfric.foundation.numeric import Scalar, column, exp
+from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
 from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
-from symfric.laws.base.law import Facts
-from symfric.laws.dynamic.bristle import Bristle
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.law import Facts, State
+from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
+
+
+@dataclass(frozen=True, eq=False)
+class Bristle(StribeckLevel):
+    """A bristle of stiffness sigma_0 and damping sigma_1 that slides at a Stribeck level.
+
+        g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
+        F = sigma_0 z + sigma_1 dz/dt + sigma_2 v
+
+    The laws differ in dz/dt and, some, in the damping.
+    """
+
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    sigma_1: Scalar = fields.SIGMA_1(190.0)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """z: mean deflection of the bristles [m], positive with v."""
+        return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0] + self.sigma_2 * v
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Bristle deflection in steady sliding [m], shape (1, 1)."""
+        return column(self.level(v, N) / self.sigma_0 * smooth.sign(v, self.v_eps))
+
+    def warnings(self) -> tuple[str, ...]:
+        """Whether the law may push: its passivity needs viscous friction."""
+        needed = (self.mu_s - self.mu_d) / self.mu_d * self.sigma_1
+        if not is_number(needed) or not is_number(self.sigma_2) or self.sigma_2 >= needed:
+            return ()
+        return (
+            f"not passive from v to F: sigma_2 = {self.sigma_2:g} is below "
+            f"sigma_1 (mu_s - mu_d) / mu_d = {needed:g}; the force may point forward for an "
+            "instant after a jump in v (lugre_passive does not)",
+        )
 
 
 @final
@@ -32,7 +79,7 @@ class LuGre(Bristle):
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, 419-425.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
@@ -63,7 +110,7 @@ class LuGreNormalised(Bristle):
     tyre models use; Canudas de Wit and Tsiotras, CDC 1999).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
@@ -117,7 +164,7 @@ class LuGrePassive(Bristle):
     damping).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="one source",
@@ -125,13 +172,7 @@ class LuGrePassive(Bristle):
         source="Olsson, PhD thesis, Lund 1996",
     )
 
-    v_d: Scalar = param(
-        1e-3,
-        unit="m/s",
-        role="velocity scale",
-        doc="velocity over which damping fades",
-        lower=1e-12,
-    )
+    v_d: Scalar = fields.VELOCITY(1e-3, doc="velocity over which damping fades")
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the bristle deflection [m/s], shape (1, 1)."""
@@ -146,3 +187,66 @@ class LuGrePassive(Bristle):
     def warnings(self) -> tuple[str, ...]:
         """None: the fading damping replaces the bound of `LuGre`."""
         return ()
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ElastoPlastic(Bristle):
+    """Elasto-plastic friction (one state).
+
+        g     = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)],   z_ss = g / sigma_0
+        r     = (z sign(v) - z_ba) / (z_ss - z_ba)
+        alpha = 0 for r <= 0,  1 for r >= 1,  between them a step of r
+        dz/dt = v - alpha sigma_0 |v| z / g
+        F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
+
+    Below the break-away deflection z_ba [m] the bristle is a spring: it returns exactly and does
+    not drift under vibration. The step is 10r^3 - 15r^4 + 6r^5; v_eps = 0 is the original, with
+    sign(v), |v| and the step (1 + sin(pi (r - 1/2))) / 2. In the printed original z stands for
+    z sign(v), which is wrong for z < 0.
+    Limits: steady state g sign(v) + sigma_2 v, approached more slowly than by `LuGre` (0.997 of
+    it after 3.4 z_ss); z_ba -> 0 is not `LuGre`, since alpha still rises with z. Passivity and the
+    choice of v_eps as in `LuGre`. Needs z_ba < mu_d N / sigma_0, hence not valid for small N.
+    Source: Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002, 787-792.
+
+    Raises:
+        ValueError: from `rate` and `force`: z_ba beyond what the load, a number, allows.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V", "P", "L", "B", "N"),
+        smoothness="C2 (C0 at v = 0 and C1 in z as v_eps -> 0)",
+        confidence="two sources",
+        checked="jchristopherson/FrictionModels.jl ElastoPlasticModels.jl; MBDyn",
+        source="Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002",
+    )
+
+    z_ba: Scalar = fields.LENGTH(1e-7, doc="break-away deflection", lower=0.0)
+
+    def sliding_share(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
+        """alpha: 0 while the bristle is elastic, 1 when it slides."""
+        z_ss = self.level(v, N) / self.sigma_0
+        elastic = self.z_ba / z_ss
+
+        def step(share: Scalar) -> Scalar:
+            r = (share - elastic) / (1 - elastic)
+            if equals(self.v_eps, 0.0):
+                return (1 + sin(pi * (smooth.clip(r, 0.0, 1.0) - 0.5))) / 2
+            return smooth.step5(r)
+
+        return ahead(step, smooth.sign(v, self.v_eps), z[0] / z_ss)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rate of the bristle deflection [m/s], shape (1, 1)."""
+        self._check_load(N)
+        relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
+        return column(v - self.sliding_share(v, N, z) * relaxation * z[0])
+
+    def _check_load(self, N: Scalar) -> None:
+        numbers = (self.mu_d, N, self.sigma_0, self.z_ba)
+        if all(map(is_number, numbers)) and self.z_ba >= self.mu_d * N / self.sigma_0:
+            raise ValueError(
+                "ElastoPlastic: expected z_ba < mu_d N / sigma_0 = "
+                f"{self.mu_d * N / self.sigma_0:g} m, got z_ba = {self.z_ba:g} m; "
+                "the bristle would have to slide before it breaks away"
+            )

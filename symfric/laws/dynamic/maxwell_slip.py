@@ -1,13 +1,20 @@
-"""Maxwell-slip friction: springs with Coulomb sliders side by side, the exact hysteresis."""
+"""Elements side by side: Maxwell-slip, and Leuven and GMS, which add a Stribeck effect and lag."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
-from symfric.foundation.numeric import Scalar, column
+from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number
 from symfric.foundation.parameters import Parametric, option, param
-from symfric.laws.base import smooth
-from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import Held, check_elements, yielding
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.law import Facts, State, Switch
+from symfric.laws.dynamic.element import (
+    Elements,
+    Held,
+    StribeckLevel,
+    ahead,
+    held_columns,
+    yielding,
+)
 
 
 @final
@@ -15,10 +22,8 @@ from symfric.laws.dynamic.element import Held, check_elements, yielding
 class Slider(Parametric):
     """A spring of stiffness k on a slider that carries mu N."""
 
-    k: Scalar = param(1e5, unit="N/m", role="stiffness", doc="stiffness", lower=1e-12)
-    mu: Scalar = param(
-        0.1, unit="1", role="level", doc="friction coefficient of the slider", lower=1e-12
-    )
+    k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
+    mu: Scalar = fields.COEFFICIENT(0.1, doc="friction coefficient of the slider", lower=1e-12)
 
 
 SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slider(1e4, 0.025))
@@ -27,7 +32,7 @@ SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slide
 
 @final
 @dataclass(frozen=True, eq=False)
-class MaxwellSlip(Law):
+class MaxwellSlip(Elements):
     """Maxwell-slip (Iwan) friction of n elements, the exact hysteresis with non-local memory.
 
         stick: dF_i/dt = k_i v     until |F_i| = mu_i N
@@ -49,7 +54,7 @@ class MaxwellSlip(Law):
     Source: Iwan, ASME J. Appl. Mech. 33(4), 1966; Prandtl 1928 (play operators).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "P", "M", "N"),
         smoothness="C∞ (C0 at the corners as n -> inf)",
         confidence="two sources",
@@ -58,43 +63,30 @@ class MaxwellSlip(Law):
         load="proportional in steady sliding",
     )
 
-    elements: tuple[Slider, ...] = SLIDERS
-    n: Scalar = param(
-        20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
-    )
-    v_eps: Scalar = param(
-        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
-    )
-    r_eps: Scalar = param(
-        1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
-    )
-    form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
+    kind = Slider
 
-    def __post_init__(self) -> None:
-        check_elements(self, Slider)
-        super().__post_init__()
+    elements: tuple[Slider, ...] = SLIDERS
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.R_EPS(1e-8)
+    form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
 
     @property
     def states(self) -> tuple[State, ...]:
         """The spring forces, and in the event form the modes."""
-        count = range(1, len(self.elements) + 1)
-        forces = tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
-        mode = "1 while the element slips"
-        modes = tuple(State(f"slip_{i}", "1", 1.0, True, mode, whole=True) for i in count)
-        return forces + (modes if self.form == "event" else ())
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """None: the force depends on the path alone."""
-        return float("inf")
+        if self.form == "smooth":
+            return super().states
+        count, mode = range(1, len(self.elements) + 1), "1 while the element slips"
+        modes = (State(f"slip_{i}", "1", 1.0, even=True, doc=mode, whole=True) for i in count)
+        return (*super().states, *modes)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Steady sliding force [N] at a speed >= 0."""
-        return N * sum((e.mu for e in self.elements[1:]), start=self.elements[0].mu)
+        return N * self.total(e.mu for e in self.elements)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        return sum((z[i] for i in range(1, len(self.elements))), start=z[0])
+        return self.springs(z)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rates of the spring forces [N/s] and, zero, of the modes."""
@@ -120,29 +112,21 @@ class MaxwellSlip(Law):
         """Slip of each element at its limit, stick of all when v changes sign."""
         if self.form == "smooth":
             return ()
-        count, direction = len(self.elements), smooth.sign(v, 0.0)
-        slips = tuple(
-            Switch(
-                f"slip_{i + 1}",
-                smooth.choose(z[count + i] > 0.5, -1.0, direction * z[i] / (e.mu * N) - 1),
-                direction=1,
-                reset={f"F_{i + 1}": direction * e.mu * N, f"slip_{i + 1}": 1.0},
-            )
-            for i, e in enumerate(self.elements)
-        )
-        sticking = {f"slip_{i + 1}": 0.0 for i in range(count)}
-        return (*slips, Switch("reversal", v, reset=sticking))
+        direction, limits = smooth.sign(v, 0.0), [e.mu * N for e in self.elements]
+        resets = [
+            {f"F_{i}": direction * e.mu * N, f"slip_{i}": 1.0}
+            for i, e in enumerate(self.elements, start=1)
+        ]
+        return self.slip_switches(v, z, limits, resets)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
         """Exact in the event form."""
         if self.form == "smooth":
             return None
         count, held = len(self.elements), Held.over(v, h)
-        parts = [
+        return held_columns(
             held.yielded(z[i], z[count + i], e.k, e.mu * N) for i, e in enumerate(self.elements)
-        ]
-        ends, means, modes = zip(*parts, strict=True)
-        return column(*ends, *modes), column(*means, *modes)
+        )
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
         """The spring forces after the slip `dx` [m] in one direction, exactly; their sum is F."""
@@ -150,3 +134,233 @@ class MaxwellSlip(Law):
             smooth.clip(F[i] + e.k * dx, -e.mu * N, e.mu * N) for i, e in enumerate(self.elements)
         ]
         return column(*held)
+
+
+LEUVEN_SLIDERS = (Slider(5e4, 0.05), Slider(2.5e4, 0.05), Slider(1.5e4, 0.05), Slider(1e4, 0.05))
+"""Together 1e5 N/m and mu = 0.2, above the static level."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Leuven(StribeckLevel, Elements):
+    """Leuven friction, modified (n states of the hysteresis).
+
+        g       = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
+        r       = F_h sign(v) / g,   F_h = F_1 + F_2 + ...
+        dz/dt   = v [1 - sign(r) |r|^delta_l]
+        dF_i/dt = k_i dz/dt [1 - |F_i/(mu_i N)|^n (1 + sign(dz/dt F_i)) / 2]
+        F       = F_h + sigma_1 dz/dt + sigma_2 v
+
+    The hysteresis force F_h is a `MaxwellSlip` force in z instead of the original stack of
+    reversal points, which jumps where a loop closes. s(v) = g sign(v) is odd; with the unsigned s
+    that is printed, z runs away for v < 0. |v| and signs are smooth over v_eps and r_eps.
+    Limits: steady state g sign(v) + sigma_2 v, whatever the F_i. delta_l -> inf is `MaxwellSlip`
+    until F_h = g. Needs mu_1 + mu_2 + ... >= mu_s, else z runs away. Not valid for N = 0.
+    Source: Swevers, Al-Bender, Ganseman, Prajogo, IEEE TAC 45(4), 2000; Lampaert, Swevers,
+    Al-Bender, IEEE TAC 47(4), 2002.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
+        smoothness="C∞ (C0 as v_eps -> 0 and n -> inf)",
+        confidence="one source",
+        checked="Lampaert, Al-Bender, Swevers 2003, signs corrected",
+        source="Lampaert, Swevers, Al-Bender, IEEE TAC 47(4), 2002",
+        load="proportional in steady sliding",
+    )
+    ordered = (("mu_d", "mu_s"),)
+    kind = Slider
+
+    elements: tuple[Slider, ...] = LEUVEN_SLIDERS
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    delta_l: Scalar = fields.SHAPE(7.0, doc="sharpness of the transition", lower=1.0, upper=1e2)
+    sigma_1: Scalar = fields.SIGMA_1(0.8)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.WIDTH(1e-8, doc="smoothing of the load shares")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        shares = [e.mu for e in self.elements]
+        if all(map(is_number, (*shares, self.mu_s))) and sum(shares) < self.mu_s:
+            raise ValueError(
+                f"Leuven: expected elements that carry mu_s = {self.mu_s:g} together, got "
+                f"{sum(shares):g}; the bristle would run away"
+            )
+
+    def stretching(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
+        """dz/dt [m/s] of the hysteretic deflection."""
+        share = self.springs(z) / self.level(v, N)
+        spent = smooth.signed_power(share, self.delta_l, self.r_eps)
+        return v - smooth.magnitude(v, self.v_eps) * spent
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        damping = self.sigma_1 * self.stretching(v, N, z)
+        return self.springs(z) + damping + self.sigma_2 * v
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the element forces [N/s]."""
+        stretch = self.stretching(v, N, z)
+        return column(
+            *(
+                e.k * yielding(stretch, z[i] / (e.mu * N), self.n, self.v_eps, self.r_eps)
+                for i, e in enumerate(self.elements)
+            )
+        )
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """One of the states whose sum is g sign(v): all elements at the same load share."""
+        total = self.total(e.mu for e in self.elements)
+        level = self.level(v, N) * smooth.sign(v, self.v_eps)
+        return column(*(e.mu / total * level for e in self.elements))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Element(Parametric):
+    """One element: a spring of stiffness k that carries the share alpha of the friction."""
+
+    k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
+    alpha: Scalar = fields.SHAPE(1.0, doc="share of the friction", lower=1e-12)
+
+
+ELEMENTS = (Element(5e4, 0.25), Element(2.5e4, 0.25), Element(1.5e4, 0.25), Element(1e4, 0.25))
+"""Together 1e5 N/m, slipping one after the other."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GMS(StribeckLevel, Elements):
+    """Generalised Maxwell-slip (GMS) friction of n elements (2n states).
+
+        g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
+        stick: dF_i/dt = k_i v                                until |F_i| = alpha_i g(v)
+        slip:  dF_i/dt = C (alpha_i sign(v) - F_i/g(v))       until v passes through zero
+        F = F_1 + F_2 + ... + sigma_2 v
+
+    The shares alpha_i are divided by their sum. C [N/s] makes the lag: all elements follow g with
+    the time constant g/C.
+    form = "event" is this law with a mode p_i of 0 (stick) or 1 (slip) for each element.
+    form = "smooth" lets p_i latch over a short path, with r_i = F_i sign(v) / (alpha_i g),
+    on = step((r_i - 1)/rho + 1), off = step(-5 r_i) and w_i = p_i (1 - off):
+
+        dp_i/dt = |v| k_i / (alpha_i g rho) [on (1 - p_i) - off p_i]
+        dF_i/dt = (1 - w_i) stick + w_i slip
+
+    It slips too early by up to the share rho of the limit; steady state, lag and memory are those
+    of the original and no state moves at rest. sign and |v| are smooth over v_eps, to be kept a
+    hundred times below the slowest motion of interest. Settled cycles dissipate; within one, slip
+    that slows down stretches the springs in time, by a little more than the work done on them.
+    Limits: steady state g sign(v) + sigma_2 v; C -> inf and mu_s = mu_d is `MaxwellSlip`; at rest
+    and in pre-sliding its forces are those of `MaxwellSlip` with limits alpha_i g(0). Not valid
+    for N = 0. Nothing damps a body that the springs hold: it rings with sqrt(sum k_i/m), and every
+    turn is a switch. The block of `Rabinowicz` takes 40 000 steps over 20 s, 20 000 with
+    sigma_2 = 0.5 N s/m and 3 700 with 2 N s/m, which ends its stick-slip.
+    Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003; Al-Bender, Lampaert, Swevers, IEEE TAC
+    50(11), 2005. The smooth form is constructed here; it is not that of Boegli et al.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
+        smoothness="C2 (switched as rho -> 0)",
+        confidence="two sources",
+        checked="jchristopherson/friction README; the paper of 2003; smooth form constructed",
+        source="Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005",
+        load="proportional in steady sliding",
+    )
+    ordered = (("mu_d", "mu_s"),)
+    kind = Element
+
+    elements: tuple[Element, ...] = ELEMENTS
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    C: Scalar = param(
+        24.0, unit="N/s", role="time", doc="attraction to the Stribeck curve", lower=1e-12
+    )
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    v_eps: Scalar = param(
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of sign(v)", lower=1e-15
+    )
+    rho: Scalar = fields.SHAPE(0.03, doc="share over which slip sets in", lower=1e-6, upper=0.5)
+    form: str = option("smooth", choices=("smooth", "event"), doc="latched, or exact with modes")
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The spring forces and the modes."""
+        mode, whole = "0 in stick, 1 in slip", self.form == "event"
+        count = range(1, len(self.elements) + 1)
+        modes = (State(f"p_{i}", "1", 1.0, even=True, doc=mode, whole=whole) for i in count)
+        return (*super().states, *modes)
+
+    def shares(self) -> list[Scalar]:
+        """The alpha_i, divided by their sum."""
+        total = self.total(e.alpha for e in self.elements)
+        return [e.alpha / total for e in self.elements]
+
+    def _direction(self, v: Scalar) -> Scalar:
+        return smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
+
+    def _begins(self, r: Scalar) -> Scalar:
+        return smooth.step5((r - 1) / self.rho + 1)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return self.total((self.sigma_2 * v, *(z[i] for i in range(len(self.elements)))))
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the spring forces [N/s] and of the modes [1/s]."""
+        count, g, direction = len(self.elements), self.level(v, N), self._direction(v)
+        forces: list[Scalar] = []
+        modes: list[Scalar] = []
+        for i, (e, alpha) in enumerate(zip(self.elements, self.shares(), strict=True)):
+            F, p = z[i], z[count + i]
+            slipping, latch = p, 0.0 * v
+            if self.form == "smooth":
+                r = F / (alpha * g)
+                on = ahead(self._begins, direction, r)
+                off = smooth.step5(-5 * (r * direction))
+                pace = smooth.magnitude(v, self.v_eps) * e.k / (alpha * g * self.rho)
+                slipping, latch = p * (1 - off), pace * (on * (1 - p) - off * p)
+            slip = self.C * direction**2 * (alpha * direction - F / g)
+            forces.append((1 - slipping) * e.k * v + slipping * slip)
+            modes.append(latch)
+        return column(*forces, *modes)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """All elements slipping on the Stribeck curve."""
+        direction = self._direction(v)
+        forces = [alpha * self.level(v, N) * direction for alpha in self.shares()]
+        return column(*forces, *(direction**2 for _ in forces))
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Exact in the event form: stick up to the limit, or exponential slip towards it."""
+        if self.form == "smooth":
+            return None
+        count, g, held = len(self.elements), self.level(v, N), Held.over(v, h)
+        x = -self.C * h / g
+        left, left_in_mean = 1 + expm1(x), smooth.phi1(x)
+        share = g / self.total(e.alpha for e in self.elements)
+        parts: list[tuple[Scalar, Scalar, Scalar]] = []
+        for i, e in enumerate(self.elements):
+            F, p, limit = z[i], z[count + i], e.alpha * share
+            load, goal = held.s * F, held.s * limit
+            slips = either(load >= limit, both(p > 0.5, load > 0))
+            slipped = goal + (F - goal) * left, goal + (F - goal) * left_in_mean
+            parts.append(held.stretched(F, p, e.k, limit, slips, slipped))
+        return held_columns(parts)
+
+    def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
+        """Slip of each element at its limit, stick of all when v passes through zero."""
+        if self.form == "smooth":
+            return ()
+        g = self.level(v, N)
+        limits = [alpha * g for alpha in self.shares()]
+        resets = [{f"p_{i + 1}": 1.0} for i in range(len(limits))]
+        return self.slip_switches(v, z, limits, resets)

@@ -1,13 +1,13 @@
-"""Stick-slip friction of Cha: a coefficient blended from velocity and stiction deformation."""
+"""Contacts that hold up to a static level: blended, by a reset integrator, and in a plane."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
-from symfric.foundation.numeric import Scalar, column
+from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
-from symfric.laws.base.law import Facts, Law, State
-from symfric.laws.dynamic.element import yielding
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.law import Facts, Law, State, Switch
+from symfric.laws.dynamic.element import Held, deflection, yielding
 
 ROOT_STEPS = 10
 """Steps of Newton's method that reach a root to rounding for every sharpness allowed."""
@@ -34,47 +34,30 @@ class StickSlip(Law):
     Source: Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011 (abstract).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "P"),
         smoothness="C2",
         confidence="rebuilt",
         checked="the structure is that of the abstract, the formulas are made here",
         source="Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
-    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_s", "v_d"),)
+    ordered = (("mu_d", "mu_s"),)
+    strictly_ordered = (("v_s", "v_d"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of full slip", lower=1e-12
-    )
-    v_d: Scalar = param(
-        1.5e-3, unit="m/s", role="velocity scale", doc="velocity of the dynamic level", lower=1e-12
-    )
-    D_max: Scalar = param(
-        1e-6, unit="m", role="length", doc="largest stiction deformation", lower=1e-15
-    )
-    n: Scalar = param(
-        20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
-    )
-    v_eps: Scalar = param(
-        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
-    )
-    r_eps: Scalar = param(
-        1e-8, unit="1", role="width", doc="smoothing of the deformation", lower=1e-12
-    )
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.VELOCITY(1e-3, doc="velocity of full slip")
+    v_d: Scalar = fields.VELOCITY(1.5e-3, doc="velocity of the dynamic level")
+    D_max: Scalar = fields.LENGTH(1e-6, doc="largest stiction deformation")
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.WIDTH(1e-8, doc="smoothing of the deformation")
     branch: str = option("plateau", choices=("plateau", "published"), doc="mu_v within v_s")
 
     @property
     def states(self) -> tuple[State, ...]:
         """D: deformation of the contact while it sticks [m]."""
         return (State("D", "m", 1e-6, doc="stiction deformation"),)
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity of full slip [m/s]."""
-        return self.v_s
 
     def _slipping(self, v: Scalar) -> Scalar:
         return smooth.step5(smooth.magnitude(v, self.v_eps) / self.v_s)
@@ -114,3 +97,189 @@ class StickSlip(Law):
             spent = (1 - slip) * smooth.power(r, self.n, self.r_eps)
             r = r - (slip * r + spent - (1 - slip)) / (slip + self.n * spent / (r + self.r_eps))
         return column(self.D_max * r * smooth.sign(v, self.v_eps))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class HaessigFriedland(Law):
+    """Reset-integrator friction (one state, with a mode in the event form).
+
+        r     = sigma_0 z / (mu_d N)
+        stick: dz/dt = v until |r| = 1
+        slip:  dz/dt = 0 until v changes sign
+        F = sigma_0 z mu_s/mu_d + sigma_1 dz/dt  in stick,  sigma_0 z  in slip
+
+    The stiction gradient of the paper is a = (mu_s - mu_d) / mu_d. form = "event" is this law, for
+    constant N; the force drops from mu_s N to mu_d N at once. form = "smooth" yields with the
+    sharpness n, and loses the excess in a step of |r| from 1 - knee to 1:
+
+        smooth: dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2]
+
+    Limits: steady state mu_d N sign(v); rate-independent for sigma_1 = 0; drifts as little as
+    `MaxwellSlip` with one element. While the bristle unloads F v < 0: it gives back what it stored,
+    at most mu_s mu_d N^2 / (2 sigma_0). |v| is smooth over v_eps. Not valid for N = 0.
+    Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "P", "N"),
+        smoothness="C2 (jumps as knee -> 0)",
+        confidence="unverified",
+        checked="the smooth form is constructed",
+        source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
+        load="proportional in steady sliding",
+    )
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    sigma_0: Scalar = fields.STIFFNESS(1e5, doc="bristle stiffness in slip")
+    sigma_1: Scalar = param(
+        190.0, unit="N s/m", role="damping", doc="bristle damping in stick", lower=0.0
+    )
+    n: Scalar = fields.SHARPNESS(50.0)
+    knee: Scalar = fields.SHAPE(0.05, doc="share over which excess is lost", lower=1e-6, upper=1)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.R_EPS(1e-8)
+    form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The bristle deflection, and in the event form the mode."""
+        slip = State("slip", "1", 1.0, even=True, doc="1 in slip", whole=True)
+        bristle = State("z", "m", deflection(self.sigma_0), doc="bristle deflection")
+        return (bristle, slip) if self.form == "event" else (bristle,)
+
+    def _share(self, N: Scalar, z: Scalar) -> Scalar:
+        return self.sigma_0 * z[0] / (self.mu_d * N)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rate of the deflection [m/s] and, zero, of the mode."""
+        if self.form == "event":
+            return column((1 - z[1]) * v, 0.0 * v)
+        return column(yielding(v, self._share(N, z), self.n, self.v_eps, self.r_eps))
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return self.mu_d * N
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        if self.form == "event":
+            excess = 1 - z[1]
+        else:
+            r = smooth.magnitude(self._share(N, z), self.r_eps)
+            excess = 1 - smooth.step5((r - 1) / self.knee + 1)
+        stiffness = self.sigma_0 * (1 + (self.mu_s / self.mu_d - 1) * excess)
+        return stiffness * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Deflection at its limit [m], mode slipping."""
+        direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
+        z = self.mu_d * N / self.sigma_0 * direction
+        return column(z, direction**2) if self.form == "event" else column(z)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Exact in the event form; the mode counts as that at the end of the step."""
+        if self.form == "smooth":
+            return None
+        held = Held.over(v, h)
+        end, mean, slip = held.yielded(z[0], z[1], 1.0, self.mu_d * N / self.sigma_0)
+        return column(end, slip), column(mean, slip)
+
+    def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
+        """Slip at the limit, stick when v changes sign."""
+        if self.form == "smooth":
+            return ()
+        direction = smooth.sign(v, 0.0)
+        reached = smooth.choose(z[1] > 0.5, -1.0, direction * self._share(N, z) - 1)
+        limit = direction * self.mu_d * N / self.sigma_0
+        return (
+            Switch("slip_begins", reached, 1, {"z": limit, "slip": 1.0}),
+            Switch("reversal", v, 0, {"slip": 0.0}),
+        )
+
+
+CUBIC_STEPS = 40
+"""Steps of Newton's method that reach a cubic root of 1e-15 of its start."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Bristle2D(Law):
+    """Bristle friction that slides where a disc ends (one state, in a plane a vector).
+
+        g     = N [mu_d + (mu_s - mu_d) exp(-|v|^2/v_s^2)]
+        F_tr  = sigma_0 z + sigma_1 v
+        F     = F_tr sat(|F_tr|, g) / |F_tr|
+        dz/dt = (F - sigma_0 z) / sigma_1
+
+    Made for slip in a plane, with vectors v, z and F: `PlanarSlip(Bristle2D())`. sat is the
+    identity up to (1 - kappa) g, so that the bristle returns exactly and does not drift, and g
+    beyond (1 + kappa) g; kappa = 0 is the projection on the disc of radius g, with its kink.
+    Limits: isotropic; steady state g v/|v| for |v| > kappa g / sigma_1, down to (1 - kappa) g in
+    creep; one bristle and damper in parallel below g. sigma_1 -> 0 tends to Coulomb friction.
+    Source: Kikuuwe, Takesue, Sano, Mochiyama, Fujimoto, IEEE T-RO 22(6), 2006 (elastoplastic
+    form); the use for contact of Liang, Fillmore, Ma, J. Comput. Nonlinear Dynam. 7(4), 2012.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "P", "N"),
+        smoothness="C2 (C0 as kappa -> 0)",
+        confidence="one source",
+        checked="JuliaRobotics/RigidBodyDynamics.jl contact.jl (viscoelastic Coulomb friction)",
+        source="Kikuuwe et al., IEEE T-RO 22(6), 2006; Liang, Fillmore, Ma 2012",
+        load="proportional in steady sliding",
+    )
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    sigma_1: Scalar = fields.SIGMA_1(190.0, lower=1e-12)
+    kappa: Scalar = fields.WIDTH(0.02, doc="rounding of the saturation", lower=0.0, upper=1.0)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """z: deflection of the bristle [m], a vector in a plane."""
+        return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"),)
+
+    def _level(self, v: Scalar, N: Scalar) -> Scalar:
+        falling = exp(-((v / self.v_s) ** 2))
+        return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return self._level(speed, N)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        g = self._level(v, N)
+        corner = 0.0 if equals(self.kappa, 0.0) else self.kappa * g
+        return smooth.hold(self.sigma_0 * z[0] + self.sigma_1 * v, g, corner)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rate of the deflection [m/s], shape (1, 1)."""
+        return column((self.force(v, N, z) - self.sigma_0 * z[0]) / self.sigma_1)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Deflection in steady sliding [m], exact to rounding of g.
+
+        Its force F solves F = sat(F + sigma_1 v). With t = (F + sigma_1 v - g) / (2 kappa g) + 1/2,
+        the place in the corner of sat, it is the root of t^3 (2 - t) = sigma_1 |v| / (kappa g) in
+        [0, 1], convex, by Newton's method from t = 1.
+        """
+        g, drawn = self._level(v, N), self.sigma_1 * smooth.magnitude(v, 0.0)
+        held = g
+        if not equals(self.kappa, 0.0):
+            t, corner = 1.0 + 0.0 * v, self.kappa * g
+            target = smooth.clip(drawn / corner, 0.0, 1.0)
+            for _ in range(CUBIC_STEPS):
+                t = t - (t * (2 - t) - target / (t * t)) / (6 - 4 * t)
+            held = smooth.choose(drawn >= corner, g, g + corner * (2 * t - 1) - drawn)
+        return column(held / self.sigma_0 * smooth.sign(v, 0.0))

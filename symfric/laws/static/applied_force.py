@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, replace
 from math import inf, pi
-from typing import ClassVar, final
+from typing import final
 
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import (
     APPLIED_FORCE,
     Facts,
@@ -46,17 +46,16 @@ class Karnopp(Sticking):
     Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public codes.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "V"),
         smoothness="C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
         confidence="two sources",
         checked="fellipegm/valve_estimation and other public code",
         source="Karnopp 1985, as in public codes",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    mu_d: Scalar = fields.MU_D(0.1)
     D_v: Scalar = param(
         1e-3,
         unit="m/s",
@@ -65,10 +64,8 @@ class Karnopp(Sticking):
         doc="half width of the band around rest",
         lower=1e-12,
     )
-    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
-    F_eps: Scalar = param(
-        1e-3, unit="N", role="width", doc="rounding of the break-away", lower=1e-12
-    )
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    F_eps: Scalar = fields.F_EPS(1e-3)
     form: str = option("smooth", choices=WITH_MODES, doc="window, hard switch, or exact with mode")
 
     @property
@@ -105,10 +102,6 @@ class Karnopp(Sticking):
     def velocity_scale(self) -> Scalar:
         """The half width of the band [m/s]; none in the event form, where it is an event."""
         return inf if self.has_mode else self.D_v
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away."""
-        return self.mu_s * N
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -164,37 +157,28 @@ class Awrejcewicz(StaticLaw):
     Source: Awrejcewicz, Grzelczyk, Pyryev 2008 (not read; branches checked to join).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
         confidence="unverified",
         checked="its four branches join",
         source="Awrejcewicz, Grzelczyk, Pyryev 2008",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
     epsilon: Scalar = param(
         1e-3, unit="m/s", role="width", width=1, doc="half width of the window", lower=1e-12
     )
-    v_s: Scalar = param(
-        1e-2, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    F_eps: Scalar = param(
-        1e-3, unit="N", role="width", doc="rounding of the break-away", lower=1e-12
-    )
+    v_s: Scalar = fields.V_S(1e-2)
+    F_eps: Scalar = fields.F_EPS(1e-3)
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic window")
 
     @property
     def inputs(self) -> tuple[Input, ...]:
         """The applied force F_e [N], which rest has to carry."""
         return (APPLIED_FORCE,)
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The half width of the window [m/s]."""
-        return self.epsilon
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -231,7 +215,7 @@ class LeineSwitch(Sticking):
     author's public code.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞ (original: jump at |v| = eta)",
         confidence="one source",
@@ -239,13 +223,8 @@ class LeineSwitch(Sticking):
         source="Leine et al. 1998; the author's public code",
     )
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    delta: Scalar = param(
-        3.0, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=0.0
-    )
-    v_eps: Scalar = param(
-        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
-    )
+    delta: Scalar = fields.STEEPNESS(3.0, doc="steepness of the fall", lower=0.0)
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
     eta: Scalar = param(
         1e-6, unit="m/s", role="width", width=1, doc="half width of the band of rest", lower=1e-15
     )
@@ -268,10 +247,6 @@ class LeineSwitch(Sticking):
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity, or the half width of the band [m/s]; none in the event form."""
         return {"smooth": self.v_eps, "original": self.eta, "event": inf}[self.form]
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away."""
-        return self.mu_s * N
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -315,24 +290,22 @@ class Wojewoda(StaticLaw):
     Source: after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008 (abstract only).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "L"),
         smoothness="C∞",
         confidence="rebuilt",
         checked="of the paper only the abstract was read",
         source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
     a_1: Scalar = param(100.0, unit="1/s", role="shape", doc="decay of the hysteresis", lower=0.0)
     a_2: Scalar = param(
         0.1, unit="m/s^2", role="shape", doc="acceleration of half the decay", lower=1e-12
     )
-    v_eps: Scalar = param(
-        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
-    )
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
     a_eps: Scalar = param(
         1e-2, unit="m/s^2", role="width", doc="smoothing acceleration", lower=1e-12
     )
@@ -349,11 +322,6 @@ class Wojewoda(StaticLaw):
     def inputs(self) -> tuple[Input, ...]:
         """The sliding acceleration dv/dt [m/s^2]."""
         return (Input("dv", "m/s^2", "sliding acceleration"),)
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]."""
-        return self.v_eps
 
     def outside(self, speed: Scalar, N: Scalar, *, dv: Scalar = 0.0) -> Scalar:
         """Refused: the branch that a slide begins or ends on follows from dv."""

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, pi
-from typing import ClassVar, final
+from typing import final
 
 from symfric.foundation.numeric import Scalar, atan, equals, erf, sqrt, tanh
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -49,7 +49,7 @@ class Coulomb(StaticLaw):
     quadratic in the incremental potential contact and TAMSI methods.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D",),
         smoothness="C∞ (shape saturation C0 at |v| = v_eps, quadratic C1 at 0 and |v| = v_eps)",
         confidence="two sources",
@@ -57,16 +57,9 @@ class Coulomb(StaticLaw):
         source="Amontons 1699, Coulomb 1785; regularised by tanh",
     )
 
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_eps: Scalar = param(
-        1e-3, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
-    )
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_eps: Scalar = fields.V_EPS(1e-3)
     shape: str = option("tanh", choices=tuple(SHAPES), doc="smooth sign")
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]; none without smoothing."""
-        return inf if equals(self.v_eps, 0.0) else self.v_eps
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -90,20 +83,9 @@ class Viscous(StaticLaw):
     Source: textbook; Olsson et al., Eur. J. Control 4, 1998.
     """
 
-    facts: ClassVar[Facts] = Facts(
-        phenomena=("V",),
-        smoothness="C∞",
-        confidence="textbook",
-        source="textbook",
-        load="independent",
-    )
+    facts = Facts(("V",), "C∞", "textbook", "textbook", load="independent")
 
-    sigma_2: Scalar = param(0.4, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """None: the force is linear."""
-        return inf
+    sigma_2: Scalar = fields.SIGMA_2(0.4)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0; none at rest."""
@@ -126,18 +108,10 @@ class PowerLawViscous(StaticLaw):
     Source: textbook; the general exponent as in drive and fluid-film models.
     """
 
-    facts: ClassVar[Facts] = Facts(
-        phenomena=("V",),
-        smoothness="C∞",
-        confidence="textbook",
-        source="textbook",
-        load="independent",
-    )
+    facts = Facts(("V",), "C∞", "textbook", "textbook", load="independent")
 
-    sigma_2: Scalar = param(
-        0.4, unit="N (s/m)^d", role="viscous", doc="viscous coefficient", lower=0.0
-    )
-    d: Scalar = param(2.0, unit="1", role="shape", doc="exponent", lower=0.1, upper=10.0)
+    sigma_2: Scalar = fields.SIGMA_2(0.4, unit="N (s/m)^d")
+    d: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
     v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
 
     @property

@@ -1,17 +1,55 @@
 """Laws whose friction falls exponentially from the static to the dynamic level."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
-from symfric.foundation.numeric import Scalar, equals, tanh
-from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
-from symfric.laws.base.law import Facts, StaticLaw
+from symfric.foundation.numeric import Scalar
+from symfric.laws.base import fields
+from symfric.laws.base.curve import Curve, Fall
+from symfric.laws.base.law import Facts
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Tustin(StaticLaw):
+class Stribeck(Curve):
+    """Stribeck friction with exponent delta (Bo-Pavelescu), smooth at rest.
+
+        F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
+
+    delta = 1 is Tustin's law, delta = 2 the Gaussian one. For other delta |v| is rounded over
+    1e-4 v_eps, which changes F by less than 1e-4 (mu_s - mu_d) N. Keep v_eps << v_s: for delta = 2
+    the peak is 0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0; the float
+    v_eps = 0 is the original with sign(v), 0 at rest.
+    Limits: mu_s = mu_d gives `Coulomb` + `Viscous`; at |v| = v_s the bracket is
+    mu_d + (mu_s - mu_d)/e for every delta. Creeps under load like `Coulomb`.
+    Source: Stribeck 1902; Hess and Soom 1990; Bo and Pavelescu, Wear 82, 1982 (exponent).
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="two sources",
+        checked="jchristopherson/friction (delta = 2); the Lund thesis on laminator nips (delta)",
+        source="Stribeck 1902; Bo and Pavelescu 1982 (exponent)",
+    )
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    v_eps: Scalar = fields.V_EPS(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, self.delta)
+        return mu * N * s + self.sigma_2 * v
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Tustin(Curve):
     """Tustin friction: Coulomb, viscous and an exponential fall.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] sign(v) + sigma_2 v
@@ -22,45 +60,30 @@ class Tustin(StaticLaw):
     Source: Tustin, J. IEE 94, 1947, in the form of Armstrong-Helouvry 1994 (neither was read).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
         checked="MassWithStopAndFriction of the Modelica Standard Library; not the name",
         source="Tustin 1947, as cited in control literature",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    v_eps: Scalar = param(
-        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
-    )
-    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_eps: Scalar = fields.V_EPS(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
-        return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 1.0)
-        return mu * N + self.sigma_2 * speed
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, 1.0, smooth.CORNER * self.v_eps)
-        mu = self.mu_d + (self.mu_s - self.mu_d) * falling
-        return mu * N * smooth.sign(v, self.v_eps) + self.sigma_2 * v
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, 1.0)
+        return mu * N * s + self.sigma_2 * v
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Benson(StaticLaw):
+class Benson(Curve):
     """Benson-Hallquist exponential friction of finite-element codes.
 
         F = N [mu_d + (mu_s - mu_d) exp(-d_c |v|)] sign(v)
@@ -70,44 +93,29 @@ class Benson(StaticLaw):
     Source: Benson and Hallquist 1990 (not read), as documented in LS-DYNA (FS, FD, DC) and COMSOL.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
         confidence="two sources",
         checked="documentation of LS-DYNA and of COMSOL",
         source="Benson and Hallquist 1990, as in LS-DYNA and COMSOL",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    d_c: Scalar = param(
-        1e3, unit="s/m", role="velocity scale", doc="decay coefficient", lower=1e-12
-    )
-    v_eps: Scalar = param(
-        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
-    )
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    d_c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
+    v_eps: Scalar = fields.V_EPS(1e-4)
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s], or 1/d_c without smoothing."""
-        return 1 / self.d_c if equals(self.v_eps, 0.0) else self.v_eps
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        falling = smooth.fall(speed, 1 / self.d_c, 1.0)
-        return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        falling = smooth.stribeck(v, 1 / self.d_c, 1.0, smooth.CORNER * self.v_eps)
-        mu = self.mu_d + (self.mu_s - self.mu_d) * falling
-        return mu * N * smooth.sign(v, self.v_eps)
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, 1 / self.d_c, 1.0)
+        return mu * N * s
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Berger(StaticLaw):
+class Berger(Curve):
     """Berger friction, an interpretation: the exponential fall of his review, with a smooth sign.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] tanh(v / v_t)
@@ -118,43 +126,29 @@ class Berger(StaticLaw):
     Source: interpretation of Berger, Appl. Mech. Rev. 55(6), 2002 (not read).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
         confidence="rebuilt",
         checked="an interpretation of a review that proposes no law",
         source="after Berger 2002",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    v_t: Scalar = param(
-        1e-4, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
-    )
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_t: Scalar = fields.V_T(1e-4)
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The transition velocity [m/s]."""
-        return self.v_t
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 1.0)
-        return mu * N
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, 1.0, smooth.CORNER * self.v_t)
-        return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N * tanh(v / self.v_t)
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, 1.0)
+        return mu * N * s
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class DuanSingh(StaticLaw):
+class DuanSingh(Curve):
     """Duan-Singh friction: conditioned dry friction with a static to kinetic ratio.
 
         F = mu_d N [1 + (mu_s/mu_d - 1) exp(-c |v|)] tanh(sigma v)
@@ -165,41 +159,29 @@ class DuanSingh(StaticLaw):
     Source: Duan and Singh 2006 (not read).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S"),
         smoothness="C∞",
         confidence="unverified",
         checked="the expression is that of Andersson with p = 1",
         source="Duan and Singh 2006",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    c: Scalar = param(1e3, unit="s/m", role="velocity scale", doc="decay coefficient", lower=1e-12)
-    sigma: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", width=-1, doc="conditioning factor", lower=1e-12
-    )
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
+    sigma: Scalar = fields.STEEPNESS(1e4, width=-1, doc="conditioning factor")
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity 1/sigma [m/s]."""
-        return 1 / self.sigma
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        falling = smooth.fall(speed, 1 / self.c, 1.0)
-        return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        falling = smooth.stribeck(v, 1 / self.c, 1.0, smooth.CORNER / self.sigma)
-        return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N * tanh(self.sigma * v)
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, 1 / self.c, 1.0)
+        return mu * N * s
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Andersson(StaticLaw):
+class Andersson(Curve):
     """Andersson-Soderberg-Bjorklund friction.
 
         F = N [mu_d + (mu_s - mu_d) exp(-(|v|/v_s)^p)] tanh(k_t v) + sigma_2 v
@@ -210,46 +192,31 @@ class Andersson(StaticLaw):
     Source: Andersson, Soderberg, Bjorklund, Tribol. Int. 40, 2007 (not read), as in public code.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
         checked="public MATLAB function Friction_A",
         source="Andersson, Soderberg, Bjorklund 2007, as in public code",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    p: Scalar = param(2.0, unit="1", role="shape", doc="exponent", lower=0.1, upper=10.0)
-    k_t: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", width=-1, doc="steepness at rest", lower=1e-12
-    )
-    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    p: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
+    k_t: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness at rest")
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity 1/k_t [m/s]."""
-        return 1 / self.k_t
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.p)
-        return mu * N + self.sigma_2 * speed
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, self.p, smooth.CORNER / self.k_t)
-        mu = self.mu_d + (self.mu_s - self.mu_d) * falling
-        return mu * N * tanh(self.k_t * v) + self.sigma_2 * v
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, self.p)
+        return mu * N * s + self.sigma_2 * v
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class SteadyStateLuGre(StaticLaw):
+class SteadyStateLuGre(Curve):
     """Steady-state LuGre friction with exponent delta, in newton.
 
         F = [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] sign(v) + sigma_2 v
@@ -263,7 +230,7 @@ class SteadyStateLuGre(StaticLaw):
     and 5.2.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
@@ -271,38 +238,19 @@ class SteadyStateLuGre(StaticLaw):
         source="A Friction Model for Laminator Nips, MSc thesis, Lund 2015; LuGre",
         load="independent",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("F_C", "F_S"),)
+    ordered = (("F_C", "F_S"),)
 
-    F_S: Scalar = param(4.4861, unit="N", role="level", doc="static level", lower=0.0)
-    F_C: Scalar = param(2.5498, unit="N", role="level", doc="dynamic level", lower=0.0)
-    v_s: Scalar = param(
-        1.2e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    sigma_2: Scalar = param(
-        230.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
-    )
-    delta: Scalar = param(
-        2.0, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
-    )
-    v_eps: Scalar = param(
-        1e-5, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
-    )
+    F_S: Scalar = fields.LEVEL(4.4861, doc="static level")
+    F_C: Scalar = fields.LEVEL(2.5498, doc="dynamic level")
+    v_s: Scalar = fields.V_S(1.2e-3)
+    sigma_2: Scalar = fields.SIGMA_2(230.0)
+    delta: Scalar = fields.DELTA(2.0)
+    v_eps: Scalar = fields.V_EPS(1e-5)
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
-        return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        falling = smooth.fall(speed, self.v_s, self.delta)
-        return self.F_C + (self.F_S - self.F_C) * falling + self.sigma_2 * speed
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, self.delta, smooth.CORNER * self.v_eps)
-        level = self.F_C + (self.F_S - self.F_C) * falling
-        return level * smooth.sign(v, self.v_eps) + self.sigma_2 * v
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        level = self.F_C + (self.F_S - self.F_C) * fall(v, self.v_s, self.delta)
+        return level * s + self.sigma_2 * v
 
     @classmethod
     def pilot(cls) -> "SteadyStateLuGre":

@@ -1,17 +1,18 @@
 """Friction of robot joints, servo drives and belts: torques that see load and temperature."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_number, tanh
 from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.curve import Curve, Fall
 from symfric.laws.base.law import Facts, Input, StaticLaw
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Bittencourt(StaticLaw):
+class Bittencourt(Curve):
     """Friction torque of a robot joint under load N at temperature T, after Bittencourt.
 
         static(T)  = max(F_s0 + F_sT T, 0),   v_s(T) = v_s0 + v_sT T
@@ -28,7 +29,7 @@ class Bittencourt(StaticLaw):
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (abstract only).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="unverified",
@@ -40,11 +41,9 @@ class Bittencourt(StaticLaw):
     T: Scalar = param(
         30.0, unit="degC", role="temperature", doc="temperature", lower=-60.0, upper=200.0
     )
-    F_c0: Scalar = param(
-        0.031, unit="N m", role="level", doc="dynamic level without load", lower=0.0
-    )
-    F_cl: Scalar = param(0.023, unit="1", role="level", doc="dynamic level by load", lower=0.0)
-    F_sl: Scalar = param(0.126, unit="1", role="level", doc="static excess by load", lower=0.0)
+    F_c0: Scalar = fields.TORQUE(0.031, doc="dynamic level without load")
+    F_cl: Scalar = fields.COEFFICIENT(0.023, doc="dynamic level by load")
+    F_sl: Scalar = fields.COEFFICIENT(0.126, doc="static excess by load")
     F_s0: Scalar = param(-0.025, unit="N m", role="level", doc="static excess at 0 degC")
     F_sT: Scalar = param(1.6e-3, unit="N m/K", role="level", doc="static excess by temperature")
     v_sl: Scalar = param(
@@ -73,12 +72,8 @@ class Bittencourt(StaticLaw):
     T_v: Scalar = param(
         20.7, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
     )
-    delta: Scalar = param(
-        1.3, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
-    )
-    v_eps: Scalar = param(
-        0.1, unit="rad/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
-    )
+    delta: Scalar = fields.DELTA(1.3)
+    v_eps: Scalar = fields.V_EPS(0.1, unit="rad/s", lower=1e-12)
     F_eps: Scalar = param(1e-4, unit="N m", role="width", doc="smoothing of the maximum", lower=0.0)
 
     def __post_init__(self) -> None:
@@ -90,31 +85,14 @@ class Bittencourt(StaticLaw):
                 "the law is not valid at this temperature"
             )
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [rad/s]."""
-        return self.v_eps
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding torque [N m] at a speed >= 0 as the widths vanish."""
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
         v_s = self.v_s0 + self.v_sT * self.T
-        loaded = self.F_sl * N * smooth.fall(speed, self.v_sl, self.delta)
+        loaded = self.F_sl * N * fall(v, self.v_sl, self.delta)
         static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
         level = self.F_c0 + self.F_cl * N + loaded
-        level += static * smooth.fall(speed, v_s, self.delta)
-        return level + (self.F_v0 + self.F_vT * exp(-self.T / self.T_v)) * speed
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction torque [N m]."""
-        v_s = self.v_s0 + self.v_sT * self.T
-        loaded = (
-            self.F_sl * N * smooth.stribeck(v, self.v_sl, self.delta, smooth.CORNER * self.v_eps)
-        )
-        static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
-        level = self.F_c0 + self.F_cl * N + loaded
-        level += static * smooth.stribeck(v, v_s, self.delta, smooth.CORNER * self.v_eps)
-        viscous = self.F_v0 + self.F_vT * exp(-self.T / self.T_v)
-        return level * smooth.sign(v, self.v_eps) + viscous * v
+        level += static * fall(v, v_s, self.delta)
+        return level * s + (self.F_v0 + self.F_vT * exp(-self.T / self.T_v)) * v
 
 
 @final
@@ -137,7 +115,7 @@ class BAM(StaticLaw):
     Source: Duclusaud et al. 2025, as in their public code.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
@@ -146,36 +124,22 @@ class BAM(StaticLaw):
         load="independent",
     )
 
-    K_b: Scalar = param(0.05, unit="N m", role="level", doc="dynamic level without load", lower=0.0)
-    K_s: Scalar = param(0.05, unit="N m", role="level", doc="static excess without load", lower=0.0)
-    K_e: Scalar = param(
-        0.05, unit="1", role="level", doc="dynamic level by external torque", lower=0.0
-    )
-    K_m: Scalar = param(
-        0.05, unit="1", role="level", doc="dynamic level by motor torque", lower=0.0
-    )
-    K_es: Scalar = param(
-        0.05, unit="1", role="level", doc="static excess by external torque", lower=0.0
-    )
-    K_ms: Scalar = param(
-        0.05, unit="1", role="level", doc="static excess by motor torque", lower=0.0
-    )
+    K_b: Scalar = fields.TORQUE(0.05, doc="dynamic level without load")
+    K_s: Scalar = fields.TORQUE(0.05, doc="static excess without load")
+    K_e: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by external torque")
+    K_m: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by motor torque")
+    K_es: Scalar = fields.COEFFICIENT(0.05, doc="static excess by external torque")
+    K_ms: Scalar = fields.COEFFICIENT(0.05, doc="static excess by motor torque")
     Q_e: Scalar = param(
         0.0, unit="1/(N m)", role="level", doc="excess by external torque squared", lower=0.0
     )
     Q_m: Scalar = param(
         0.0, unit="1/(N m)", role="level", doc="excess by motor torque squared", lower=0.0
     )
-    v_s: Scalar = param(
-        0.2, unit="rad/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
-    )
-    alpha: Scalar = param(
-        1.35, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
-    )
-    K_v: Scalar = param(0.1, unit="N m s/rad", role="viscous", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(
-        0.01, unit="rad/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
-    )
+    v_s: Scalar = fields.V_S(0.2, unit="rad/s")
+    alpha: Scalar = fields.DELTA(1.35)
+    K_v: Scalar = fields.SIGMA_2(0.1, unit="N m s/rad")
+    v_eps: Scalar = fields.V_EPS(0.01, unit="rad/s", lower=1e-12)
     tau_eps: Scalar = param(1e-3, unit="N m", role="width", doc="smoothing torque", lower=1e-12)
 
     @property
@@ -188,11 +152,6 @@ class BAM(StaticLaw):
             Input("tau_m", "N m", "torque of the motor", steady=1.0),
             Input("tau_e", "N m", "external torque", steady=0.5),
         )
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [rad/s]."""
-        return self.v_eps
 
     def force(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
@@ -250,26 +209,13 @@ class Capstan(StaticLaw):
     Source: Euler 1769, Eytelwein 1808; textbook.
     """
 
-    facts: ClassVar[Facts] = Facts(
-        phenomena=("D",),
-        smoothness="C∞",
-        confidence="textbook",
-        source="Euler 1769, Eytelwein 1808",
-        odd=False,
-    )
+    facts = Facts(("D",), "C∞", "textbook", "Euler 1769, Eytelwein 1808", odd=False)
 
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    mu_d: Scalar = fields.MU_D(0.1)
     beta: Scalar = param(
         3.141592653589793, unit="rad", role="geometry", doc="wrap angle", lower=0.0
     )
-    v_eps: Scalar = param(
-        1e-3, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
-    )
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]."""
-        return self.v_eps
+    v_eps: Scalar = fields.V_EPS(1e-3)
 
     def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
         """Sliding force [N] to one side as the widths vanish."""

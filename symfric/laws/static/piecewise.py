@@ -1,14 +1,119 @@
-"""Laws that multibody codes compose from pieces: ramps, steps and a fall."""
+"""Laws of pieces, as multibody codes compose them: ramps, steps and a fall."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, final
+from math import exp as exp_of_float
+from typing import final
 
-from symfric.foundation.numeric import Scalar, exp
-from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
+from symfric.foundation.numeric import Scalar, exp, tanh
+from symfric.foundation.parameters import option
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.curve import TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 FORMS = ("smooth", "original")
+RISE = 1 - exp_of_float(-3.0)
+"""What the rise 1 - exp(-3 |v|/v_r) has reached at v_r."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rise(StaticLaw):
+    """A law that rises to mu_d N within the velocity v_r, in its smooth form as tanh(3 v / v_r)."""
+
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_r: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the transition")
+    form: str = option("smooth", choices=FORMS, doc="form of the rise")
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity v_r / 3 [m/s]."""
+        return self.v_r / 3
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        if self.form == "smooth":
+            return self.mu_d * N * tanh(3 * (v / self.v_r))
+        return self.mu_d * N * self.original(v)
+
+    @abstractmethod
+    def original(self, v: Scalar) -> Scalar:
+        """The original form of the force over mu_d N."""
+
+    @staticmethod
+    def rise(u: Scalar) -> Scalar:
+        """(1 - exp(-3 |u|)) sign(u), with its slope 3 at zero."""
+        return 3 * u * smooth.phi1(-3 * smooth.magnitude(u, 0.0))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Threlfall(Rise):
+    """Threlfall friction.
+
+        original:  F = mu_d N (1 - exp(-3 |v|/v_r)) sign(v)   for |v| <= v_r
+                   F = 0.95 mu_d N sign(v)                    beyond
+        smooth:    F = mu_d N tanh(3 v / v_r)
+
+    Both have the slope 3 mu_d N / v_r at rest.
+    Limits: the original never reaches mu_d N, being 5 % short for ever, and jumps by
+    -2.1e-4 mu_d N at v_r; the smooth form tends to mu_d N. Creeps under load.
+    Source: Threlfall, Mech. Mach. Theory 13, 1978 (not read), as in public multibody code.
+    """
+
+    facts = Facts(
+        phenomena=("D",),
+        smoothness="C∞ (original: jump at |v| = v_r, C1 at 0)",
+        confidence="one source",
+        checked="public Python code of a multibody simulation",
+        source="Threlfall 1978, as in public multibody code",
+    )
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        reached = 1.0 if self.form == "smooth" else 0.95
+        return self.mu_d * N * reached
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The largest force [N]: the original drops by 2e-4 mu_d N behind it."""
+        return self.mu_d * N * (1.0 if self.form == "smooth" else RISE)
+
+    def original(self, v: Scalar) -> Scalar:
+        """The original form of the force over mu_d N."""
+        u = v / self.v_r
+        within = smooth.magnitude(u, 0.0) <= 1
+        return smooth.choose(within, self.rise(u), 0.95 * smooth.sign(v, 0.0))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ModifiedThrelfall(Rise):
+    """Threlfall friction modified by Marques et al., so that it reaches the dynamic level.
+
+        original:  F = mu_d N (1 - exp(-3 |v|/v_r)) / (1 - exp(-3)) sign(v)   for |v| <= v_r
+                   F = mu_d N sign(v)                                         beyond
+        smooth:    F = mu_d N tanh(3 v / v_r)
+
+    Limits: F(v_r) = mu_d N in the original, 0.995 mu_d N in the smooth form, which is that of
+    `Threlfall`. The coefficient is an interpretation: with it the law is continuous; with 0.95
+    instead of 1 - exp(-3) it would overshoot by 2.2e-4. Creeps under load.
+    Source: Marques et al., Nonlinear Dynam. 86, 2016 (not read).
+    """
+
+    facts = Facts(
+        phenomena=("D",),
+        smoothness="C∞ (original: C0 at |v| = v_r, C1 at 0)",
+        confidence="unverified",
+        checked="the coefficient is an interpretation",
+        source="Marques et al. 2016",
+    )
+
+    def original(self, v: Scalar) -> Scalar:
+        """The original form of the force over mu_d N."""
+        return self.rise(smooth.clip(v / self.v_r, -1.0, 1.0)) / RISE
 
 
 @final
@@ -25,29 +130,20 @@ class BengisuAkay(StaticLaw):
     Source: Bengisu and Akay, J. Sound Vib. 171, 1994 (not read).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C1 at 0 and |v| = v_0 (original: C0 at |v| = v_0)",
         confidence="unverified",
         checked="parabola and fall join at the static level",
         source="Bengisu and Akay 1994",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_0: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", width=1, doc="velocity of the peak", lower=1e-12
-    )
-    xi: Scalar = param(
-        1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=0.0
-    )
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_0: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
+    xi: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall", lower=0.0)
     form: str = option("smooth", choices=FORMS, doc="fall behind the peak")
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity of the peak [m/s]."""
-        return self.v_0
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -66,7 +162,7 @@ class BengisuAkay(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class VelocityBased(StaticLaw):
+class VelocityBased(TwoLevels):
     """Velocity-based friction of MSC ADAMS: a step up to the static level, a step down.
 
         F = N [2 S((v + v_s) / (2 v_s)) - 1] [mu_s - (mu_s - mu_d) S((|v| - v_s) / (v_d - v_s))]
@@ -78,48 +174,21 @@ class VelocityBased(StaticLaw):
     Source: documentation of MSC ADAMS, contact friction and STEP, two pages.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S"),
         smoothness="C2 at |v| = v_s and v_d (original: C1)",
         confidence="two sources",
         checked="two pages of the documentation of MSC ADAMS",
         source="documentation of MSC ADAMS",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
-    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_s", "v_d"),)
+    ordered = (("mu_d", "mu_s"),)
+    strictly_ordered = (("v_s", "v_d"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(
-        1e-3,
-        unit="m/s",
-        role="velocity scale",
-        width=1,
-        doc="stiction transition velocity",
-        lower=1e-12,
-    )
-    v_d: Scalar = param(
-        1.5e-3,
-        unit="m/s",
-        role="velocity scale",
-        width=1,
-        doc="friction transition velocity",
-        lower=1e-12,
-    )
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.VELOCITY(1e-3, width=1, doc="stiction transition velocity")
+    v_d: Scalar = fields.VELOCITY(1.5e-3, width=1, doc="friction transition velocity")
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The stiction transition velocity [m/s]."""
-        return self.v_s
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        return self.mu_d * N
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -146,32 +215,18 @@ class Ambrosio(StaticLaw):
     Source: Ambrosio 2003 (not read), as in public multibody code.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D",),
         smoothness="C2 at |v| = v_0 and v_1 (original: C0)",
         confidence="one source",
         checked="public Python code of a multibody simulation",
         source="Ambrosio 2003, as in public multibody code",
     )
-    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_0", "v_1"),)
+    strictly_ordered = (("v_0", "v_1"),)
 
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_0: Scalar = param(
-        2e-4,
-        unit="m/s",
-        role="velocity scale",
-        width=1,
-        doc="velocity below which nothing acts",
-        lower=0.0,
-    )
-    v_1: Scalar = param(
-        1e-3,
-        unit="m/s",
-        role="velocity scale",
-        width=1,
-        doc="velocity of full friction",
-        lower=1e-12,
-    )
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_0: Scalar = fields.VELOCITY(2e-4, width=1, doc="velocity below which nothing acts", lower=0.0)
+    v_1: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of full friction")
     form: str = option("smooth", choices=FORMS, doc="quintic step or ramp")
 
     @property
@@ -193,7 +248,7 @@ class Ambrosio(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Hollars(StaticLaw):
+class Hollars(TwoLevels):
     """Hollars friction, of Simbody.
 
         u = |v| / v_t
@@ -205,39 +260,24 @@ class Hollars(StaticLaw):
     Source: Simbody, three public headers.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at |v| = v_t (1 -+ u_eps) (u_eps = 0: C0 at v_t)",
         confidence="one source",
         checked="simbody/simbody HuntCrossleyForce.h",
         source="Simbody, HuntCrossleyForce",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_t: Scalar = param(
-        1e-2, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
-    )
-    mu_v: Scalar = param(
-        0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
-    )
-    u_eps: Scalar = param(
-        0.2, unit="1", role="width", doc="rounding of the peak", lower=0.0, upper=1.0
-    )
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The transition velocity [m/s]."""
-        return self.v_t
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_t: Scalar = fields.V_T(1e-2)
+    mu_v: Scalar = fields.MU_V(0.0)
+    u_eps: Scalar = fields.U_EPS(0.2)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
         return N * (self.mu_d + self.mu_v * speed)
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N; rounding the peak takes 0.19 u_eps of it."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -248,7 +288,7 @@ class Hollars(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Exudyn(StaticLaw):
+class Exudyn(TwoLevels):
     """Regularised friction of Exudyn: a ramp up to the static level, an exponential fall.
 
         F = N mu_s u                                                u = v/v_reg, for |u| <= 1
@@ -261,48 +301,26 @@ class Exudyn(StaticLaw):
     Source: Exudyn, public source; its text writes the ramp without the division by v_reg.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at |v| = v_reg (1 -+ u_eps) (u_eps = 0: C0 at v_reg)",
         confidence="one source",
         checked="jgerstmayr/EXUDYN, source of its regularised friction",
         source="Exudyn, public source",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_reg: Scalar = param(
-        1e-3,
-        unit="m/s",
-        role="velocity scale",
-        width=1,
-        doc="velocity of the ramp's end",
-        lower=1e-12,
-    )
-    v_exp: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of the fall", lower=1e-12
-    )
-    mu_v: Scalar = param(
-        0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
-    )
-    u_eps: Scalar = param(
-        0.2, unit="1", role="width", doc="rounding of the peak", lower=0.0, upper=1.0
-    )
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity of the ramp's end [m/s]."""
-        return self.v_reg
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_reg: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the ramp's end")
+    v_exp: Scalar = fields.VELOCITY(1e-3, doc="velocity of the fall")
+    mu_v: Scalar = fields.MU_V(0.0)
+    u_eps: Scalar = fields.U_EPS(0.2)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_exp, 1.0)
         return N * (mu + self.mu_v * speed)
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N; rounding the peak takes 0.19 u_eps of it."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -316,7 +334,7 @@ class Exudyn(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Step5(StaticLaw):
+class Step5(TwoLevels):
     """Quintic-step Stribeck friction, of Simbody and of the early Drake.
 
         u = |v| / v_t,   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
@@ -328,36 +346,23 @@ class Step5(StaticLaw):
     Source: Simbody, public source.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at |v| = v_t and 3 v_t",
         confidence="one source",
         checked="simbody/simbody CompliantContactSubsystem.cpp, function stribeck",
         source="Simbody, CompliantContactSubsystem",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_t: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
-    )
-    mu_v: Scalar = param(
-        0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
-    )
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The transition velocity [m/s]."""
-        return self.v_t
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_t: Scalar = fields.V_T(1e-3)
+    mu_v: Scalar = fields.MU_V(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
         return N * (self.mu_d + self.mu_v * speed)
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from math import pi
-from typing import ClassVar, final
+from typing import final
 
 from symfric.foundation.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.curve import Curve, Fall
 from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 
@@ -45,7 +46,7 @@ class QuarterCarGeneral(StaticLaw):
     Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
         confidence="one source",
@@ -55,23 +56,17 @@ class QuarterCarGeneral(StaticLaw):
         load="independent",
     )
 
-    k_s: Scalar = param(28900.0, unit="N/m", role="stiffness", doc="spring stiffness", lower=0.0)
+    k_s: Scalar = fields.STIFFNESS(28900.0, doc="spring stiffness", lower=0.0)
     b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="damper coefficient", lower=0.0)
     theta: Scalar = param(
         pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
     )
     L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
-    F_brk: Scalar = param(193.8, unit="N", role="level", doc="break-away force", lower=0.0)
-    C_e: Scalar = param(180.0, unit="N", role="level", doc="static excess at rest", lower=0.0)
-    e_1: Scalar = param(
-        0.01, unit="m/s", role="velocity scale", doc="velocity of the decay", lower=1e-12
-    )
-    mu: Scalar = param(
-        0.05, unit="1", role="level", doc="friction coefficient of the guide", lower=0.0
-    )
-    sigma_v: Scalar = param(
-        1500.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
-    )
+    F_brk: Scalar = fields.LEVEL(193.8, doc="break-away force")
+    C_e: Scalar = fields.LEVEL(180.0, doc="static excess at rest")
+    e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
+    mu: Scalar = fields.COEFFICIENT(0.05, doc="friction coefficient of the guide")
+    sigma_v: Scalar = fields.SIGMA_2(1500.0)
     v_eps: Scalar = param(
         1e-3, unit="m/s", role="width", width=1, doc="half width of the stick window", lower=1e-12
     )
@@ -87,11 +82,6 @@ class QuarterCarGeneral(StaticLaw):
             Input("x_rel", "m", "position of the wheel minus that of the body", 0.01, 5e-3),
             Input("v_rel", "m/s", "velocity of the wheel minus that of the body", 0.1),
         )
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The half width of the stick window [m/s]."""
-        return self.v_eps
 
     def outside(
         self, speed: Scalar, N: Scalar, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
@@ -144,7 +134,7 @@ class QuarterCarGeneral(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class QuarterCarSimple(StaticLaw):
+class QuarterCarSimple(Curve):
     """Quarter-car friction without the Coulomb term, in newton.
 
         F = C_e exp(-|v|/e_1) sign(v) + sigma_v v
@@ -158,7 +148,7 @@ class QuarterCarSimple(StaticLaw):
     Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
@@ -167,27 +157,11 @@ class QuarterCarSimple(StaticLaw):
         load="independent",
     )
 
-    C_e: Scalar = param(180.0, unit="N", role="level", doc="static level", lower=0.0)
-    e_1: Scalar = param(
-        0.01, unit="m/s", role="velocity scale", doc="velocity of the decay", lower=1e-12
-    )
-    sigma_v: Scalar = param(
-        1500.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
-    )
-    v_eps: Scalar = param(
-        1e-3, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
-    )
+    C_e: Scalar = fields.LEVEL(180.0, doc="static level")
+    e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
+    sigma_v: Scalar = fields.SIGMA_2(1500.0)
+    v_eps: Scalar = fields.V_EPS(1e-3)
 
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s], or that of the decay without smoothing."""
-        return self.e_1 if equals(self.v_eps, 0.0) else self.v_eps
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        return self.C_e * smooth.fall(speed, self.e_1, 1.0) + self.sigma_v * speed
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        dry = self.C_e * smooth.stribeck(v, self.e_1, 1.0, smooth.CORNER * self.v_eps)
-        return dry * smooth.sign(v, self.v_eps) + self.sigma_v * v
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        return self.C_e * fall(v, self.e_1, 1.0) * s + self.sigma_v * v

@@ -1,4 +1,4 @@
-"""The self-tuning law: a sine of an arctangent whose shape factor follows from mu_d / mu_s."""
+"""The magic formula as friction: a sine of an arctangent, and laws that tune its factors."""
 
 from dataclasses import dataclass
 from math import asin as asin_of_float
@@ -6,16 +6,62 @@ from math import atan as atan_of_float
 from math import cos as cos_of_float
 from math import inf, pi
 from math import sin as sin_of_float
-from typing import ClassVar, final
+from typing import final
 
 from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
 from symfric.foundation.parameters import param
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.curve import TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class SelfTuning(StaticLaw):
+class RuiWang(StaticLaw):
+    """Rui-Wang static friction, a reconstruction: the magic formula with constant level.
+
+        y = B v,   phi = (1 - E) y + E atan(y)
+        F = D sin(C atan(phi))
+
+    Recorded of the original are only that it is continuously differentiable in v and knows neither
+    mu_d, nor N, nor a transition velocity, and that `SelfTuning` modifies it and keeps sine and
+    arctangent; the equation is presumed.
+    Limits: `SelfTuning` with D = mu_s N and its C; F -> D sin(C pi/2). `N` has no effect. C <= 1 is
+    monotone, C > 1 has a peak. Creeps under load.
+    Source: reconstruction; the equation of Wang and Rui 2000 is lost and was not read.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St"),
+        smoothness="C∞",
+        confidence="rebuilt",
+        source="after Wang and Rui 2000 (equation lost)",
+        load="independent",
+    )
+
+    D: Scalar = fields.LEVEL(1.5, doc="peak")
+    C: Scalar = fields.SHAPE(1.5, doc="shape factor", lower=0.0, upper=2.0)
+    B: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor")
+    E: Scalar = fields.CURVATURE(0.0)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.D * sin(self.C * pi / 2)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The peak [N]; what a curve without one tends to."""
+        return self.D * sin(smooth.clip(self.C, 0.0, 1.0) * pi / 2)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        y = self.B * v
+        phi = y if equals(self.E, 0.0) else (1 - self.E) * y + self.E * atan(y)
+        return self.D * sin(self.C * atan(phi))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SelfTuning(TwoLevels):
     """Self-tuning friction (Pacejka-like), reconstructed.
 
         y = B v,   phi = (1 - E) y + E atan(y)
@@ -30,40 +76,23 @@ class SelfTuning(StaticLaw):
     bracket with E and the function for B are interpretations.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
         confidence="rebuilt",
         source="after doi 10.1177/14644193231169325 (equations reconstructed)",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(
-        0.15, unit="1", role="level", doc="static friction coefficient", lower=1e-12
-    )
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    B: Scalar = param(
-        1000.0, unit="s/m", role="velocity scale", width=-1, doc="stiffness factor", lower=1e-12
-    )
-    E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
+    mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
+    mu_d: Scalar = fields.MU_D(0.1)
+    B: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor")
+    E: Scalar = fields.CURVATURE(0.0)
 
     @property
     def C(self) -> Scalar:
         """Shape factor [1], between 1 and 2, in closed form."""
         return shape_factor(self.mu_d / self.mu_s)
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity 1/B [m/s]."""
-        return 1 / self.B
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        return self.mu_d * N
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -97,7 +126,7 @@ class SelfTuning(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class BrittleSelfTuning(StaticLaw):
+class BrittleSelfTuning(TwoLevels):
     """Self-tuning friction whose stiffness factor follows from load and brittleness.
 
         B = B_0 + (B_max - B_0) [1 - exp(-(mu_s - mu_d)/difference_ref N/N_ref)]
@@ -111,53 +140,27 @@ class BrittleSelfTuning(StaticLaw):
     formula is lost and this one is a candidate.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
         confidence="rebuilt",
         source="after doi 10.1177/14644193231169325 (equations reconstructed)",
         load="more than proportional below the peak, since B grows",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"), ("B_0", "B_max"))
+    ordered = (("mu_d", "mu_s"), ("B_0", "B_max"))
 
-    mu_s: Scalar = param(
-        0.15, unit="1", role="level", doc="static friction coefficient", lower=1e-12
-    )
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    B_0: Scalar = param(
-        100.0,
-        unit="s/m",
-        role="velocity scale",
-        width=-1,
-        doc="stiffness factor without load",
-        lower=1e-12,
-    )
-    B_max: Scalar = param(
-        1000.0,
-        unit="s/m",
-        role="velocity scale",
-        width=-1,
-        doc="stiffness factor under heavy load",
-        lower=1e-12,
-    )
-    difference_ref: Scalar = param(
-        0.05, unit="1", role="shape", doc="reference of mu_s - mu_d", lower=1e-12
-    )
+    mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
+    mu_d: Scalar = fields.MU_D(0.1)
+    B_0: Scalar = fields.STEEPNESS(100.0, width=-1, doc="stiffness factor without load")
+    B_max: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor under heavy load")
+    difference_ref: Scalar = fields.SHAPE(0.05, doc="reference of mu_s - mu_d", lower=1e-12)
     N_ref: Scalar = param(50.0, unit="N", role="load", doc="reference of the load", lower=1e-12)
-    E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
+    E: Scalar = fields.CURVATURE(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
         """The velocity 1/B_max [m/s]."""
         return 1 / self.B_max
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        return self.mu_d * N
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

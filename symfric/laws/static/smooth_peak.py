@@ -1,17 +1,64 @@
-"""Smooth laws whose static peak is met by construction."""
+"""Smooth laws with a peak or a fall that is no exponential."""
 
 from dataclasses import dataclass
 from math import e, sqrt
-from typing import ClassVar, final
+from typing import final
 
-from symfric.foundation.numeric import Scalar, exp, tanh
+from symfric.foundation.numeric import Scalar, equals, exp, tanh
 from symfric.foundation.parameters import param
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.curve import Curve, Fall, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class SimscapeBreakaway(StaticLaw):
+class BrownMcPhee(TwoLevels):
+    """Brown-McPhee friction.
+
+        x = v / v_t
+        F = N [mu_d tanh(4x) + (mu_s - mu_d) x / (x^2/4 + 3/4)^2] + mu_v v tanh(4 N / N_t)
+
+    Limits: F(v_t) = N (mu_s - 6.7e-4 mu_d), so the static level is met to 0.1 %; the excess over
+    mu_d N falls like 16 (v_t/v)^3; mu_s = mu_d gives mu_d N tanh(4x). Creeps under load. Slope at
+    rest N [4 mu_d + (16/9)(mu_s - mu_d)] / v_t sets the stiffness of the scene.
+    Source: Brown and McPhee, ASME J. Comput. Nonlinear Dynam. 11(5), 2016, 054502.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="two sources",
+        checked="public MATLAB function Friction_B and the code of a railway simulator",
+        source="Brown and McPhee, J. Comput. Nonlinear Dynam. 11(5), 2016",
+    )
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_t: Scalar = fields.V_T(1e-3)
+    mu_v: Scalar = fields.SIGMA_2(0.0)
+    N_t: Scalar = param(1.0, unit="N", role="load", doc="transition normal force", lower=1e-12)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        if equals(self.mu_v, 0.0):
+            return self.mu_d * N
+        return self.mu_d * N + self.mu_v * speed * tanh(4 * N / self.N_t)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        x = v / self.v_t
+        bump = x / (0.25 * (x * x) + 0.75) ** 2
+        dry = self.mu_d * tanh(4 * x) + (self.mu_s - self.mu_d) * bump
+        if equals(self.mu_v, 0.0):
+            return dry * N
+        return dry * N + self.mu_v * v * tanh(4 * N / self.N_t)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SimscapeBreakaway(TwoLevels):
     """Breakaway friction of Simscape's translational and rotational friction blocks.
 
         u = v / (sqrt(2) v_brk)
@@ -23,21 +70,19 @@ class SimscapeBreakaway(StaticLaw):
     Source: documentation of Simscape, four pages.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
         checked="documentation of Simscape, four pages",
         source="documentation of Simscape",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_brk: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", width=1, doc="breakaway velocity", lower=1e-12
-    )
-    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_brk: Scalar = fields.VELOCITY(1e-3, width=1, doc="breakaway velocity")
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -48,10 +93,6 @@ class SimscapeBreakaway(StaticLaw):
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
         return self.mu_d * N + self.sigma_2 * speed
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
-        return self.mu_s * N
-
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         u = v / (sqrt(2) * self.v_brk)
@@ -61,7 +102,7 @@ class SimscapeBreakaway(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Specker(StaticLaw):
+class Specker(TwoLevels):
     """Specker-Buchholz-Dietmayer friction.
 
         F_p = N [mu_s - mu_d tanh(v_sp / v_t)] - sigma_2 v_sp
@@ -72,25 +113,21 @@ class Specker(StaticLaw):
     Source: Specker, Buchholz, Dietmayer 2014 (not read; the correction by sigma_2 is uncertain).
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="unverified",
         checked="v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain",
         source="Specker, Buchholz, Dietmayer 2014",
     )
-    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
-    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_t", "v_sp"),)
+    ordered = (("mu_d", "mu_s"),)
+    strictly_ordered = (("v_t", "v_sp"),)
 
-    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_sp: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", width=1, doc="velocity of the peak", lower=1e-12
-    )
-    v_t: Scalar = param(
-        1e-4, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
-    )
-    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_sp: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
+    v_t: Scalar = fields.V_T(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -100,10 +137,6 @@ class Specker(StaticLaw):
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
         return self.mu_d * N + self.sigma_2 * speed
-
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -127,7 +160,7 @@ class MakkarDixon(StaticLaw):
     Source: Makkar, Dixon, Sawyer, Hu 2005 (not read), as in public code.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
@@ -135,30 +168,14 @@ class MakkarDixon(StaticLaw):
         source="Makkar, Dixon, Sawyer, Hu 2005, as in public code",
         load="independent",
     )
-    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("gamma_3", "gamma_2"),)
+    strictly_ordered = (("gamma_3", "gamma_2"),)
 
-    gamma_1: Scalar = param(0.5, unit="N", role="level", doc="static excess", lower=0.0)
-    gamma_2: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", width=-1, doc="steepness of the rise", lower=1e-12
-    )
-    gamma_3: Scalar = param(
-        1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=1e-12
-    )
-    gamma_4: Scalar = param(1.0, unit="N", role="level", doc="dynamic level", lower=0.0)
-    gamma_5: Scalar = param(
-        1e4,
-        unit="s/m",
-        role="velocity scale",
-        width=-1,
-        doc="steepness of the dynamic part",
-        lower=1e-12,
-    )
-    gamma_6: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The velocity 1/gamma_2 [m/s]."""
-        return 1 / self.gamma_2
+    gamma_1: Scalar = fields.LEVEL(0.5, doc="static excess")
+    gamma_2: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness of the rise")
+    gamma_3: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall")
+    gamma_4: Scalar = fields.LEVEL(1.0, doc="dynamic level")
+    gamma_5: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness of the dynamic part")
+    gamma_6: Scalar = fields.SIGMA_2(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -169,3 +186,78 @@ class MakkarDixon(StaticLaw):
         """Friction force [N]."""
         bump = self.gamma_1 * (tanh(self.gamma_2 * v) - tanh(self.gamma_3 * v))
         return bump + self.gamma_4 * tanh(self.gamma_5 * v) + self.gamma_6 * v
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Lorentzian(Curve):
+    """Lorentzian friction of Hess and Soom.
+
+        F = N [mu_d + (mu_s - mu_d) / (1 + (v/v_s)^2)] sign(v) + sigma_2 v
+
+    sign(v) is smooth over v_eps; the float v_eps = 0 is the original.
+    Limits: halfway between the levels at v = v_s; the excess over mu_d N falls like (v_s/v)^2.
+    Creeps under load.
+    Source: Hess and Soom, ASME J. Tribol. 112, 1990, as cited by Armstrong-Helouvry (not read).
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="one source",
+        checked="g(v) of jchristopherson/friction README with alpha = 2; not the name",
+        source="Hess and Soom 1990",
+    )
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_eps: Scalar = fields.V_EPS(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        u = v / self.v_s
+        mu = self.mu_d + (self.mu_s - self.mu_d) / (1 + u * u)
+        return mu * N * s + self.sigma_2 * v
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PoppStelter(StaticLaw):
+    """Popp-Stelter friction: a hyperbolic fall and a quadratic rise.
+
+        F = N {mu_s [(1 - eta) / (1 + d |v|) + eta] + kappa v^2} sign(v)
+
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
+    Limits: eta mu_s N is the level that the fall tends to. The braces are the coefficient mu(v),
+    so that the quadratic rise is proportional to the load, too. Creeps under load.
+    Source: Popp and Stelter, Phil. Trans. R. Soc. A 332, 1990 (not read).
+    """
+
+    facts = Facts(("D", "S", "St", "V"), "C∞", "unverified", "Popp and Stelter 1990")
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    eta: Scalar = fields.SHAPE(0.5, doc="share that remains", lower=0.0, upper=1.0)
+    d: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall")
+    kappa: Scalar = param(
+        0.0, unit="s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
+    )
+    v_eps: Scalar = fields.V_EPS(1e-4)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        fall = (1 - self.eta) / (1 + smooth.onward(self.d * speed)) + self.eta
+        mu = self.mu_s * fall
+        return N * (mu if equals(self.kappa, 0.0) else mu + self.kappa * speed * speed)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        fall = (1 - self.eta) / (
+            1 + self.d * smooth.magnitude(v, smooth.CORNER * self.v_eps)
+        ) + self.eta
+        mu = self.mu_s * fall
+        if not equals(self.kappa, 0.0):
+            mu += self.kappa * v * v
+        return mu * N * smooth.sign(v, self.v_eps)

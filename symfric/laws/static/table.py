@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -30,7 +29,7 @@ class Table(StaticLaw):
     1984 (harmonic mean of slopes); tables as in Modelica's SupportFriction.
     """
 
-    facts: ClassVar[Facts] = Facts(
+    facts = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C1 at the speeds of the table",
         confidence="two sources",
@@ -40,9 +39,7 @@ class Table(StaticLaw):
 
     speeds: tuple[float, ...]
     coefficients: tuple[float, ...]
-    v_eps: Scalar = param(
-        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
-    )
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -57,11 +54,6 @@ class Table(StaticLaw):
             raise ValueError(f"Table: speeds: expected 0 <= rising numbers, got {self.speeds}")
         if not (mu >= 0).all():
             raise ValueError(f"Table: coefficients: expected numbers >= 0, got {self.coefficients}")
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]."""
-        return self.v_eps
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""

@@ -14,16 +14,23 @@ from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.foundation.parameters import check_names, parameters, with_values
 from symfric.laws import Coulomb, Law, Sum, Viscous
 from symfric.laws.base.law import check_law
-from symfric.multibody.body import GROUND, unphysical
-from symfric.multibody.couplings import Gear
+from symfric.multibody.constraints import Gear
 from symfric.multibody.forces import JointSpringDamper
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.joint import Joint
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
-from symfric.multibody.spatial import Vector
-from symfric.multibody.urdf.bodies import Carried, carried, holding, merged
-from symfric.multibody.urdf.file import Inertial, Urdf, UrdfJoint, parse
+from symfric.multibody.spatial import GROUND, Vector, unphysical
+from symfric.multibody.urdf.file import (
+    Carried,
+    Inertial,
+    Urdf,
+    UrdfJoint,
+    carried,
+    holding,
+    merged,
+    parse,
+)
 from symfric.multibody.urdf.notes import Array
 
 KINDS: dict[str, type[Joint]] = {

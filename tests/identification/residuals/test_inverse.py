@@ -14,7 +14,7 @@ from symfric import LuGre, Stribeck, rabinowicz, simulate
 from symfric.foundation.parameters import with_values
 from symfric.integrator import Linear
 from symfric.scenes.drive import Drive
-from symfric.scenes.four_bar import FourBar
+from symfric.scenes.linkages import FourBar
 
 Array = NDArray[np.float64]
 PLAIN = Filter(60.0, 4)

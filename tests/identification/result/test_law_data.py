@@ -14,7 +14,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param, parameters, with_values
 from symfric.laws import StaticLaw
 from symfric.laws.base.law import Facts
-from symfric.laws.names import law_from_text
+from symfric.laws.catalogue import law_from_text
 from symfric.scenes import Drive
 
 LAWS: list[Law] = [

@@ -12,7 +12,7 @@ from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.laws import Law
 from symfric.multibody import prepare
-from symfric.multibody.cuts import Cuts
+from symfric.multibody.kinematics import Cuts
 
 pytestmark = pytest.mark.heavy
 

@@ -12,7 +12,7 @@ from symfric.multibody import (
     UserForce,
     functions,
 )
-from symfric.multibody.turns import Moved, Turns
+from symfric.multibody.kinematics import Moved, Turns
 
 
 def drill(loop: bool, start: float, stiffness: float = 473.0) -> Mechanism:

@@ -1,7 +1,7 @@
 """Units of multipliers and constraints: their product is an energy."""
 
 from symfric.laws import BrownMcPhee
-from symfric.multibody.units import constraint_units
+from symfric.multibody.results import constraint_units
 from symfric.scenes import FourBar, SliderCrank
 
 

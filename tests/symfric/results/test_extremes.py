@@ -22,8 +22,8 @@ from symfric import (
     simulate,
 )
 from symfric.cli import main
-from symfric.results.extremes import extremes, looks
 from symfric.results.pictures import plot_trajectories
+from symfric.results.quadrature import extremes, looks
 
 AT, WIDTH = 5.1234, 1e-3
 

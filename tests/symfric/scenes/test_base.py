@@ -20,7 +20,7 @@ from symfric import (
     rabinowicz,
 )
 from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene, friction_states
-from symfric.scenes.quarter_car import ANY
+from symfric.scenes.rigs import ANY
 
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
 """Scenes that write their own equations; mechanisms are tested in test_mechanism.py."""

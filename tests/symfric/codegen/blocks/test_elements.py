@@ -19,8 +19,7 @@ from symfric.codegen.writing.routines import routines
 from symfric.codegen.writing.source import source
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS, Asymmetric, Law, LuGre, MaxwellSlip, Sum, Viscous
-from symfric.laws.dynamic.gms import Element
-from symfric.laws.dynamic.maxwell_slip import Slider
+from symfric.laws.dynamic.maxwell_slip import Element, Slider
 
 
 def gms(n: int, share: float = 0.0, **numbers: float) -> GMS:

@@ -21,7 +21,7 @@ from symfric import (
 )
 from symfric.foundation.parameters import with_values
 from symfric.laws import ALL_LAWS, GMS, Bittencourt, Karnopp, Lagged, Table, TemperatureDependent
-from symfric.laws.composed.wrapper import Wrapper
+from symfric.laws.composed.wrap import Wrapper
 
 N = 7.848
 

@@ -1,0 +1,333 @@
+"""Friction with a memory of the time at rest: Gonthier, Armstrong, and rate and state."""
+
+from dataclasses import dataclass
+from typing import final
+
+from symfric.foundation.numeric import (
+    Scalar,
+    asinh,
+    column,
+    equals,
+    exp,
+    expm1,
+    is_number,
+    log,
+    sqrt,
+)
+from symfric.foundation.parameters import option, param
+from symfric.foundation.vector import TINY
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.law import Facts, Law, State, one_sided
+from symfric.laws.dynamic.element import deflection, yielding
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Gonthier(Law):
+    """Gonthier friction with dwell time (two states).
+
+        s        = exp(-(v/v_s)^2),   dir = 3/2 u - 1/2 u^3 for u = v/v_d in [-1, 1], else sign(v)
+        F_C      = N [mu_d + (mu_s - mu_d) s_dw]
+        dz/dt    = s v + (1 - s) [F_C dir - sigma_0 z] / sigma_1
+        ds_dw/dt = (s - s_dw) / tau,  tau = tau_dw while dwelling (s > s_dw), else sigma_1 / sigma_0
+        F        = sat(sigma_0 z + sigma_1 dz/dt, F_C) + sigma_2 v
+
+    s_dw is the memory of the dwell: after a rest of duration t, break-away takes
+    N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) is x up to F_C and bends over to
+    (1 + kappa) F_C. Without it the printed law creeps under any load when v_s is above the
+    creep velocity: its force there is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0 asks
+    for that original. tau changes smoothly over s_eps.
+    Limits: steady state F_C(s(v)) dir + sigma_2 v for v far above v_s; mu_s = mu_d has no dwell
+    effect. Needs v_d < v_s. dz/dt does not vanish in creep (v < v_s), where only sat bounds F.
+    Source: Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004, 209-233; the
+    saturation is added here.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V", "P", "L", "B", "T"),
+        smoothness="C1 (dir at v_d; C2 elsewhere)",
+        confidence="unverified",
+        checked="behaviour checked; the saturation is constructed",
+        source="Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004",
+        load="proportional in steady sliding",
+    )
+    ordered = (("mu_d", "mu_s"),)
+    strictly_ordered = (("v_d", "v_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_d: Scalar = fields.VELOCITY(1e-4, doc="velocity of full direction")
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    sigma_1: Scalar = fields.SIGMA_1(190.0, lower=1e-12)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    tau_dw: Scalar = fields.TIME(0.1, doc="time constant of the dwell")
+    kappa: Scalar = fields.WIDTH(1e-3, doc="rounding of the saturation", lower=0.0, upper=1.0)
+    s_eps: Scalar = fields.WIDTH(1e-3, doc="smoothing of the dwell switch")
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """Bristle deflection and dwell memory."""
+        dwell = State("s_dw", "1", 1.0, even=True, doc="memory of the dwell, 1 after long rest")
+        return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"), dwell)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity of full direction [m/s]."""
+        return self.v_d
+
+    def _sticking(self, v: Scalar) -> Scalar:
+        return exp(-((v / self.v_s) ** 2))
+
+    def _level(self, N: Scalar, s_dw: Scalar) -> Scalar:
+        return N * (self.mu_d + (self.mu_s - self.mu_d) * s_dw)
+
+    def _direction(self, v: Scalar) -> Scalar:
+        u = smooth.clip(v / self.v_d, -1.0, 1.0)
+        return u * (1.5 - 0.5 * u * u)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the deflection [m/s] and of the dwell memory [1/s]."""
+        s, fast = self._sticking(v), self.sigma_1 / self.sigma_0
+        pull = (self._level(N, z[1]) * self._direction(v) - self.sigma_0 * z[0]) / self.sigma_1
+        dwelling = (1 + smooth.sign(s - z[1], self.s_eps)) / 2
+        tau = fast + (self.tau_dw - fast) * dwelling
+        return column(s * v + (1 - s) * pull, (s - z[1]) / tau)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0, in its limit of small v_d."""
+        return self._level(N, self._sticking(speed)) + self.sigma_2 * speed
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        bristle = self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
+        if equals(self.kappa, 0.0):
+            return bristle + self.sigma_2 * v
+        rounding = self.kappa * self._level(N, z[1])
+        return smooth.hold(bristle, self._level(N, z[1]) + rounding, rounding) + self.sigma_2 * v
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Dwell memory s(v), and the deflection at which the force stays.
+
+        dz/dt vanishes at sigma_0 z = F_C dir + sigma_1 v s/(1 - s). In creep that is far beyond
+        the level F_C, at which the saturated force is reached: the deflection stands there, and
+        goes on growing without effect on the force but for kappa F_C.
+        """
+        s, x = self._sticking(v), v / self.v_s
+        F_C = self._level(N, s)
+        creep = self.sigma_1 * self.v_s * s * x / (TINY - expm1(-x * x))
+        z = smooth.clip(F_C * self._direction(v) + creep, -F_C, F_C) / self.sigma_0
+        return column(z, s)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Armstrong(Law):
+    """Armstrong's seven-parameter friction in differential form (three states).
+
+        L     = N { mu_d + [mu_a + (mu_inf - mu_a) q] / [1 + (w/v_s)^2] }
+        xi    : spring of stiffness k_t that yields at L with the sharpness n
+        dw/dt = (v - w) / tau_L
+        dq/dt = rest (1 - q)^2/gamma - (1 - rest) q/tau_r,   rest = exp(-(v/v_e)^2)
+        F     = k_t xi + sigma_2 v
+
+    The seven are k_t, mu_d, sigma_2, mu_inf (excess of the static over the dynamic level after long
+    rest), v_s, tau_L (lag of the Stribeck curve) and gamma (dwell); mu_a is the excess right after
+    slip. The paper switches between a stiction spring k_t x and a sliding law with a pure delay
+    tau_L and a dwell clock; here one spring yields, a filter makes the delay, and
+    q = t/(t + gamma) counts the rest of duration t, forgotten within tau_r of slip.
+    Limits: steady state L(v) sign(v) + sigma_2 v; gamma -> inf, tau_L -> 0, k_t -> inf is the
+    Lorentzian law with the excess mu_a. v_e tells rest from slip; keep it above the creep.
+    Not valid for N = 0.
+    Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, 1083-1138.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V", "P", "L", "T"),
+        smoothness="C∞ (the original is switched)",
+        confidence="unverified",
+        checked="the differential form is constructed",
+        source="Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
+        load="proportional in steady sliding",
+    )
+    ordered = (("mu_a", "mu_inf"),)
+
+    k_t: Scalar = fields.STIFFNESS(1e5, doc="tangential stiffness")
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    mu_inf: Scalar = fields.COEFFICIENT(0.05, doc="static excess after long rest")
+    mu_a: Scalar = fields.COEFFICIENT(0.01, doc="static excess right after slip")
+    v_s: Scalar = fields.V_S(1e-3)
+    tau_L: Scalar = fields.TIME(0.02, doc="lag of the Stribeck curve")
+    gamma: Scalar = fields.TIME(0.2, doc="dwell that recovers half the excess")
+    v_e: Scalar = fields.VELOCITY(1e-4, doc="velocity that ends the rest")
+    tau_r: Scalar = fields.TIME(0.01, doc="time that forgets the rest in slip")
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.R_EPS(1e-8)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """Spring, filtered velocity and dwell."""
+        return (
+            State("xi", "m", 1e-5, doc="stretch of the stiction spring"),
+            State("w", "m/s", 1e-2, doc="velocity that the level follows"),
+            State("q", "1", 1.0, even=True, doc="share of the rest that is remembered"),
+        )
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity that ends the rest [m/s]."""
+        return self.v_e
+
+    def level(self, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
+        """The force L > 0 [N] at which the spring yields."""
+        excess = self.mu_a + (self.mu_inf - self.mu_a) * q
+        return N * (self.mu_d + excess / (1 + (w / self.v_s) ** 2))
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0, above v_e, where no rest is remembered."""
+        return self.level(N, speed, 0.0) + self.sigma_2 * speed
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away after a long rest."""
+        return self.level(N, 0.0, 1.0)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return self.k_t * z[0] + self.sigma_2 * v
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the spring [m/s], the filter [m/s^2] and the dwell [1/s]."""
+        xi, w, q = z[0], z[1], z[2]
+        rest, slip = self._shares(v)
+        share = self.k_t * xi / self.level(N, w, q)
+        return column(
+            yielding(v, share, self.n, self.v_eps, self.r_eps),
+            (v - w) / self.tau_L,
+            rest * (1 - q) ** 2 / self.gamma - slip * q / self.tau_r,
+        )
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Spring at its level, filter at v, dwell in balance of growth and loss."""
+        q = self._balance(v)
+        return column(self._yielded(v, N, v, q), v, q)
+
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
+        """The same with the spring at the level of the filter and the dwell that there are."""
+        return column(self._yielded(v, N, z[1], z[2]), v, self._balance(v))
+
+    def _shares(self, v: Scalar) -> tuple[Scalar, Scalar]:
+        """How much v is rest and how much slip, together 1, each right where it is small."""
+        x = -((v / self.v_e) ** 2)
+        return exp(x), -expm1(x)
+
+    def _balance(self, v: Scalar) -> Scalar:
+        """Where the dwell grows as fast as it is lost.
+
+        The root of what is lost, `slip` gamma, is written with |v|: it has a slope at rest, too.
+        """
+        rest, slip = self._shares(v)
+        grow, lose = rest * self.tau_r, slip * self.gamma
+        of_speed = self.gamma * smooth.phi1(-((v / self.v_e) ** 2))
+        root = smooth.magnitude(v, 0.0) / self.v_e * sqrt(of_speed * (lose + 4 * grow))
+        return 2 * grow / (2 * grow + lose + root)
+
+    def _yielded(self, v: Scalar, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
+        """Stretch of the spring at its level."""
+        return self.level(N, w, q) / self.k_t * smooth.sign(v, self.v_eps)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RateAndState(Law):
+    """Rate-and-state friction (one state), regularised at rest.
+
+        psi = ln(v_0 theta / D_c)
+        F   = N a asinh( v/(2 v_0) exp((mu_0 + b psi)/a) )
+        dpsi/dt = v_0/D_c [exp(-psi) - w/v_0]             evolution = "ageing"
+        dpsi/dt = -w/D_c [ln(w/v_0) + psi]                evolution = "slip"
+
+    theta [s] is the mean age of the contacts and w = sqrt(v^2 + v_eps^2); the age stops growing at
+    D_c/v_eps. For v >> v_0 exp(-mu_0/a) the force is N [mu_0 + a ln(v/v_0) + b psi].
+    Limits: steady state N [mu_0 + (a - b) ln(|v|/v_0)] sign(v): weakening for a < b, unstable on a
+    spring softer than N (b - a)/D_c. A step of the velocity by the factor e raises mu by a, then
+    lowers it by b over a few D_c. Creeps under any load; no pre-sliding. At rest the slope
+    is N a/(2 v_0) exp((mu_0 + b psi)/a): from 1e15 N s/m on, the rounding of velocities in a
+    mechanism hides it, and steps fall without end. Meant for slow slip: at high velocity ratios the
+    logarithm makes mu small or negative where a < b.
+    Source: Dieterich, J. Geophys. Res. 84, 1979; Ruina, J. Geophys. Res. 88, 1983; asinh form:
+    Rice, Ben-Zion, PNAS 93, 1996.
+
+    Raises:
+        ValueError: mu_0/a above 150, or with the oldest contact's above 200: derivatives overflow.
+    """
+
+    facts = Facts(
+        phenomena=("D", "St", "L", "T"),
+        smoothness="C∞",
+        confidence="two sources",
+        checked="jrleeman/rsfmodel and public MATLAB code (inverse hyperbolic sine)",
+        source="Dieterich 1979; Ruina 1983; Rice and Ben-Zion 1996",
+        load="proportional",
+    )
+
+    mu_0: Scalar = fields.COEFFICIENT(0.12, doc="friction coefficient at v_0", lower=1e-12)
+    a: Scalar = fields.COEFFICIENT(0.01, doc="direct effect", lower=1e-6)
+    b: Scalar = fields.COEFFICIENT(0.015, doc="evolution effect")
+    v_0: Scalar = fields.VELOCITY(1e-6, doc="reference velocity", lower=1e-15)
+    D_c: Scalar = fields.LENGTH(1e-5, doc="slip that renews the contacts")
+    v_eps: Scalar = param(
+        1e-12,
+        unit="m/s",
+        role="width",
+        doc="counts as rest; D_c/v_eps is the age of the oldest contact",
+        lower=1e-15,
+    )
+    evolution: str = option("ageing", choices=("ageing", "slip"), doc="Dieterich's or Ruina's law")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not all(map(is_number, (self.mu_0, self.a, self.b, self.v_0, self.v_eps))):
+            return
+        oldest = self.mu_0 + self.b * max(log(self.v_0 / self.v_eps), 0.0)
+        if self.mu_0 > 150 * self.a or oldest > 200 * self.a:
+            raise ValueError(
+                f"RateAndState: expected mu_0 <= 150 a and, of the oldest contact, "
+                f"mu_0 + b ln(v_0/v_eps) <= 200 a, got {self.mu_0:g} and {oldest:g} for "
+                f"a = {self.a:g}; the regularisation would overflow"
+            )
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """Logarithm of the age."""
+        return (State("psi", "1", 1.0, even=True, doc="logarithm of the contacts' age"),)
+
+    def _speed(self, v: Scalar) -> Scalar:
+        return sqrt(v * v + self.v_eps * self.v_eps)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Refused: the steady force follows ln v, and no load is held at rest."""
+        raise one_sided(self, "it creeps under any load, and ln v has no limit at rest")
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        argument = v / (2 * self.v_0) * exp((self.mu_0 + self.b * z[0]) / self.a)
+        return N * self.a * asinh(argument)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rate of psi [1/s], shape (1, 1)."""
+        w = self._speed(v)
+        if self.evolution == "slip":
+            return column(-w / self.D_c * (log(w / self.v_0) + z[0]))
+        return column(self.v_0 / self.D_c * (exp(-z[0]) - w / self.v_0))
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """The psi of steady sliding, shape (1, 1); 0, an age of D_c/v_0, below v_eps.
+
+        A contact at rest has no steady age. The oldest one, D_c/v_eps, is that of months: a body
+        that is let go under more than such a contact holds leaves it within no time that a step
+        could resolve.
+        """
+        moves = smooth.magnitude(v, 0.0) >= self.v_eps
+        return column(smooth.choose(moves, -log(self._speed(v) / self.v_0), 0.0))

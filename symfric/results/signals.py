@@ -1,0 +1,320 @@
+"""Signals of a run: at any time, their extremes, integrals and derivatives."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import check_names
+from symfric.foundation.shown import Showing
+from symfric.foundation.status import Status
+from symfric.foundation.symbols import strays
+from symfric.model import Model
+from symfric.results.quadrature import extremes, integral_between, integrals, looks
+from symfric.results.statistics import Statistics
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Signals(Showing):
+    """Named signals of a simulated model over time; see `Trajectory` for its fields."""
+
+    hidden = Showing.hidden | {
+        "count", "delays", "ends", "evaluate", "express", "pull_back", "states",
+    }  # fmt: skip
+
+    scene: str
+    t: Array
+    units: dict[str, str]
+    status: Status
+    message: str
+    count: Callable[[], Statistics]
+    span: tuple[float, float]
+    ends: Callable[[], Array]
+    states: Callable[[Array], dict[str, Array]]
+    evaluate: Callable[[Array], dict[str, Array]]
+    express: Callable[[ca.SX, Array], Array]
+    model: Model
+    happened: tuple[tuple[float, str], ...] = ()
+    differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
+    pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
+    delays: Callable[[], dict[str, Array]] | None = None
+
+    @property
+    def doubts(self) -> str:
+        """What its tolerances do not vouch for, in sentences; "" where nothing is known."""
+        return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """Steps, evaluations, times."""
+        return self.count()
+
+    @property
+    def step_times(self) -> Array:
+        """Ends of the accepted steps [s], shape (steps + 1,); `at(step_times)` has the signals.
+
+        A run whose steps would take much memory has not kept them, and is run again for them, as it
+        is for values between the times `t`.
+        """
+        return self._ends
+
+    @cached_property
+    def _ends(self) -> Array:
+        return self.ends()
+
+    @cached_property
+    def signals(self) -> dict[str, Array]:
+        """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
+        return self.evaluate(self.t)
+
+    @cached_property
+    def looks(self) -> Array:
+        """Times [s] that show every accepted step, however short, and `t`, shape (k,)."""
+        jumps = np.array([time for time, _ in self.happened], dtype=float)
+        return looks(self.t, self.step_times, jumps)
+
+    @cached_property
+    def _looked(self) -> dict[str, Array]:
+        return self.evaluate(self.looks)
+
+    def at_looks(self, name: str) -> Array:
+        """A signal or detail at `looks`: what pictures show."""
+        self.check([name])
+        if name in self._looked:
+            return self._looked[name]
+        return self.of(self.model.expression(name), self.looks)
+
+    @cached_property
+    def extremes(self) -> dict[str, tuple[float, float]]:
+        """Name -> least and greatest value of a signal over all accepted steps."""
+        found = extremes(self.looks, self._looked, self.evaluate)
+        return {name: (float(low), float(high)) for name, (low, high) in found.items()}
+
+    @cached_property
+    def _own_states(self) -> dict[str, Array]:
+        return self.states(self.t)
+
+    def __getitem__(self, name: str) -> Array:
+        if name == "t":
+            return self.t
+        if not isinstance(name, str) or name not in self.units:  # pyright: ignore[reportUnnecessaryIsInstance]
+            self.check([name])
+            return self._further[name]
+        states = self._own_states
+        return states[name] if name in states else self.signals[name]
+
+    @cached_property
+    def _further(self) -> dict[str, Array]:
+        """All details at `t`; one by one they would cost almost as much each."""
+        column = ca.vertcat(*(o.expression for o in self.model.further.values()), 0)
+        return dict(zip(self.model.further, self.of(column), strict=False))
+
+    @cached_property
+    def details(self) -> dict[str, str]:
+        """Name -> unit of the further results of the model, such as reactions."""
+        return {name: output.unit for name, output in self.model.further.items()}
+
+    def unit(self, name: str) -> str:
+        """The unit of a signal or detail."""
+        return self.units[name] if name in self.units else self.details[name]
+
+    def check(self, names: Iterable[str]) -> None:
+        """Refuse what is neither a signal nor a detail.
+
+        Raises:
+            ValueError: unknown names, with the nearest known one.
+        """
+        where = f"trajectory of '{self.scene}'"
+        names = [checks.text(where, name, "the name of a signal") for name in names]
+        known = self.units if all(n in self.units for n in names) else self.units | self.details
+        check_names(f"trajectory of '{self.scene}'", names, known)
+
+    def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
+        """Values of an expression in the symbols of the model: t, x, z, u, p.
+
+        Args:
+            expression: SX of one element, or a column (rows, 1).
+            times: where [s], shape (n,); `t` if not given.
+
+        Returns:
+            Shape (n,), or (rows, n) for a column.
+
+        Raises:
+            ValueError: a symbol that is none of the model's, a time outside the span.
+        """
+        where = f"trajectory of '{self.scene}': of"
+        column, model = ca.SX(checks.expression(where, expression)), self.model
+        known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
+        stray = strays(column, known)
+        if stray:
+            raise ValueError(
+                f"trajectory of '{self.scene}': expected an expression in the symbols of its "
+                f"model, got {', '.join(stray)}"
+            )
+        values = self.express(ca.vec(column), self.t if times is None else self._inside(times))
+        return values[0] if column.is_scalar() else values
+
+    def at(self, times: ArrayLike) -> dict[str, Array]:
+        """All signals at `times` [s] inside the simulated span, by dense output.
+
+        Raises:
+            ValueError: a time outside the span.
+        """
+        return self.evaluate(self._inside(times))
+
+    def _inside(self, times: ArrayLike) -> Array:
+        where = f"trajectory of '{self.scene}': times"
+        at = np.atleast_1d(checks.array(where, times, ndim=None, what="times [s]"))
+        if at.ndim > 1:
+            raise checks.refused(where, "a time or a sequence of times [s]", times)
+        first, last = self.span
+        if at.size and not (first <= at.min() and at.max() <= last):
+            raise ValueError(
+                f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
+                f"got {at.min():g} ... {at.max():g} s"
+            )
+        return at
+
+    @cached_property
+    def final(self) -> dict[str, float]:
+        """All signals at the last time reached."""
+        return {k: float(v[0]) for k, v in self.evaluate(np.array(self.span[1:])).items()}
+
+    def integral(self, name: str, times: ArrayLike | None = None) -> Array:
+        """Integral of a signal or detail over time from the start, such as energy from power.
+
+        By Gauss quadrature over the dense output of every accepted step, which costs the
+        simulation nothing: `trajectory.integral("friction_power")` is a work [J].
+
+        Args:
+            name: of a signal or detail.
+            times: up to where [s], shape (n,); `t` if not given.
+
+        Raises:
+            ValueError: unknown name, a time outside the span.
+        """
+        self.check([name])
+        at = self.t if times is None else self._inside(times)
+        return integrals(self, self.model.expression(name), at)[0]
+
+    def work(self, force: str, rate: str, between: tuple[float, float] | None = None) -> float:
+        """Integral of a force times a rate over time, such as the work of friction [J].
+
+        Over the dense output, steps halved until quadrature is exact to rounding. A sum over the
+        samples at `t` is off by what happens between them.
+
+        Args:
+            force: a signal or detail.
+            rate: another one, such as a velocity.
+            between: first and last time [s]; the whole span if not given.
+
+        Raises:
+            ValueError: unknown names, times outside the span or not in order.
+        """
+        self.check([force, rate])
+        product = self.model.expression(force) * self.model.expression(rate)
+        return self._integral_between(product, between)
+
+    def area(self, y: str, x: str, between: tuple[float, float] | None = None) -> float:
+        """Integral of y dx along the run: the area below a curve, or in a loop that closes.
+
+        Positive for a loop that is run clockwise in the plane of x and y. Found as `work` is; what
+        the reset of an event does to x at once is left out.
+
+        Args:
+            y: a signal or detail.
+            x: one of the states and time alone, of a model with explicit equations.
+            between: first and last time [s]; the whole span if not given.
+
+        Raises:
+            ValueError: unknown names, an x whose rate the equations do not give, times outside the
+                span or not in order.
+        """
+        self.check([y, x])
+        model, signal = self.model, ca.SX(self.model.expression(x))
+        free = ca.vertcat(model.vector("z"), model.vector("u"))
+        if model.ode is None or ca.depends_on(signal, free):
+            raise ValueError(
+                f"trajectory of '{self.scene}': area: expected an x of the states and time of "
+                f"explicit equations, got '{x}'; work(y, rate) takes its rate, where it is a signal"
+            )
+        rate = ca.jacobian(signal, model.vector("x")) @ model.ode + ca.jacobian(signal, model.t)
+        return self._integral_between(model.expression(y) * rate, between)
+
+    def _integral_between(self, expression: ca.SX, times: tuple[float, float] | None) -> float:
+        a, b = self.span if times is None else self._inside(times).tolist()
+        if not a <= b:
+            raise ValueError(
+                f"trajectory of '{self.scene}': between: expected a first and a later time [s], "
+                f"got {a:g} and {b:g} s"
+            )
+        return integral_between(self, expression, a, b)
+
+    @cached_property
+    def sensitivities(self) -> dict[str, dict[str, Array]]:
+        """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
+
+        They jump where an event moves with the name; at its time they are those behind it.
+
+        Raises:
+            ValueError: none were asked for, or an event has none: its expression only touches
+                zero, it comes with a jump of an input, or with an event whose order matters.
+        """
+        if self.differentiate is None:
+            raise self._without_derivatives
+        return self.differentiate(self.t)
+
+    @cached_property
+    def event_sensitivities(self) -> dict[str, Array]:
+        """Derivatives of the times of `happened`: name -> [s per unit], shape (events,).
+
+        That of a terminal event is the derivative of the end time. Refused as `sensitivities` is.
+        """
+        if self.delays is None:
+            raise self._without_derivatives
+        return self.delays()
+
+    def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
+        """Derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
+
+        One sweep backwards over the steps, at a cost that does not grow with the number of names
+        given to `simulate`. For a cost J of the signals at `t`, the weights are dJ/ds(t_i).
+
+        Args:
+            weights: signal -> a number for every time of `t`, or one for all.
+
+        Returns:
+            Name as given to `simulate` -> derivative.
+
+        Raises:
+            ValueError: no sensitivities were asked for, an unknown signal, another length.
+        """
+        if self.pull_back is None:
+            raise self._without_derivatives
+        where = f"trajectory of '{self.scene}'"
+        named = checks.named(f"{where}: gradient", weights, self.units)
+        given = {
+            name: checks.array(f"{where}: gradient: {name}", w, ndim=None)
+            for name, w in named.items()
+        }
+        odd = {name: w.shape for name, w in given.items() if w.shape not in ((), self.t.shape)}
+        if odd:
+            raise ValueError(
+                f"{where}: gradient: expected numbers or arrays of {self.t.size} weights, got "
+                + ", ".join(f"{name} of shape {shape}" for name, shape in odd.items())
+            )
+        return self.pull_back({n: np.broadcast_to(w, self.t.shape) for n, w in given.items()})
+
+    @property
+    def _without_derivatives(self) -> ValueError:
+        return ValueError(
+            f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
+            "simulate(..., sensitivities=[...])"
+        )

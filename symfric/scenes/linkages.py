@@ -1,0 +1,224 @@
+"""Plane linkages with friction in their hinges: pendulums, one on a box, and a four-bar."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import Any, ClassVar, final
+
+from symfric.foundation.numeric import Scalar, atan, cos, equals, sin
+from symfric.foundation.parameters import param
+from symfric.laws import Law
+from symfric.multibody import JointFriction, Mechanism, PlanarRevolute, Prismatic, Revolute
+from symfric.scenes import fields, jing_mi
+from symfric.scenes.base import other_law
+from symfric.scenes.mechanism import MechanismScene, reach
+from symfric.scenes.presets import Preset
+
+HINGE = (0.0, -1.0, 0.0)
+"""Axis of a hinge: angles turn x towards z, against the clock as seen on the page."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Pendulum(MechanismScene):
+    """A rod on a hinge with friction.
+
+        (J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N)
+
+    phi is the angle from hanging; N is the size of the bearing force, weight and centrifugal force
+    together. Defaults: a rod of 1 kg and 1 m.
+    """
+
+    t_end: ClassVar[float] = 10.0
+
+    m: Scalar = fields.MASS(1.0, doc="mass")
+    L: Scalar = fields.SIZE(0.5, doc="distance of hinge and centre of mass")
+    J: Scalar = fields.INERTIA(1 / 12, doc="inertia about the centre")
+    R: Scalar = fields.SIZE(0.02, doc="radius of the bearing")
+    phi_0: Scalar = fields.ANGLE(1.0, doc="angle at the start")
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def mechanism(self) -> Mechanism:
+        """One body, one hinge."""
+        m = Mechanism("pendulum", gravity=(0.0, 0.0, -self.g))
+        m.body("rod", self.m, (self.J, self.J, self.J))
+        m.frame("ground.hinge", z=HINGE, x=(0.0, 0.0, -1.0))
+        m.frame("rod.hinge", at=(0.0, 0.0, self.L), z=HINGE, x=(0.0, 0.0, -1.0))
+        friction = JointFriction(self.law, radius=self.R)
+        m.joint(Revolute("phi", "ground.hinge", "rod.hinge", start=self.phi_0, friction=friction))
+        return m
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class DoublePendulum(MechanismScene):
+    """Two equal rods, the second one hinged to the end of the first, with friction in both hinges.
+
+    phi_1 is the angle of the first rod from hanging, phi_2 that of the second from the first. Its
+    motion is chaotic: small tolerances show the same path for a few seconds only.
+    """
+
+    t_end: ClassVar[float] = 5.0
+
+    lower: Law | None = other_law("hinge phi_2 between the rods; `law` without")
+    m: Scalar = fields.MASS(1.0, doc="mass of each rod")
+    L: Scalar = fields.SIZE(1.0, doc="length of each rod")
+    R: Scalar = fields.SIZE(0.02, doc="radius of the bearings")
+    phi_0: Scalar = fields.ANGLE(2.0, doc="angle of the straight pendulum at the start")
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def mechanism(self) -> Mechanism:
+        """Two bodies in a chain."""
+        m = Mechanism("double_pendulum", gravity=(0.0, 0.0, -self.g))
+        J = self.m * self.L * self.L / 12
+        down = (0.0, 0.0, -1.0)
+        m.frame("ground.hinge", z=HINGE, x=down)
+        for body in ("upper", "lower"):
+            m.body(body, self.m, (J, J, J))
+            m.frame(f"{body}.top", at=(0.0, 0.0, self.L / 2), z=HINGE, x=down)
+            m.frame(f"{body}.end", at=(0.0, 0.0, -self.L / 2), z=HINGE, x=down)
+        upper, lower = (JointFriction(of, radius=self.R) for of in (self.law, self.law_of("lower")))
+        m.joint(Revolute("phi_1", "ground.hinge", "upper.top", start=self.phi_0, friction=upper))
+        m.joint(Revolute("phi_2", "upper.end", "lower.top", friction=lower))
+        return m
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PendulumBox(MechanismScene):
+    """A box on rough ground and a pendulum on it, friction under the box and in the hinge.
+
+    x is the position of the box, phi the angle of the pendulum from hanging; the normal force
+    under the box is the whole vertical reaction, that of the hinge the size of its reaction.
+    `hinge` is the law of the hinge, with its own parameters (endings _1 and _2 where box and hinge
+    share a name); without it the hinge has the law of the box.
+
+    Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 6 and 7 (box 6 kg,
+    pendulum 20 kg on 0.3 m, from 30 degrees), with a point mass. Its 1.8 kg m^2 are m L^2, so that
+    they may be the inertia of that about the hinge; the preset has them about the mass, where the
+    standard deviation of positions at equal times is that of its table 8. The text does not decide.
+    No radius of the hinge is given; 0.01 m here.
+    Limits: the ground does not pull: while N > 0 the box does not lift off, which is not checked.
+    """
+
+    t_end: ClassVar[float] = 15.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "jing_mi_table_7": Preset(
+            "box and pendulum of table 6, every law with its own numbers in floor and hinge; its "
+            "1.8 kg m^2 are about the mass (the text does not say where), and the radius of the "
+            "hinge, over which those of the hinge act, is not given: 0.01 m here",
+            jing_mi.SOURCE + "6 and 7",
+            {"m_box": 6.0, "m": 20.0, "L": 0.3, "J": 1.8, "R": 0.01, "phi_0": pi / 6, "g": 9.81},
+            {"law": jing_mi.BOX, "hinge": jing_mi.HINGE},
+        )
+    }
+
+    hinge: Law | None = other_law("hinge of the pendulum; the law of the box without")
+    m_box: Scalar = fields.MASS(6.0, doc="mass of the box")
+    m: Scalar = fields.MASS(20.0, doc="mass of the pendulum")
+    L: Scalar = fields.SIZE(0.3, doc="distance of hinge and mass")
+    J: Scalar = fields.INERTIA(1e-9, doc="inertia about the mass")
+    R: Scalar = fields.SIZE(0.01, doc="radius of the hinge")
+    phi_0: Scalar = fields.ANGLE(pi / 6, doc="angle at the start")
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def mechanism(self) -> Mechanism:
+        """Two bodies, a slide and a hinge."""
+        m = Mechanism("pendulum_box", gravity=(0.0, 0.0, -self.g))
+        along, down = (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)
+        m.body("box", self.m_box, (0.1, 0.1, 0.1))
+        m.body("pendulum", self.m, (self.J, self.J, self.J))
+        m.frame("ground.floor", z=along, x=(0.0, 0.0, 1.0))
+        m.frame("box.floor", z=along, x=(0.0, 0.0, 1.0))
+        m.frame("box.hinge", at=(0.0, 0.0, 0.4), z=HINGE, x=down)
+        m.frame("pendulum.hinge", at=(0.0, 0.0, self.L), z=HINGE, x=down)
+        floor = JointFriction(self.law)
+        bearing = JointFriction(self.law_of("hinge"), radius=self.R)
+        m.joint(Prismatic("x", "ground.floor", "box.floor", friction=floor))
+        m.joint(Revolute("phi", "box.hinge", "pendulum.hinge", start=self.phi_0, friction=bearing))
+        return m
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FourBar(MechanismScene):
+    """Crank, coupler and rocker between two hinges of the ground, friction in the hinges.
+
+    crank and rocker are angles against x, coupler the angle of the coupler against the crank. The
+    fourth hinge, between coupler and rocker, closes the loop as a `PlanarRevolute`: a `Revolute`
+    would fix what the plane fixes already, and leave the reactions out of the plane open. `pin` is
+    the law of its friction; without it it has none. Laws of other places have their own parameters,
+    with the endings _1, _2, ... where they share a name.
+
+    Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
+    """
+
+    t_end: ClassVar[float] = 3.0
+
+    hinge_coupler: Law | None = other_law("hinge between crank and coupler; `law` without")
+    hinge_rocker: Law | None = other_law("hinge of the rocker at the ground; `law` without")
+    pin: Law | None = other_law("pin between coupler and rocker; without friction where not given")
+    crank: Scalar = fields.SIZE(0.1, doc="length of the crank")
+    coupler: Scalar = fields.SIZE(0.35, doc="length of the coupler")
+    rocker: Scalar = fields.SIZE(0.3, doc="length of the rocker")
+    base: Scalar = fields.SIZE(0.4, doc="distance of the fixed hinges")
+    density: Scalar = param(
+        2.0, unit="kg/m", role="mass", doc="mass of the links per length", lower=1e-12
+    )
+    R: Scalar = fields.SIZE(0.01, doc="radius of the hinges")
+    angle: Scalar = fields.ANGLE(1.0, doc="angle of the crank at the start")
+    omega: Scalar = fields.TURN(10.0, doc="angular velocity of the crank at the start")
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def closed(self) -> tuple[Any, ...]:
+        """Angles of crank, coupler and rocker against x at the start, and their rates."""
+        theta = self.angle
+        x, z = self.base - self.crank * cos(theta), -self.crank * sin(theta)
+        square = x * x + z * z
+        if equals(square, 0.0):
+            raise ValueError("FourBar: expected a crank whose end is not on the far hinge")
+        # the pin lies above the line from the crank's end to the far hinge
+        along = (square + self.coupler * self.coupler - self.rocker * self.rocker) / (2 * square)
+        across = reach(
+            "FourBar", self.coupler * self.coupler / square - along * along,
+            "coupler and rocker that meet, not in line,",
+        )  # fmt: skip
+        px, pz = along * x - across * z, along * z + across * x
+        beta = 2 * atan(pz / (px + self.coupler))
+        qx, qz = px - x, pz - z
+        gamma = 2 * atan(qz / (qx + self.rocker))
+        # crank' + coupler' - rocker' = 0 as velocities of the pin
+        turn = self.crank * self.omega / sin(gamma - beta)
+        return (
+            beta,
+            gamma,
+            -turn * sin(gamma - theta) / self.coupler,
+            turn * sin(theta - beta) / self.rocker,
+        )
+
+    def mechanism(self) -> Mechanism:
+        """Three bodies, three hinges, a pin that closes the loop."""
+        m = Mechanism("four_bar", gravity=(0.0, 0.0, -self.g))
+        lengths = {"crank": self.crank, "coupler": self.coupler, "rocker": self.rocker}
+        m.frame("ground.left", z=HINGE, x=(1.0, 0.0, 0.0))
+        m.frame("ground.right", at=(self.base, 0.0, 0.0), z=HINGE, x=(1.0, 0.0, 0.0))
+        for name, length in lengths.items():
+            mass = self.density * length
+            J = mass * length * length / 12
+            m.body(f"{name}_rod", mass, (J, J, J), com=(length / 2, 0.0, 0.0))
+            m.frame(f"{name}_rod.near", z=HINGE, x=(1.0, 0.0, 0.0))
+            m.frame(f"{name}_rod.far", at=(length, 0.0, 0.0), z=HINGE, x=(1.0, 0.0, 0.0))
+        beta, gamma, beta_rate, gamma_rate = self.closed()
+        hinges = (
+            ("theta_crank", "ground.left", "crank_rod.near", self.angle, self.omega, self.law),
+            ("theta_coupler", "crank_rod.far", "coupler_rod.near",
+             beta - self.angle, beta_rate - self.omega, self.law_of("hinge_coupler")),
+            ("theta_rocker", "ground.right", "rocker_rod.near", gamma, gamma_rate,
+             self.law_of("hinge_rocker")),
+        )  # fmt: skip
+        for name, parent, child, start, rate, law in hinges:
+            friction = JointFriction(law, radius=self.R)
+            m.joint(Revolute(name, parent, child, start, rate, friction))
+        closing = None if self.pin is None else JointFriction(self.pin, radius=self.R)
+        m.joint(PlanarRevolute("pin", "rocker_rod.far", "coupler_rod.far", friction=closing))
+        return m

@@ -1,0 +1,309 @@
+"""Machines that turn: a clutch, a drill string, and the rollers of a laminator nip."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import pi
+from typing import ClassVar, final
+
+import casadi as ca
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar, equals
+from symfric.foundation.parameters import Variable, param
+from symfric.foundation.symbols import symbols_of
+from symfric.laws import Benson, LuGre, Stribeck, Tustin
+from symfric.laws.base import smooth
+from symfric.model import Model, Output, Variables
+from symfric.model.sketch import Sketch
+from symfric.scenes import fields
+from symfric.scenes.base import GivenInput, Scene, contact, structure
+from symfric.scenes.drawn import Block, drawn
+from symfric.scenes.presets import Numbers, Preset
+
+
+def closing(t: ca.SX) -> ca.SX:
+    """From 0 to 4 bar within 0.1 s, then held."""
+    return 4e5 * smooth.clip(t / 0.1, 0.0, 1.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Clutch(Scene):
+    """Engine and load on both sides of plates that are pressed together.
+
+        J_1 w_1' = T_1 - T,   J_2 w_2' = T - T_2,   T = n R F(v, N)
+        v = R (w_1 - w_2),   N = N_0 + max(pressure A, 0),   heat' = T (w_1 - w_2)
+
+    R is the radius at which the plates act, n the number of faces that rub, each under N. The
+    input is the pressure of the piston [Pa]; below zero the plates are apart. The motion is
+    computed in w_2 and the slip w_1 - w_2, whose rest is exact. Coulomb friction at full pressure
+    from t = 0 locks after w / a, and takes T w^2 / (2 a), with w the slip at the start and
+    a = T (1/J_1 + 1/J_2) - T_1/J_1 - T_2/J_2.
+
+    Defaults: made up, of a car of 1.2 t in first gear (J_2 and T_2 at the gearbox) with laws of
+    mu_d = 0.1: 200 N m at 4 bar.
+    Limits: N_0, the drag of the open clutch, keeps the load of laws that divide by it above zero.
+    """
+
+    t_end: ClassVar[float] = 0.6
+    inputs: ClassVar[Mapping[str, GivenInput]] = {
+        "pressure": GivenInput("4e5 min(t / 0.1, 1)", closing),
+    }
+
+    J_1: Scalar = fields.INERTIA(0.2, doc="inertia of the engine")
+    J_2: Scalar = fields.INERTIA(0.64, doc="inertia of the load")
+    T_1: Scalar = param(100.0, unit="N m", role="offset", doc="torque of the engine")
+    T_2: Scalar = param(20.0, unit="N m", role="offset", doc="torque that the load takes")
+    n: Scalar = param(2.0, unit="1", role="geometry", doc="faces that rub", lower=1e-12)
+    R: Scalar = fields.SIZE(0.1, doc="radius of the plates")
+    A: Scalar = param(
+        0.008 * pi, unit="m^2", role="geometry", doc="area of the piston", lower=1e-12
+    )
+    N_0: Scalar = fields.LOAD(1.0, doc="load of the open clutch")
+    omega_1: Scalar = fields.TURN(150.0, doc="w_1 at the start")
+    omega_2: Scalar = fields.TURN(0.0, doc="w_2 at the start")
+
+    def equations(self, p: Variables) -> Model:
+        """States w_rel, w_2, heat and those of the law; input pressure; torque, friction."""
+        w_rel = Variable(
+            "w_rel", "rad/s", start=self.omega_1 - self.omega_2, nominal=10.0, doc="w_1 - w_2"
+        )
+        w_2 = Variable("w_2", "rad/s", start=self.omega_2, nominal=10.0, doc="speed of the load")
+        heat = Variable("heat", "J", nominal=1e3, doc="energy lost in the plates")
+        pressure = Variable("pressure", "Pa", nominal=1e5, doc="pressure of the piston")
+        N = self.N_0 + smooth.positive(pressure.symbol * self.A, 0.0)
+        both = 1 / self.J_1 + 1 / self.J_2
+        pull = (self.T_1 / self.J_1 + self.T_2 / self.J_2) / (self.n * self.R * both)
+        v = self.R * w_rel.symbol
+        plates = contact(
+            "plates", self.law, v, N, rest={"w_rel": 0.0}, least=self.N_0, F_e=ca.SX(pull)
+        )
+        T = self.n * self.R * plates.force
+        return Model(
+            name="clutch",
+            x=(w_rel, w_2, heat),
+            u=(pressure,),
+            p=p,
+            ode=ca.vertcat(
+                self.T_1 / self.J_1 + self.T_2 / self.J_2 - T * both,
+                (T - self.T_2) / self.J_2,
+                T * w_rel.symbol,
+            ),
+            contacts=(plates,),
+            outputs={
+                "w_1": Output(w_2.symbol + w_rel.symbol, "rad/s", "speed of the engine"),
+                "torque": Output(T, "N m", "torque of the clutch"),
+                "v_rel": Output(v, "m/s", "sliding velocity at the radius R"),
+                "N": Output(N, "N", "normal force of the plates"),
+                "friction": Output(plates.force, "N", "friction force of a face, opposing v_rel"),
+                "power": Output(T * w_rel.symbol, "W", "power taken by friction"),
+            },
+        )
+
+
+def slow(t: ca.SX) -> ca.SX:
+    """0.3 rad/s: slower than is drilled, as default laws grip less than rock."""
+    return ca.SX(0.3)
+
+
+FALL = {"v_s": 0.155575 / 0.9}
+"""Velocity [m/s] over which friction at the bit falls by 1/e in the paper's numbers."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class DrillString(Scene):
+    """A string of inertias under a top drive whose speed is given, friction at the bit.
+
+        twist_i' = w_(i-1) - w_i,   w_0 = w_top
+        t_i = n k twist_i + n c (w_(i-1) - w_i)
+        J_i w_i' = t_i - t_(i+1),   at the bit t_(n+1) = R F(R w_n, N) + c_b w_n
+
+    w_top is the input [rad/s], k and c the stiffness and the damping of the whole string, n =
+    lumps; the lumps of the string have J_string/n, the bit has J_bit and half a lump more. N is the
+    weight on the bit, R the radius at which the law acts. The states are the twists of the n
+    pieces, not angles, so a thousand turns cost no digit; `phi` is the angle of the bit.
+
+    Defaults: Navarro-Lopez and Cortes (J_bit, k, c, c_b, R, N); four lumps and J_string, that of
+    1.1 km of 5 inch pipe of this stiffness, are ours. Rock has coefficients of 0.5 to 0.8, see the
+    preset, with which the bit sticks up to 4 rad/s; with those of default laws it takes the slow
+    default input.
+    Limits: torsion only: no axial motion, no cutting of the rock; the top drive is stiff.
+    Source: Navarro-Lopez and Cortes, J. Sound Vib. 307, 2007, 152-171 (as quoted; there the top is
+    an inertia driven by a torque).
+    """
+
+    t_end: ClassVar[float] = 60.0
+    inputs: ClassVar[Mapping[str, GivenInput]] = {"w_top": GivenInput("0.3", slow)}
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "navarro_lopez": Preset(
+            "one inertia below a stiff top; their law falls as exp(-0.9 |w| / (1 rad/s)), which is "
+            "Stribeck's with delta = 1 at v_s = R / 0.9",
+            "Navarro-Lopez and Cortes, J. Sound Vib. 307, 2007, as quoted",
+            {"J_bit": 471.9698, "J_string": 0.0, "k": 861.5336, "c": 172.3067, "c_b": 50.0}
+            | {"R": 0.155575, "N": 97347.0, "lumps": 1},
+            {
+                "law": Numbers(
+                    {"mu_s": 0.8, "mu_d": 0.5, "sigma_2": 0.0},
+                    {
+                        Stribeck: FALL | {"delta": 1.0},
+                        LuGre: FALL | {"delta": 1.0},
+                        Tustin: FALL,
+                        Benson: {"d_c": 0.9 / 0.155575},
+                    },
+                )
+            },
+        )
+    }
+
+    lumps: int = structure(4, "inertias into which the string is divided")
+    J_bit: Scalar = fields.INERTIA(471.9698, doc="inertia of bit and collars")
+    J_string: Scalar = fields.INERTIA(100.0, doc="inertia of the string", lower=0.0)
+    k: Scalar = fields.SHAFT(861.5336, doc="stiffness of the string", lower=1e-12)
+    c: Scalar = fields.DRAG(172.3067, doc="damping of the string")
+    c_b: Scalar = fields.DRAG(50.0, doc="drag of the mud at the bit")
+    R: Scalar = fields.SIZE(0.155575, doc="radius of the bit")
+    N: Scalar = fields.LOAD(97347.0, doc="weight on the bit")
+
+    def __post_init__(self) -> None:
+        checks.count("DrillString: lumps", self.lumps, least=1)
+        super().__post_init__()
+        if self.lumps > 1 and equals(self.J_string, 0.0):
+            raise ValueError(
+                f"DrillString: J_string: expected above 0 kg m^2 with lumps = {self.lumps}, got 0; "
+                "lumps = 1 is a string without inertia"
+            )
+
+    def equations(self, p: Variables) -> Model:
+        """States twist_i, w_i, phi and those of the law; input w_top; torques and friction."""
+        n = self.lumps
+        top = Variable("w_top", "rad/s", nominal=10.0, doc="speed of the top drive")
+        twists = tuple(
+            Variable(f"twist_{i}", "rad", nominal=1.0, doc=f"twist of piece {i}, from the top")
+            for i in range(1, n + 1)
+        )
+        speeds = tuple(
+            Variable(f"w_{i}", "rad/s", nominal=1.0, doc=f"speed of lump {i}") for i in range(1, n)
+        )
+        bit = Variable("w_bit", "rad/s", nominal=1.0, doc="speed of the bit")
+        phi = Variable("phi", "rad", nominal=10.0, doc="angle of the bit")
+        turning = symbols_of((top, *speeds, bit))
+        twisting = turning[:-1] - turning[1:]
+        torques = n * (self.k * symbols_of(twists) + self.c * twisting)
+        at_bit = torques[n - 1] - self.c_b * bit.symbol
+        v = self.R * bit.symbol
+        rock = contact("rock", self.law, v, self.N, rest={"w_bit": 0.0}, F_e=at_bit / self.R)
+        J = self.J_string / n
+        between = [(torques[i] - torques[i + 1]) / J for i in range(n - 1)]
+        last = (at_bit - self.R * rock.force) / (self.J_bit + J / 2)
+        return Model(
+            name="drill_string",
+            x=(*twists, *speeds, bit, phi),
+            u=(top,),
+            p=p,
+            ode=ca.vertcat(twisting, *between, last, bit.symbol),
+            contacts=(rock,),
+            outputs={
+                "torque_top": Output(torques[0], "N m", "torque of the top drive"),
+                "torque_bit": Output(self.R * rock.force, "N m", "torque of the rock on the bit"),
+                "v_rel": Output(v, "m/s", "sliding velocity at the radius of the bit"),
+                "friction": Output(rock.force, "N", "friction force opposing v_rel"),
+                "power": Output(rock.force * v, "W", "power taken by the rock"),
+            },
+            sketch=partial(self._sketch, phi.symbol, symbols_of(twists)),
+        )
+
+    def _sketch(self, phi: ca.SX, twists: ca.SX) -> Sketch:
+        """Hands of bit and top drive, seen from above; the angle between them is the twist."""
+        hands = {"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)}
+        return drawn({}, hands=hands, hub=Block(0.0, 0.0, "", "v_rel", self.law))
+
+
+def machine_start(t: ca.SX) -> ca.SX:
+    """The line accelerates to 0.5 m/s within 4 s."""
+    return 0.5 * smooth.clip(t / 4, 0.0, 1.0)
+
+
+def pressing(t: ca.SX) -> ca.SX:
+    """500 N, 5 % more and less with every turn of an eccentric roller at full speed."""
+    return 500 + 25 * ca.sin(5 * t)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Nip(Scene):
+    """Carton between a steel chill roll, which carries it, and a rubber roller that lags behind.
+
+        J w' = R F(v, N) + k twist + d (w_0 - w),   twist' = w_0 - w
+        v = v_line - R w,   w_0 = (1 - lag) v_line / R,   N = N_0 + max(load, 0)
+        tau v_line' = v_set - v_line
+
+    The web has the speed v_line of the line, which follows the input v_set, and slips by v over the
+    nip roller, whose drive turns by `lag` slower, 1 to 2 % in practice. Friction drags the roller
+    forward against its shaft (stiffness k, damping d), as the belt does the block of `Rabinowicz`:
+    where the curve falls, the slip swings. The input `load` [N] presses the roller; below zero the
+    nip is open. The contact is taken as flat under even pressure, friction as the law makes it of
+    the load. -F is what the web feels, the step of its tension across the nip.
+
+    Defaults: slip and its range of at most 650 mm/min from the thesis; it has no numbers of the
+    machine: roller, shaft and load are made up. Its measured laws are presets of `Prescribed`.
+    Limits: where friction falls, even slip and stick-slip are both motions of one nip, and start
+    and law decide between them: under the defaults dry friction that was at rest swings for ever,
+    the soft bristles of `LuGre` (1e5 N/m) find even slip. The web does not slip on the chill roll
+    and does not stretch; no edge effects of the cylinder.
+    Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 2.9.
+    """
+
+    t_end: ClassVar[float] = 8.0
+    inputs: ClassVar[Mapping[str, GivenInput]] = {
+        "v_set": GivenInput("0.5 min(t / 4, 1)", machine_start),
+        "load": GivenInput("500 + 25 sin(5 t)", pressing),
+    }
+
+    J: Scalar = fields.INERTIA(0.2, doc="inertia of the roller")
+    R: Scalar = fields.SIZE(0.1, doc="radius of the roller")
+    k: Scalar = fields.SHAFT(200.0, doc="stiffness of its shaft")
+    d: Scalar = fields.DRAG(0.5, doc="damping of its shaft")
+    tau: Scalar = param(
+        0.1, unit="s", role="time", doc="time constant of the line's drive", lower=1e-9
+    )
+    lag: Scalar = param(
+        0.015,
+        unit="1",
+        role="motion",
+        doc="share by which its drive lags",
+        lower=0.0,
+        upper=1.0,
+    )
+    N_0: Scalar = fields.LOAD(1.0, doc="load of the open nip")
+
+    def equations(self, p: Variables) -> Model:
+        """States v_line, v_rel, twist and those of the law; inputs v_set, load; friction."""
+        twist = Variable("twist", "rad", nominal=0.01, doc="twist of the shaft")
+        v_rel = Variable("v_rel", "m/s", nominal=0.01, doc="slip of the web over the nip roller")
+        line = Variable("v_line", "m/s", nominal=0.1, doc="speed of the web")
+        target = Variable("v_set", "m/s", nominal=0.1, doc="speed that the line is set to")
+        load = Variable("load", "N", nominal=100.0, doc="force that presses the nip roller")
+        N = self.N_0 + smooth.positive(load.symbol, 0.0)
+        v, twisting = v_rel.symbol, (v_rel.symbol - self.lag * line.symbol) / self.R
+        shaft = self.k * twist.symbol + self.d * twisting
+        gain = (target.symbol - line.symbol) / self.tau
+        mass = self.J / (self.R * self.R)
+        pull = mass * gain - shaft / self.R
+        web = contact("web", self.law, v, N, rest={"v_rel": 0.0}, least=self.N_0, F_e=pull)
+        return Model(
+            name="nip",
+            x=(line, v_rel, twist),
+            u=(target, load),
+            p=p,
+            ode=ca.vertcat(gain, (pull - web.force) / mass, twisting),
+            contacts=(web,),
+            outputs={
+                "w_roller": Output((line.symbol - v) / self.R, "rad/s", "speed of the nip roller"),
+                "N": Output(N, "N", "normal force of the nip"),
+                "torque": Output(shaft, "N m", "torque of the shaft on the roller"),
+                "friction": Output(web.force, "N", "friction force on the roller, along v_rel"),
+                "power": Output(web.force * v, "W", "power taken by friction"),
+            },
+        )

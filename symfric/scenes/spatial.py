@@ -1,0 +1,183 @@
+"""Spatial mechanisms: an arm of six joints, four sliders, and a robot from a URDF file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, final
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import param
+from symfric.laws import BrownMcPhee, Law
+from symfric.laws.base.law import check_law
+from symfric.multibody import (
+    Distance,
+    JointFriction,
+    JointSpringDamper,
+    Mechanism,
+    Prismatic,
+    Revolute,
+    SpringDamper,
+)
+from symfric.multibody.urdf.read import read_urdf
+from symfric.scenes import fields
+from symfric.scenes.base import other_law
+from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.presets import Numbers, Preset
+
+UP, SIDE, OUT = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
+AXES = (UP, SIDE, SIDE, OUT, SIDE, OUT)
+"""Axes of the joints while all angles are zero and the arm reaches along x."""
+LENGTHS = (0.0, 0.4, 0.35, 0.1, 0.1, 0.08)
+MASSES = (8.0, 6.0, 4.0, 1.5, 1.0, 0.4)
+STARTS = (0.3, -0.8, 1.2, 0.4, -0.6, 0.2)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Arm(MechanismScene):
+    """Six revolute joints: base, shoulder, elbow and three of the wrist, with a torque in each.
+
+    q1 ... q6 are the joint angles, tau1 ... tau6 the inputs [N m]. The bearing of every joint
+    carries the reaction of all links beyond it at two stations, so the friction of the shoulder
+    depends on what the wrist does. Defaults: a made-up arm of 21 kg and 1 m that falls from rest.
+    """
+
+    t_end: ClassVar[float] = 1.0
+
+    q2: Law | None = other_law("joint q2, shoulder; `law` without")
+    q3: Law | None = other_law("joint q3, elbow; `law` without")
+    q4: Law | None = other_law("joint q4, first of the wrist; `law` without")
+    q5: Law | None = other_law("joint q5, second of the wrist; `law` without")
+    q6: Law | None = other_law("joint q6, third of the wrist; `law` without")
+    load: Scalar = fields.MASS(0.0, doc="mass at the end of the arm", lower=0.0)
+    R: Scalar = fields.SIZE(0.03, doc="radius of the bearings")
+    a: Scalar = fields.STATIONS(0.08)
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def mechanism(self) -> Mechanism:
+        """Six bodies in a chain."""
+        m = Mechanism("arm", gravity=(0.0, 0.0, -self.g))
+        m.frame("ground.tip", at=(0.0, 0.0, 0.5), z=UP)
+        before = "ground"
+        for i, (axis, length, mass) in enumerate(zip(AXES, LENGTHS, MASSES, strict=True), start=1):
+            body = f"link{i}"
+            total = mass + self.load if i == len(AXES) else mass
+            slender = mass * (length * length / 12 + 0.002)
+            m.body(body, total, (0.002 * mass, slender, slender), com=(length / 2, 0.0, 0.0))
+            m.frame(f"{body}.root", z=axis)
+            if i < len(AXES):
+                m.frame(f"{body}.tip", at=(length, 0.0, 0.0), z=AXES[i])
+            law = self.law if i == 1 else self.law_of(f"q{i}")
+            friction = JointFriction(law, radius=self.R, length=self.a)
+            joint = Revolute(f"q{i}", f"{before}.tip", f"{body}.root", STARTS[i - 1], 0.0, friction)
+            m.joint(joint)
+            torque = m.input(f"tau{i}", "N m", nominal=10.0)
+            m.force(JointSpringDamper(f"motor{i}", f"q{i}", actuator=torque))
+            before = body
+        return m
+
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FourMass(MechanismScene):
+    """Four sliders: 1 and 4 on the axis x, 2 on y, 3 on z; two degrees of freedom.
+
+    Massless rods of lengths 5 and 7 m hold 1 to 2 and 2 to 3; springs of rate k hold 1, 2, 3 to
+    the ground (free at 3, 4, 3 m), and one of rate k_4 holds 4 to 1 (free at 1 m). The normal
+    force of every guide follows from the forces in the rods, so friction acts back on itself.
+
+    Defaults: Haug's spatial example, with friction; t_end = 4 s.
+    """
+
+    t_end: ClassVar[float] = 4.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "haug": Preset(
+            "sliders of the spatial example with friction in all guides; laws without a transition "
+            "velocity get the coefficients",
+            "Haug, spatial four-mass example, data as in public codes",
+            {"m_1": 2.0, "m_3": 6.0, "k": 2.0, "k_4": 10.0, "v_4": -1.0, "a": 0.1, "g": 9.8},
+            {"law": Numbers({"mu_s": 0.12, "mu_d": 0.1}, {BrownMcPhee: {"v_t": 0.01}})},
+        )
+    }
+
+    guide_2: Law | None = other_law("guide of slider 2 (y2); `law` without")
+    guide_3: Law | None = other_law("guide of slider 3 (z3); `law` without")
+    guide_4: Law | None = other_law("guide of slider 4 (x4); `law` without")
+    m_1: Scalar = fields.MASS(2.0, doc="mass of sliders 1 and 2")
+    m_3: Scalar = fields.MASS(6.0, doc="mass of sliders 3 and 4")
+    k: Scalar = fields.SPRING(2.0, doc="rate of the springs to the ground")
+    k_4: Scalar = fields.SPRING(10.0, doc="rate of the spring between 1 and 4")
+    v_4: Scalar = fields.VELOCITY(-1.0, doc="velocity of slider 4 at the start")
+    a: Scalar = fields.STATIONS(0.1)
+    g: Scalar = fields.GRAVITY(9.8)
+
+    def mechanism(self) -> Mechanism:
+        """Four bodies, four guides, two rods, four springs."""
+        m = Mechanism("four_mass", gravity=(0.0, 0.0, -self.g))
+        masses = (self.m_1, self.m_1, self.m_3, self.m_3)
+        starts = (("x1", 4.0, 0.0), ("y2", 3.0, 0.0), ("z3", 40.0**0.5, 0.0), ("x4", 5.0, self.v_4))
+        axes = ((X, Z), (Y, X), (Z, X), (X, Z))
+        laws = (self.law, *(self.law_of(f"guide_{i}") for i in (2, 3, 4)))
+        for i, (name, start, rate) in enumerate(starts):
+            body, (z, x) = f"slider_{i + 1}", axes[i]
+            m.body(body, masses[i], (1.0, 1.0, 1.0))
+            friction = JointFriction(laws[i], length=self.a, width=self.a)
+            m.frame(f"{body}.guide", z=z, x=x)
+            m.frame(f"ground.guide_{i + 1}", z=z, x=x)
+            m.joint(
+                Prismatic(name, f"ground.guide_{i + 1}", f"{body}.guide", start, rate, friction)
+            )
+        m.joint(Distance("rod_12", "slider_1", "slider_2", length=5.0))
+        m.joint(Distance("rod_23", "slider_2", "slider_3", length=7.0))
+        for i, (axis, free) in enumerate(((X, 13.0), (Y, 14.0), (Z, 13.0)), start=1):
+            m.frame(f"ground.wall_{i}", at=tuple(-10.0 * a for a in axis))
+            m.force(SpringDamper(f"spring_{i}", f"ground.wall_{i}", f"slider_{i}", self.k, free))
+        m.frame("slider_4.far", at=(10.0, 0.0, 0.0))
+        m.force(SpringDamper("spring_4", "slider_1", "slider_4.far", self.k_4, 11.0))
+        return m
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Robot(MechanismScene):
+    """The robot of a URDF file, with the law at the friction level of every joint.
+
+    `source` is the path of the file or its text. The normal force of the law is the joint's
+    `<dynamics friction>`, or `level` where it has none; the law `relative(LuGre())` breaks away
+    there. `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits. `laws` are
+    those of the `joints` of these names; their parameters have endings where they share a name.
+    """
+
+    t_end: ClassVar[float] = 2.0
+
+    source: str | Path
+    joints: tuple[str, ...] = ()
+    laws: tuple[Law, ...] = ()
+    level: Scalar = param(
+        0.0,
+        unit="N m",
+        role="load",
+        doc="friction of joints without a tag; [N] where they slide",
+        lower=0.0,
+    )
+    g: Scalar = fields.GRAVITY(9.81)
+
+    def __post_init__(self) -> None:
+        for law in checks.many("Robot: laws", self.laws, "laws"):
+            check_law("Robot: laws", law)
+        if len(checks.many("Robot: joints", self.joints, "names of joints")) != len(self.laws):
+            raise ValueError(
+                f"Robot: expected a law for every one of the joints, got {len(self.joints)} joints "
+                f"and {len(self.laws)} laws"
+            )
+        super().__post_init__()
+
+    def mechanism(self) -> Mechanism:
+        """Bodies, joints and motors."""
+        gravity = (0.0, 0.0, -self.g)
+        laws = dict(zip(self.joints, self.laws, strict=True))
+        return read_urdf(self.source, law=self.law, laws=laws, level=self.level, gravity=gravity)
