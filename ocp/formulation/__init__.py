@@ -1,1 +1,1 @@
-"""What the user writes: phases, conditions, costs, and what they resolve to."""
+"""Problems as users write them: phases, conditions, costs, and their resolved form."""

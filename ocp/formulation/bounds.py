@@ -61,17 +61,17 @@ def as_box(value: Range) -> Box:
 
 
 def meet(a: Box, b: Box) -> Box:
-    """What lies in both ranges; empty (lower > upper) if nothing does."""
+    """Intersection of two ranges; empty (lower > upper) if nothing does."""
     return (max(a[0], b[0]), min(a[1], b[1]))
 
 
 def fixed(box: Box) -> bool:
-    """Whether the range is one number."""
+    """True if the range is one number."""
     return box[0] == box[1]
 
 
 def is_range(value: Any) -> bool:
-    """Whether `value` is a finite number or an ordered pair that leaves some room."""
+    """True if `value` is a finite number or an ordered pair of bounds."""
     if not isinstance(value, tuple):
         return is_number(value) and isfinite(value)
     if len(value) != 2 or not all(v is None or is_number(v) for v in value):

@@ -64,7 +64,7 @@ def written(
 
 @contextmanager
 def gathered(tell: list[str], where: str) -> Generator[None]:
-    """What is wrong in here goes to `tell`, and work goes on behind it."""
+    """Collect an error of the block in `tell` and continue after it."""
     try:
         yield
     except ValueError as error:
@@ -147,7 +147,7 @@ def _missing(condition: Callable[..., object], settings: Sequence[Setting]) -> s
 
 
 def _links(setting: Setting, before: Model, tell: list[str]) -> Iterator[Link]:
-    """Where the states start that continue the phase before."""
+    """Start values of the states that continue the phase before."""
     there = {v.name for v in before.x}
     signals = Signals(before)
     for v in setting.model.x:

@@ -31,7 +31,7 @@ class Signals:
     """The signals of a model by name: `s.force`, or `s["force"]`.
 
     Time `t` since the start of the problem [s], states, algebraic variables, inputs, parameters,
-    outputs, and the details of a mechanism, which are written out when one is asked for.
+    outputs, and the details of a mechanism, which are written out on demand.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Signals:
         return self[name]
 
     def __call__(self) -> tuple[str, ...]:
-        """Names of the details that were asked for."""
+        """Names of the details that were used."""
         return tuple(self._details)
 
 
@@ -95,7 +95,7 @@ def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
 
 
 def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
-    """What `function` returns; what CasADi and Python refuse becomes a `ValueError`.
+    """Call `function`; errors of CasADi and Python become a `ValueError`.
 
     Raises:
         ValueError: the function asks for what does not exist or cannot be done.
@@ -148,7 +148,7 @@ def _refused(found: object, hint: str = "") -> ValueError:
 
 
 def _short(text: str) -> str:
-    """The last line of what CasADi or Python says, without the place in its source."""
+    """The last line of a message of CasADi or Python, without the place in its source."""
     last = text.strip().splitlines()[-1].rstrip(".")
     return last.split(": ", 1)[-1] if ".cpp:" in last else last
 
@@ -208,7 +208,7 @@ def _sorted(left: ca.SX, right: ca.SX, *, equal: bool) -> Comparison:
 
 
 Expression = Callable[[Signals], Scalar]
-"""What to evaluate, such as `lambda s: s.force**2`."""
+"""A function of the signals, such as `lambda s: s.force**2`."""
 
 Terms = tuple[tuple[float, Expression], ...]
 
@@ -286,7 +286,7 @@ class Cost:
     def expressions(self, model: Model, signals: Signals | None = None) -> tuple[ca.SX, ca.SX]:
         """Integrand, squares included, and end value in the symbols of `model`, (1, 1) each.
 
-        `signals` are those of the model, where somebody wants to know what was asked of them.
+        `signals` are those of the model; they record which details are used.
 
         Raises:
             ValueError: a name the model does not have, or an expression that is not scalar.

@@ -25,7 +25,7 @@ Ranges = Mapping[str, Range]
 """Name -> value to meet, or (lower, upper)."""
 
 Start = Callable[[Signals], Scalar] | str | None
-"""Where a state starts that continues another phase: an expression in the signals at its end, the
+"""Start of a state that continues another phase: an expression in the signals at its end, the
 name of one of them, or None for anywhere."""
 
 PathCondition = Callable[[Signals], object]
@@ -53,7 +53,7 @@ class Phase:
         model: an explicit model, `ode` with or without `alg`.
         T: duration [s], or `Free(lower, upper)` to let the optimiser choose.
         start: states, inputs and outputs at the start; those of an input hold on the first
-            interval. States of the first phase that are not named start where the model says.
+            interval. States of the first phase that are not named have the start of the model.
             `FREE` leaves one open.
         end: likewise at the end; those not named end where they like.
         via: {0.5: {"x": 1.0}}: states and outputs at a fraction of T between 0 and 1.
@@ -72,10 +72,10 @@ class Phase:
         p: values of parameters of the model.
         name: for messages and pictures.
 
-    What is wrong with a phase is said by the `Problem` it is put into.
+    `Problem` reports errors of its phases.
 
     Limits: bounds on states and outputs, and `path`, hold at the collocation points, not between
-    them; `verify` says what they do there.
+    them; `verify` checks them there.
     """
 
     model: Model
@@ -143,7 +143,7 @@ class Row:
 @final
 @dataclass(frozen=True, eq=False)
 class Link:
-    """Where a state starts: at an expression in t, x, z, u, p of the model of the span before."""
+    """Start of a state: an expression in t, x, z, u, p of the model of the span before."""
 
     state: str
     expression: ca.SX
@@ -196,7 +196,7 @@ class Span:
             and inputs in them are those of the interval before, at 0 of the first one.
         path: conditions at every collocation point.
         running, end: integrand, and value at the end, of the share of the cost, SX (1, 1).
-        squares: least-squares form of what it can be told of in `running`, as (weight, residual).
+        squares: least-squares form of the squared terms in `running`, as (weight, residual).
         links: where states start that continue the span before; none in the first span.
         joins: conditions to the span before; none in the first span.
     """

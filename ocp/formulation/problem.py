@@ -50,8 +50,8 @@ class Problem(Statement):
         min J   subject to   x' = ode(t, x, z, u, p),  0 = alg(t, x, z, u, p)   in every phase,
                              ends, bounds, path conditions, links between phases
 
-    `bounds`, `rates`, `path` and `p` hold in every phase that has the names; what a phase says
-    itself wins. Everything is bound to names, so that one text serves several models.
+    `bounds`, `rates`, `path` and `p` hold in every phase that has the names; fields of a
+    phase win. Everything is bound to names, so that one statement serves several models.
 
     Attributes:
         phases: a `Phase`, or several: `out >> back`.
@@ -102,7 +102,7 @@ class Problem(Statement):
 
     @property
     def kind(self) -> Literal["sum", "mean", "worst"]:
-        """How the costs of the spans make one; mean and worst are over the sums of scenarios."""
+        """Sum of the costs of the spans, or mean or worst of these sums over scenarios."""
         if len(self.scenarios) < 2:
             return "sum"
         return "worst" if self.cost is not None and self.cost.largest else "mean"
@@ -142,19 +142,19 @@ class Problem(Statement):
 
 def sized(problem: Problem) -> Problem:
     """`problem` with nominal values from what it asks for; itself where 1 is near enough."""
-    asked: dict[str, float] = {}
+    sizes: dict[str, float] = {}
     for phase in problem.chain:
         for given in (phase.start, phase.end, *phase.via.values(), phase.bounds, problem.bounds):
             for name, wanted in given.items():
-                asked[name] = max(asked.get(name, 0.0), _size(wanted))
-    asked = {name: size for name, size in asked.items() if size > 0.0}
+                sizes[name] = max(sizes.get(name, 0.0), _size(wanted))
+    sizes = {name: size for name, size in sizes.items() if size > 0.0}
     models = [phase.model for phase in problem.chain]
-    if not any(_far(v, asked) for model in models for v in (*model.x, *model.u)):
+    if not any(_far(v, sizes) for model in models for v in (*model.x, *model.u)):
         return problem
     for phase in problem.chain:
         T = phase.T.start if isinstance(phase.T, Free) else float(phase.T)
-        asked |= _following(phase.model, T, asked)
-    made = {id(phase.model): _with_nominals(phase.model, asked) for phase in problem.chain}
+        sizes |= _following(phase.model, T, sizes)
+    made = {id(phase.model): _with_nominals(phase.model, sizes) for phase in problem.chain}
     phases = tuple(replace(phase, model=made[id(phase.model)]) for phase in problem.chain)
     return replace(problem, phases=Chain(phases))
 
@@ -176,13 +176,13 @@ def _size(wanted: Range) -> float:
 
 
 def _far(v: Variable, sizes: Sizes) -> bool:
-    """Whether the nominal value of a variable is far from its size, and none that was given."""
+    """True if a nominal value is far above the size, or was not given and is far below it."""
     times = sizes.get(v.name, v.nominal) / v.nominal
     return times * FAR <= 1.0 or (v.nominal == UNSAID and times >= FAR)
 
 
 def _following(model: Model, T: float, known: Sizes) -> dict[str, float]:
-    """Sizes of states and inputs of which nothing is asked, from those of others."""
+    """Sizes of states and inputs without ends or bounds, from those of others."""
     symbols = arguments(model)
     ode = ca.SX(0, 1) if model.ode is None else model.ode
     slopes = ca.Function("slopes", symbols, [

@@ -29,11 +29,11 @@ from symfric.model import Model
 
 ROUNDS = 50
 CLOSED = 1e-11
-"""What is left of a constraint that is met, in the units of the constraint."""
+"""Residual of a constraint that counts as met, in the units of the constraint."""
 
 
 def function_problems(problem: Statement) -> list[str]:
-    """What is wrong with costs, conditions and links, whatever ranges and numbers are."""
+    """Messages about costs, conditions and links that are wrong for all ranges and numbers."""
     tell: list[str] = []
     written(problem, settings_of(problem), tell)
     return tell
@@ -73,7 +73,7 @@ def _without_repeats(spans: Sequence[Span], k: int) -> Span:
 
 
 def _goes_on(before: Span, link: Link) -> bool:
-    """Whether a state is continuous, as it is by default."""
+    """True if a state is continuous, as it is by default."""
     symbols = {v.name: v.symbol for v in before.model.x}
     return link.state in symbols and ca.is_equal(link.expression, symbols[link.state])
 
@@ -125,7 +125,7 @@ def _met(boxes: Mapping[str, Box], given: Mapping[str, Any], group: Any) -> dict
 
 
 def _rows_at(model: Model, fraction: float, given: Mapping[str, Any]) -> tuple[Row, ...]:
-    """What is given there for signals that are no states or inputs."""
+    """Conditions there on signals that are no states or inputs."""
     own = {v.name for group in (model.x, model.u) for v in group}
     place = {0.0: "at the start", 1.0: "at the end"}.get(fraction, f"at {fraction:g} T")
     return tuple(
@@ -162,7 +162,7 @@ def _at_numbers(
 
 
 def _unreachable(spans: Sequence[Span], settings: Sequence[Setting]) -> Iterator[str]:
-    """Ranges that leave no room."""
+    """Messages about empty ranges."""
     for span in spans:
         setting = settings[span.phase]
         for fraction, boxes in (*span.nodes.items(), *span.inputs_at.items()):
@@ -219,7 +219,7 @@ def start_of(
 ) -> tuple[dict[str, Box], tuple[Row, ...]]:
     """Range of every state at 0, and equations of those whose start follows from unknowns.
 
-    A state that is not named starts where the model says: at a number, or, where that depends on
+    A state that is not named has the start of the model: at a number, or, where that depends on
     parameters that are chosen, at an expression in these. Periodic states and inputs with bounded
     rate start anywhere. In a mechanism with loops, coordinates and rates that are not named follow
     from those that are.
@@ -292,7 +292,7 @@ def _following(span: Span, named: Collection[str]) -> dict[str, ca.SX]:
 
 
 def has_loops(model: Model) -> bool:
-    """Whether constraints bind the coordinates of the model."""
+    """True if constraints bind the coordinates of the model."""
     return model.holonomic is not None and model.holonomic.phi.numel() > 0
 
 

@@ -1,4 +1,4 @@
-"""What a file keeps of a problem: its resolved form, not the functions that it was written in."""
+"""Problems in files: their resolved form, not the functions that they were written in."""
 
 from dataclasses import dataclass
 from typing import Literal, final
@@ -58,7 +58,7 @@ class Posed:
 
 
 def posed(problem: Problem | Posed) -> Posed:
-    """What is kept of a problem."""
+    """The part of a problem that a file keeps."""
     if isinstance(problem, Posed):
         return problem
     return Posed(

@@ -1,4 +1,4 @@
-"""What a problem states, and what follows from it for the model, bounds and costs of each phase.
+"""Statements of a problem, and the model, bounds and costs of each phase that follow.
 
 Changes of models are pure: Model -> Model, with the same symbols and names, so that a cost, a bound
 or an output written for the one holds for the other.

@@ -179,7 +179,7 @@ def _event_problem(model: Model) -> str:
             return f"expected contacts with known modes, got events of '{contact.name}': {text}"
     try:
         own = model.open.events if model.contacts else model.events
-    except ValueError:  # changed since it was closed: nobody knows whose they are
+    except ValueError:  # changed since it was closed: their origin is unknown
         own = model.events
     names = [event.name for event in own]
     if not names:
@@ -197,7 +197,7 @@ def _links(phase: Phase, states: Collection[str]) -> Iterator[str]:
 
 
 def duration_problem(T: object) -> str:
-    """What is wrong with a duration, or nothing."""
+    """Message about a wrong duration, else nothing."""
     number = checks.as_number(T)
     if isinstance(T, Free) or (number is not None and 0 < number < inf):
         return ""
@@ -224,12 +224,12 @@ def _rate_problems(rates: Mapping[str, Any]) -> Iterator[str]:
 
 
 def freed(names: Iterable[str]) -> str:
-    """How a number of a law or a scene becomes a parameter."""
+    """Hint how a number of a law or a scene becomes a parameter."""
     return f"free it where the model is made: drive(law, free={list(names)!r})"
 
 
 def _no_signal(model: Model, given: Iterable[str], fleeting: Collection[str]) -> str:
-    """What to do about names that are no signals."""
+    """Hint about names that are no signals."""
     if {"t", "T"} & set(given):
         return "durations are T of the phases, and durations=... of the problem"
     if set(fleeting) & set(given):

@@ -122,7 +122,7 @@ class ClosedLoop:
         controls: input -> value held over the interval after each cycle.
         references: name -> value at each cycle.
         residual: of each cycle, as the controller reports it.
-        checked: the same by a second opinion (`optimality`); NaN where it was not asked.
+        checked: the same by a second opinion (`optimality`); NaN without it.
         seconds, cpu: that each cycle took on the clock, and of the processor [s]; the first counts
             other programs on a busy machine, too.
         iterations, program_iterations: quadratic programs, and of the interior point.
@@ -246,7 +246,7 @@ def plot_loops(
 ) -> "Figure":
     """Signals and controls of closed loops over time, a panel each, and the time of their cycles.
 
-    Shaded is where a controller says that it did not converge.
+    Shaded cycles did not converge, by their own status.
 
     Args:
         loops: legend entry -> loop.

@@ -80,7 +80,7 @@ class Controller:
                 "auto": compiled where there is a compiler.
 
         Raises:
-            CompileError: compiled code was asked for, and there is no compiler or it failed.
+            CompileError: backend="compiled" without a compiler, or it failed.
         """
         return Session(self.design, backend)
 
@@ -101,7 +101,7 @@ class Controller:
         """The controller on a plant, whose equations may be others: simulated within tolerances.
 
         The plant has the inputs that are controlled and the signals that are measured by the same
-        names; its other inputs stay where the model says.
+        names; its other inputs keep the values of the model.
 
         Args:
             plant: the model of the plant, with events or without.
@@ -111,7 +111,7 @@ class Controller:
             p: parameters of the controller's model, by name.
             noise: standard deviation of measured states, by name.
             seed: of the noise.
-            check: whether a second opinion is asked on the residual of each cycle, at some
+            check: whether an independent residual is computed for each cycle, at some
                 milliseconds each.
             backend: as in `start`.
 
@@ -174,7 +174,7 @@ def controller_of(
         step: time between cycles [s].
         method, steps: of `flow`, for an interval. The steps should resolve the transition velocity
             of friction: where v changes by much more than v_t in one, iterations converge slowly or
-            not, which the residual says. With bristles "backward_euler".
+            not, as the residual shows. With bristles "backward_euler".
         measured: names of measured states, by default all; the others, such as bristles, are those
             of the plan. Inputs with a rate (`rates`) are never measured.
         tolerance: residual (see `gauss_newton`) at which a plan is optimal.
@@ -188,7 +188,7 @@ def controller_of(
             without curvature; names that C cannot have.
 
     Limits: inputs are constant over an interval; unmeasured states are not estimated, only
-    predicted; far from the optimum iterations may use up their number, which is said. Friction
+    predicted; far from the optimum iterations may run out, as the status reports. Friction
     that is very sharp hides the way out of rest: a plan that stays there is optimal to first order,
     and is what comes out, converged. Let the controller believe in a v_t of about a hundredth of
     the velocities (on a drive that moves at 1 m/s, 1e-2 m/s leaves rest and 1e-3 m/s does not); the

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class Control:
-    """What a controller hands out: an input, or the mean over the interval of one with a rate.
+    """Output of a controller: an input, or the mean over the interval of one with a rate.
 
     Attributes:
         name, unit: of the input.

@@ -164,7 +164,7 @@ def _references(problem: Problem, span: Span) -> tuple[str, ...]:
 
 
 def _others(problem: Problem, span: Span) -> list[tuple[float, ca.SX]]:
-    """What of the running cost is no square."""
+    """Terms of the running cost that are no squares."""
     rest = span.running - sum((w * e**2 for w, e in span.squares), ca.SX(0))
     if not any(cost.running for cost in _costs(problem)):
         return []

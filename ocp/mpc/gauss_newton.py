@@ -42,7 +42,7 @@ ROUNDING = 1e-12
 
 
 class CycleStatus(IntEnum):
-    """How a cycle ended; the numbers are those of the C."""
+    """End of a cycle; the numbers are those of the C."""
 
     CONVERGED = 0
     NOT_CONVERGED = 1
@@ -51,7 +51,7 @@ class CycleStatus(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What it means and what to try."""
+        """Meaning, and what to try."""
         return {
             0: "converged",
             1: "not converged: the residual is above the tolerance after the last iteration; allow "
@@ -99,7 +99,7 @@ class Plan:
 @final
 @dataclass(frozen=True)
 class Report:
-    """How a cycle went.
+    """Result of a cycle.
 
     Attributes:
         residual: of the plan that is handed out.
@@ -178,7 +178,7 @@ def improved(
 
 
 def _step(merit: "Merit", plan: Plan, move: Move, nu: float, halvings: int) -> tuple[float, float]:
-    """How far to go along a change, and the weight of the defects, which does not fall again."""
+    """Step length along a change, and the weight of the defects, which never falls."""
     c, v, cost = merit.sweeps.value(plan.X, plan.U, merit.given)
     prices, gap = merit.prices, merit.gap(c)
     slope = total(move.costs[:, 0]) + (prices.of(v + move.D) - prices.of(v))

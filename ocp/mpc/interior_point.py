@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What is known of the whole horizon in one cycle.
+    """Data of the whole horizon in one cycle.
 
     Attributes:
         R: references, shape (N+1, number of them).
@@ -235,7 +235,7 @@ class Prices:
     soft: NDArray[np.bool_]
 
     def of(self, v: Array) -> float:
-        """What violations of soft rows cost."""
+        """Cost of the violations of soft rows."""
         s = np.maximum(-v, 0.0)
         return total(self.rho * s + 0.5 * (self.sigma * (s * s)))
 
@@ -316,7 +316,7 @@ def solve_program(
 
 
 def _inside(prices: Prices, v: Array, first: Array, warm: Array, product: float) -> Point:
-    """Where to begin, with all products about equal.
+    """A point to begin with, whose products are about equal.
 
     A soft row that is violated now (v < 0) is taken to remain so, with z at its price; the others
     are kept off their bounds, `first` being their values at the free minimum, and z is no less than
@@ -352,7 +352,7 @@ def _newton(
     weights: tuple[Array, Array],
     goals: tuple[Array, Array],
 ) -> tuple[Move, Point]:
-    """Where Newton's method aims at with t z and s y at their goals, and the change to there."""
+    """Newton's aim with t z and s y at their goals, and the change to there."""
     L, end, v, G = program
     f, w = weights
     z, s, soft = point.z, point.s, prices.soft

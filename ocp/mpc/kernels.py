@@ -1,4 +1,4 @@
-"""What is computed in one interval of the horizon, as SX Functions of columns.
+"""Computations of one interval of the horizon, as SX Functions of columns.
 
 The quadratic program of an iteration, with d the change of the states and c = F(x, u) - after:
 
@@ -60,7 +60,7 @@ class Packed:
 @final
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """All Functions; those of the end are missing where nothing is asked for there.
+    """All Functions; those of the end are None without cost and conditions there.
 
     Attributes:
         advance: (x, u, r, p) -> x after a substep.

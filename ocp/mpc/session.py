@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """What one cycle gave.
+    """Result of one cycle.
 
     Attributes:
         u: controls.
@@ -173,7 +173,7 @@ BACKENDS = ("auto", "vm", "compiled")
 @final
 @dataclass(frozen=True, eq=False)
 class Action:
-    """What a controller does in one cycle.
+    """Action of a controller in one cycle.
 
     Attributes:
         controls: input -> value over the next interval.
@@ -197,7 +197,7 @@ class Action:
 
     @property
     def converged(self) -> bool:
-        """Whether the plan is optimal within the tolerance."""
+        """True if the plan is optimal within the tolerance."""
         return self.status is CycleStatus.CONVERGED
 
 

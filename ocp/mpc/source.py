@@ -75,7 +75,7 @@ void {name}_step({name}_t *self, const {name}_param_t *param, const {name}_in_t 
 
 
 def _structs(design: Design) -> str:
-    """What goes in and comes out."""
+    """Structs of inputs and outputs."""
     name, h = design.name, design.horizon
     parameters = [(v.name, f"{v.doc} [{v.unit}]") for v in _constants(design)]
     parameters += [(bound, "bound") for bound in design.bound_names]
@@ -132,7 +132,7 @@ def source(design: Design) -> str:
 
 #include <math.h>
 {booleans}
-{_doors(design)}
+{_user_functions(design)}
 {_macros(design)}
 {macros}
 {_constants_of(design)}
@@ -279,16 +279,16 @@ def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
     return f"{head}\n{{\n{body}}}\n\n", code.calls
 
 
-def _doors(design: Design) -> str:
-    """What touches names of the user: no macro stands before it."""
+def _user_functions(design: Design) -> str:
+    """Functions with names of the user; no macro stands before them."""
     name, h = design.name, design.horizon
     p = [f"m->p[{i}] = param->{v.name};" for i, v in enumerate(_constants(design))]
     b = [f"m->b[{i}] = param->{bound};" for i, bound in enumerate(design.bound_names)]
     r = [f"m->r[k][{i}] = in->{reference}[k];" for i, reference in enumerate(h.references)]
-    asked = [f"in->{h.model.x[i].name}" for i in design.measured] + ["param->tolerance"]
-    asked += ["in->t"] * timed(design)
-    asked += [f"m->p[{i}]" for i in range(len(p))] + [f"m->b[{i}]" for i in range(len(b))]
-    checks = [f"sound = sound && isfinite({what});" for what in asked]
+    needed = [f"in->{h.model.x[i].name}" for i in design.measured] + ["param->tolerance"]
+    needed += ["in->t"] * timed(design)
+    needed += [f"m->p[{i}]" for i in range(len(p))] + [f"m->b[{i}]" for i in range(len(b))]
+    checks = [f"sound = sound && isfinite({what});" for what in needed]
     now = "in->t + " if timed(design) else ""
     each = [f"m->t[k] = {now}{DOUBLE.literal(h.step)} * (double)k;", *r]
     each += [f"sound = sound && isfinite(m->r[k][{i}]);" for i in range(len(r))]
@@ -314,7 +314,7 @@ static void show(const {name}_t *m, {name}_out_t *out)
 
 
 def timed(design: Design) -> bool:
-    """Whether a cost or a bound depends on time."""
+    """True if a cost or a bound depends on time."""
     h = design.horizon
     values = [h.early.value, h.late.value, h.end.value]
     values += [limit.expression for limit in (*h.limits, *h.end_limits)]

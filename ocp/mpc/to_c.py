@@ -24,13 +24,13 @@ ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
     "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos", "memcpy", "memmove",
     "memset", "_GLOBAL_OFFSET_TABLE_",
 }  # fmt: skip
-"""What the object file may need: functions of math.h, and copies that the compiler itself makes."""
+"""Symbols that the object file may need: math.h, and copies that the compiler itself makes."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class GeneratedController:
-    """What `Controller.to_c` wrote.
+    """Files that `Controller.to_c` wrote.
 
     Attributes:
         folder: where the files are.
@@ -43,7 +43,7 @@ class GeneratedController:
     design: Design
 
     def verify(self, cycles: int = 100) -> "ControllerCheck":
-        """Compile the files and run them beside the virtual machine; see `ControllerCheck`.
+        """Compile the files and compare them with the virtual machine; see `ControllerCheck`.
 
         The loop is closed through the controller's own model, with noise, references that jump,
         far states, and measured numbers that are not finite.
@@ -54,10 +54,10 @@ class GeneratedController:
 @final
 @dataclass(frozen=True)
 class ControllerCheck:
-    """What was found about generated C.
+    """Result of checking generated C.
 
     Attributes:
-        status: "verified", or a sentence that says why not.
+        status: "verified", or the reason in a sentence.
         cycles: that were compared.
         warnings: what the compiler warned of.
         foreign: what the object file needs besides functions of math.h; None without `nm`.
@@ -92,8 +92,8 @@ def write_c(design: Design, folder: str | Path) -> GeneratedController:
 def _verified(generated: GeneratedController, cycles: int) -> ControllerCheck:
     compiler = find_compiler()
     if compiler is None:
-        said = "not verified: no C compiler found; install gcc or clang, or set CC"
-        return ControllerCheck(said, 0, (), None, np.inf, 0)
+        reason = "not verified: no C compiler found; install gcc or clang, or set CC"
+        return ControllerCheck(reason, 0, (), None, np.inf, 0)
     try:
         with TemporaryDirectory(prefix="symfric-") as name:
             target = Path(name) / "controller.o"

@@ -14,7 +14,7 @@ class Ready:
 
     Attributes:
         name: as on the command line.
-        title: one line that says what moves, and what is sought.
+        title: one line about motion and goal.
         make: the problem; keyword arguments are its numbers, such as v_t.
         optimum: best known cost J, in the unit of the problem's cost; NaN where none is known.
         uncertain: what the optimum is good for.

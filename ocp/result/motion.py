@@ -1,9 +1,9 @@
 """Motions of one scenario by name: signals over time, and values that a warm start needs."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ SAME = 1e-6
 @final
 @dataclass(frozen=True)
 class Stretch:
-    """When a phase is.
+    """Begin and duration of a phase.
 
     Attributes:
         name: of the phase.
@@ -46,7 +46,7 @@ class Stretch:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
-    """What moves in one scenario.
+    """Motion of one scenario.
 
     `motion["v"]` is a signal at the times `motion.t`.
 
@@ -147,34 +147,32 @@ def motion_of(
     inputs = list(dict.fromkeys(v.name for _, span in spans for v in span.model.u))
     ends = [piece.t.size - int(k + 1 < len(pieces) and not pieces[k + 1].jumps)
             for k, piece in enumerate(pieces)]  # fmt: skip
+
+    def joined(of: Callable[[_Piece], NDArray[Any]]) -> NDArray[Any]:
+        return np.concatenate([of(p)[:n] for p, n in zip(pieces, ends, strict=True)])
+
+    def signal(name: str) -> Array:
+        return joined(lambda p: p.values.get(name, np.full(p.t.size, np.nan)))
+
+    def control(name: str) -> Array:
+        none = [np.full(p.edges.size - 1, np.nan) for p in pieces]
+        return np.concatenate([p.controls.get(name, n) for p, n in zip(pieces, none, strict=True)])
+
     return Motion(
         name=name,
-        t=np.concatenate([p.t[:n] for p, n in zip(pieces, ends, strict=True)]),
-        signals={
-            signal: np.concatenate(
-                [
-                    p.values.get(signal, np.full(p.t.size, np.nan))[:n]
-                    for p, n in zip(pieces, ends, strict=True)
-                ]
-            )
-            for signal in ordered
-        },
-        units={signal: units[signal] for signal in ordered},
-        nodes=np.concatenate([p.nodes[:n] for p, n in zip(pieces, ends, strict=True)]),
+        t=joined(lambda p: p.t),
+        signals={name: signal(name) for name in ordered},
+        units={name: units[name] for name in ordered},
+        nodes=joined(lambda p: p.nodes),
         t_control=np.concatenate([p.edges[:-1] for p in pieces]),
-        controls={
-            u: np.concatenate(
-                [p.controls.get(u, np.full(p.edges.size - 1, np.nan)) for p in pieces]
-            )
-            for u in inputs
-        },
+        controls={name: control(name) for name in inputs},
         phases=tuple(phases),
         spans=tuple(number for number, _ in spans),
     )
 
 
 def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
-    """Whether a state jumps at the joint, or is not in both phases."""
+    """True if a state jumps at the joint, or is not in both phases."""
     there = {v.name: k for k, v in enumerate(before.model.x)}
     if [*there] != [v.name for v in after.model.x]:
         return True

@@ -1,4 +1,4 @@
-"""Pictures of optimal motions: what the optimiser says against what the model does."""
+"""Pictures of optimal motions: optimised points against the simulated model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

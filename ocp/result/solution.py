@@ -32,32 +32,36 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AT_BOUND = 1e-5
-"""Relative distance from a bound within which a duration is said to be at it."""
+"""Relative distance from a bound within which a duration counts as at it."""
 
 
 class Verdict(Protocol):
-    """What a solution knows of its verification (`ocp.checking` makes it)."""
+    """Verification of a solution (`ocp.checking` makes it)."""
 
     @property
     def ok(self) -> bool:
-        """Whether nothing missed by more than the tolerance."""
+        """True if nothing missed by more than the tolerance."""
+        ...
 
     @property
     def largest(self) -> float:
         """The largest relative miss."""
+        ...
 
     @property
     def trajectories(self) -> Sequence[Trajectory]:
         """The re-simulated motion of each span that was simulated, in order."""
+        ...
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
+        ...
 
 
 @final
 @dataclass(frozen=True)
 class Mode:
-    """What a contact does for a while.
+    """Mode of a contact for a while.
 
     Attributes:
         kind: "slip+", "slip-" or "stick".
@@ -86,8 +90,8 @@ class Solution:
         chosen: values of the parameters that were chosen.
         statistics: size, iterations, times, of all solves together.
         scheme, meshes, points, iterate: what a warm start needs.
-        modes: contact -> what it does when; empty where friction was not told apart by modes.
-        verification: what the re-simulation says, or None where it was not asked for.
+        modes: contact -> its modes in order; empty where friction was not solved by modes.
+        verification: result of the re-simulation, or None without it.
         cause: the exception in `progress` that stopped the solver, if any.
     """
 
@@ -115,12 +119,12 @@ class Solution:
         )
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
-        """What a notebook shows: what was found, and the motion."""
+        """Text and picture for a notebook."""
         title = f"Solution of '{self.problem.name}': {self.status.name}"
         return Shown(title, tuple(str(self).splitlines())).html(self.plot())
 
     def __str__(self) -> str:
-        """What was found, in a few lines."""
+        """The result in a few lines."""
         phases = ", ".join(f"{phase.name} {phase.T:.4g} s" for phase in self.phases)
         several = f" ({phases})" if len(self.phases) > 1 else ""
         lines = [self.message, f"J = {self.cost:.6g}, T = {self.T:.6g} s{several}"]
@@ -131,8 +135,8 @@ class Solution:
         if self.chosen:
             lines.append("chosen: " + ", ".join(f"{n} = {v:.6g}" for n, v in self.chosen.items()))
         for contact, modes in self.modes.items():
-            told = ", ".join(f"{m.kind} {m.begin:.4g} ... {m.end:.4g} s" for m in modes)
-            lines.append(f"{contact}: {told}")
+            listed = ", ".join(f"{m.kind} {m.begin:.4g} ... {m.end:.4g} s" for m in modes)
+            lines.append(f"{contact}: {listed}")
         if self.verification is not None:
             lines.append(str(self.verification).splitlines()[0])
         counts = self.statistics
@@ -147,12 +151,12 @@ class Solution:
 
     @property
     def ok(self) -> bool:
-        """Whether it can be used as it is."""
+        """True if it can be used as it is."""
         return self.status.ok
 
     @property
     def verified(self) -> bool:
-        """Whether the model under this control does what was asked for, within the tolerance."""
+        """True if the model under this control meets all conditions within the tolerance."""
         return self.verification is not None and self.verification.ok
 
     @property
@@ -202,7 +206,7 @@ class Solution:
 
     @property
     def phases(self) -> tuple[Stretch, ...]:
-        """When each phase is."""
+        """Begin and duration of each phase."""
         return self.motions[0].phases
 
     @property
@@ -223,7 +227,7 @@ class Solution:
 
     @property
     def stored(self) -> Stored:
-        """What a warm start needs of it, free of models."""
+        """Values for a warm start, free of models."""
         return Stored(
             name=self.problem.name,
             status=self.status.name,
@@ -391,7 +395,6 @@ def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Sol
         own: your classes in it, such as a law of yours.
 
     Raises:
-        ValueError: no such file, one that something else wrote, a damaged one, one of another
-            version, or classes that are not known.
+        ValueError: no such file, a foreign, damaged or newer one, or classes that are not known.
     """
     return SOLUTION.load(path, own)

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.solvers.watch import Shaped
 from ocp.transcription.program import Program
 
 POINT = ["x", "p"]
@@ -56,7 +57,7 @@ def lagrangian(program: Program) -> ca.Function:
 def gradients(program: Program) -> ca.Function:
     """(x, p, lam_f, lam_g) -> f, g and the gradients of lam_f f + lam_g' g in x and in p.
 
-    Those in p are zero: nobody asks for them, and CasADi wants a function that has them.
+    Those in p are zero: they are not used, but CasADi needs them.
     """
     x, p, lam_f, lam_g = _symbols(program)
     f, slope = program.gradient(x, p)
@@ -101,36 +102,15 @@ class _Size:
 
 
 @final
-class Convexified(ca.Callback):
+class Convexified(Shaped):
     """(x, p, lam_f, lam_g) -> the whole Hessian of the Lagrangian, made positive semidefinite."""
 
     def __init__(self, program: Program) -> None:
-        super().__init__()
         self._hessian = program.hessian
         hubs = np.array([not np.isfinite(place.fraction) for place in program.unknowns])
         self._sizes, self._pattern = _plan(program.hessian.sparsity_out(0), hubs)
-        self._inputs = [program.hessian.sparsity_in(i) for i in range(4)]
-        self.construct("nlp_hess_l", {})
-
-    def get_n_in(self) -> int:  # noqa: D102
-        return 4
-
-    def get_n_out(self) -> int:  # noqa: D102
-        return 1
-
-    def get_name_in(self, i: int) -> str:  # noqa: D102
-        return ("x", "p", "lam_f", "lam_g")[i]
-
-    def get_name_out(self, i: int) -> str:  # noqa: D102
-        del i
-        return "hess_gamma_x_x"
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return self._inputs[i]
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
-        del i
-        return self._pattern
+        inputs = {name: program.hessian.sparsity_in(i) for i, name in enumerate(MULTIPLIERS)}
+        super().__init__("nlp_hess_l", inputs, "hess_gamma_x_x", self._pattern)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         triangle = np.append(np.array(self._hessian(*arg).nonzeros()), 0.0)

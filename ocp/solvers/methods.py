@@ -184,7 +184,7 @@ class Fatrop(_Method):
 
     def _build(self, program: Program, warm: bool) -> Built:
         del warm
-        hook, stages = GradientHook(program, program.w.numel()), program.stages
+        hook, stages = GradientHook(program), program.stages
         sizes = {name: list(getattr(stages, name)) for name in ("nx", "nu", "ng")}
         derivatives = {
             "nlp_grad": gradients(program),

@@ -1,4 +1,4 @@
-"""What goes into a nonlinear solver and what comes out of it."""
+"""Inputs and results of a nonlinear solver."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ Report = Callable[[Progress], object]
 
 
 def in_stage(progress: Report | None, stage: str) -> Report | None:
-    """`progress` that says in which of several solves it is."""
+    """`progress` with the name of one of several solves."""
     if progress is None:
         return None
     return lambda now: progress(replace(now, stage=stage))
@@ -59,7 +59,7 @@ class Iterate:
 @final
 @dataclass(frozen=True)
 class SolverStatistics:
-    """What one optimisation, or several in a row, cost.
+    """Effort of one optimisation, or of several in a row.
 
     Attributes:
         unknowns, constraints: size of the nonlinear program, the last one of several.
@@ -96,7 +96,7 @@ class SolverStatistics:
 @final
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a solver returned; a failed solve is an outcome, too.
+    """Result of a solver; a failed solve is an outcome, too.
 
     Attributes:
         iterate: the solution, or the best point seen: among feasible ones that of least cost, else
@@ -130,7 +130,7 @@ class Outcome:
 
 
 def outside(values: Array, lower: Array, upper: Array) -> Array:
-    """How far each value is outside its bounds; infinity for one that is not finite."""
+    """Distance of each value from its bounds; infinity for one that is not finite."""
     far = np.maximum(0.0, np.maximum(lower - values, values - upper))
     return np.where(np.isfinite(values), far, np.inf)
 

@@ -50,7 +50,7 @@ HALTED = {
     Halt.TIME: Status.TIME_LIMIT,
     Halt.FAR: Status.UNBOUNDED,
 }
-"""Who stopped the solver -> how the solve ended."""
+"""Reason to stop -> end of the solve."""
 
 LEAN: dict[str, Any] = {
     "print_time": False,
@@ -58,7 +58,7 @@ LEAN: dict[str, Any] = {
     "calc_lam_p": False,
     "no_nlp_grad": True,
 }
-"""Nothing is printed, and no derivatives are made that nobody asks for."""
+"""Nothing is printed, and no unused derivatives are made."""
 
 
 def made(
@@ -189,7 +189,7 @@ class Prepared:
     def _called(
         self, solver: Built, watch: Watch, arguments: Mapping[str, Array]
     ) -> tuple[Mapping[str, ca.DM] | None, str, Status]:
-        """What the solver returns, its answer and what that means."""
+        """Result of the solver, its answer and the meaning of that."""
         solver.hook.watch = watch
         try:
             with interrupts(watch):

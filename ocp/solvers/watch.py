@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -31,7 +31,7 @@ RESTING = 1e-6
 
 
 class Halt(Enum):
-    """Who stopped the solver."""
+    """Reasons to stop a solver."""
 
     USER = "the user"
     TIME = "the time limit"
@@ -53,7 +53,7 @@ class Seen:
 
     @property
     def finite(self) -> bool:
-        """Whether cost and rows are numbers."""
+        """True if cost and rows are numbers."""
         return bool(np.isfinite(self.f) and np.isfinite(self.violation))
 
     def better_than(self, other: "Seen | None") -> bool:
@@ -117,12 +117,12 @@ class Watch:
 
     @property
     def cycles(self) -> bool:
-        """Whether the last iterations went round (see `goes_round`)."""
+        """True if the last iterations went round (see `goes_round`)."""
         return goes_round(self.trace)
 
 
 def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
-    """Whether neither cost nor violation got better in the last iterations, while w kept moving.
+    """True if neither cost nor violation got better in the last iterations, while w kept moving.
 
     This is what a Newton method does at a kink that is smoothed over less than one step: it jumps
     from one side to the other.
@@ -144,28 +144,49 @@ def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
     return bool(moves and not closer and not cheaper)
 
 
-@final
-class IterationHook(ca.Callback):
-    """Shows every iterate of a solver that has a callback (Ipopt, SQP) to the current `watch`."""
+class Shaped(ca.Callback):
+    """A function of CasADi that calls Python, with arguments and one result of given shapes."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(
+        self, name: str, inputs: Mapping[str, ca.Sparsity], output: str, shape: ca.Sparsity
+    ) -> None:
         super().__init__()
-        n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
-        self._rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
-        self.watch: Watch | None = None
-        self.construct("watch", {})
+        self._inputs, self._output, self._shape = [*inputs.items()], output, shape
+        self.construct(name, {})
 
     def get_n_in(self) -> int:  # noqa: D102
-        return ca.nlpsol_n_out()
+        return len(self._inputs)
 
     def get_n_out(self) -> int:  # noqa: D102
         return 1
 
     def get_name_in(self, i: int) -> str:  # noqa: D102
-        return ca.nlpsol_out(i)
+        return self._inputs[i][0]
+
+    def get_name_out(self, i: int) -> str:  # noqa: D102
+        del i
+        return self._output
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return ca.Sparsity.dense(self._rows[ca.nlpsol_out(i)], 1)
+        return self._inputs[i][1]
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
+        del i
+        return self._shape
+
+
+@final
+class IterationHook(Shaped):
+    """Shows every iterate of a solver that has a callback (Ipopt, SQP) to the current `watch`."""
+
+    def __init__(self, program: Program) -> None:
+        n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
+        rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
+        names = [ca.nlpsol_out(i) for i in range(ca.nlpsol_n_out())]
+        self.watch: Watch | None = None
+        super().__init__(
+            "watch", {n: ca.Sparsity.dense(rows[n], 1) for n in names}, "stop", ca.Sparsity.dense(1)
+        )
 
     def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
         if self.watch is None:
@@ -176,39 +197,18 @@ class IterationHook(ca.Callback):
 
 
 @final
-class GradientHook(ca.Callback):
+class GradientHook(Shaped):
     """The gradient of the cost, through which a solver without callback (fatrop) is watched.
 
-    It is asked for once an iteration, at the new iterate. To stop the solver, it returns NaN.
+    It is evaluated once an iteration, at the new iterate. To stop the solver, it returns NaN.
     """
 
-    def __init__(self, program: Program, n: int) -> None:
-        super().__init__()
+    def __init__(self, program: Program) -> None:
         self._gradient = program.gradient
-        self._sizes = (n, program.p.numel())
         self._values = ca.Function("values", [program.w, program.p], [program.f, program.g])
         self.watch: Watch | None = None
-        self.construct("nlp_grad_f", {})
-
-    def get_n_in(self) -> int:  # noqa: D102
-        return 2
-
-    def get_n_out(self) -> int:  # noqa: D102
-        return 1
-
-    def get_name_in(self, i: int) -> str:  # noqa: D102
-        return ("x", "p")[i]
-
-    def get_name_out(self, i: int) -> str:  # noqa: D102
-        del i
-        return "grad_f_x"
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return ca.Sparsity.dense(self._sizes[i], 1)
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
-        del i
-        return ca.Sparsity.dense(self._sizes[0], 1)
+        x, p = (ca.Sparsity.dense(part.numel(), 1) for part in (program.w, program.p))
+        super().__init__("nlp_grad_f", {"x": x, "p": p}, "grad_f_x", x)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         slope = ca.densify(self._gradient(*arg)[1])
@@ -277,20 +277,20 @@ def sentence(
     values: Array,
     at: At,
 ) -> str:
-    """How the solve ended, what is worst at `point`, and what to try."""
+    """End of the solve, worst row at `point`, and what to try."""
     if status.ok:
         return status.value
     count = watch.iterations
-    said = _reason(watch, status, answer, solver, max_time)
+    reason = _reason(watch, status, answer, solver, max_time)
     if watch.halt is None:
-        said += f" ({solver} after {count} iterations: {answer}.)"
+        reason += f" ({solver} after {count} iterations: {answer}.)"
     if status is Status.NOT_FINITE:
         tried = [seen for seen in (watch.last, point) if seen is not None]
         named = (not_finite(program, seen.w, values, at) for seen in tried)
-        return f"{said} {next(filter(None, named), TRIED)}"
+        return f"{reason} {next(filter(None, named), TRIED)}"
     if watch.cycles:
-        said += " The last iterations go round without getting better, as they do at a kink."
-    return f"{said} {worst(program, point, at)}"
+        reason += " The last iterations go round without getting better, as they do at a kink."
+    return f"{reason} {worst(program, point, at)}"
 
 
 def _reason(watch: Watch, status: Status, answer: str, solver: str, max_time: float | None) -> str:
@@ -328,7 +328,7 @@ def worst(program: Program, point: Seen, at: At) -> str:
 
 
 def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
-    """Which equation, or derivative of one, is NaN or infinite at `w`; empty if none is."""
+    """Equation, or derivative of one, that is NaN or infinite at `w`; empty if none is."""
     cost, slope = program.gradient(w, values)
     g, jacobian = program.jacobian(w, values)
     rows, columns = (np.array(part) for part in jacobian.sparsity().get_triplet())
@@ -351,6 +351,6 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
 
 
 def plainly(w: Array, place: Place) -> str:
-    """When a place is, where no durations are known."""
+    """Time of a place as a fraction, without known durations."""
     del w
     return f"at {place.fraction:.4g} of the duration"

@@ -5,7 +5,7 @@ gradient, the Jacobian and the Hessian is one constant sparse matrix each, made 
 nothing is differentiated again, and the graph does not grow with the mesh.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import final
@@ -19,7 +19,7 @@ from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Sele
 @final
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Where the shares of one cost go.
+    """Place of the shares of one cost.
 
     Attributes:
         weight: factor in the objective; 0 where a row bounds the cost instead.
@@ -77,8 +77,8 @@ def assemble(
         if part.block.share is not None and part.weight:
             f += part.weight * ca.sum2(part.mapped(part.block.share)[0])
     g = _rows(parts, [part.rows_alone() for part in parts], constant, w, m)
-    gradient, jacobian, hessian = _Sum((n, 1)), _Sum((m, n)), _Sum((n, n))
-    gradient.constant(np.arange(n), np.zeros(n, np.int64), c)
+    gradient, jacobian, hessian = _Sum((1, n)), _Sum((m, n)), _Sum((n, n))
+    gradient.constant(np.zeros(n, np.int64), np.arange(n), c)
     jacobian.constant(*constant)
     rows: list[ca.MX] = []
     for part in parts:
@@ -88,20 +88,14 @@ def assemble(
         part.add_hessian(hessian, lam_f, lam_g)
     J, H = jacobian.matrix(), hessian.matrix()
     both = [_rows(parts, rows, constant, w, m), J]
+    slope = ca.densify(gradient.matrix()).T
+    multipliers = ["x", "p", "lam_f", "lam_g"]
     return Assembled(
         f,
         g,
-        ca.Function(
-            "nlp_grad_f", [w, p], [f, ca.densify(gradient.matrix())], ["x", "p"], ["f", "grad_f_x"]
-        ),
+        ca.Function("nlp_grad_f", [w, p], [f, slope], ["x", "p"], ["f", "grad_f_x"]),
         ca.Function("nlp_jac_g", [w, p], both, ["x", "p"], ["g", "jac_g_x"]),
-        ca.Function(
-            "nlp_hess_l",
-            [w, p, lam_f, lam_g],
-            [H],
-            ["x", "p", "lam_f", "lam_g"],
-            ["triu_hess_gamma_x_x"],
-        ),
+        ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [H], multipliers, ["triu_hess_gamma_x_x"]),
         at,
     )
 
@@ -111,17 +105,18 @@ def _slot(slot: Slot, at: tuple[Indices, ...]) -> tuple[float, int]:
 
 
 Triplets = tuple[Indices, Indices, Array]
+"""Rows, columns and values."""
+EMPTY: Triplets = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
 
 
 def _linear(pieces: Sequence[Piece], at: tuple[Indices, ...]) -> Triplets:
     """Rows, columns and values of A."""
-    rows, columns, weights = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    found = [EMPTY]
     for piece, numbers in zip(pieces, at, strict=True):
-        if piece.linear is not None:
-            rows.append(numbers[piece.linear.rows, piece.linear.places])
-            columns.append(piece.linear.columns)
-            weights.append(piece.linear.weights)
-    return np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
+        if (A := piece.linear) is not None:
+            found.append((numbers[A.rows, A.places], A.columns, A.weights))
+    rows, columns, weights = map(np.concatenate, zip(*found, strict=True))
+    return rows, columns, weights
 
 
 @final
@@ -181,15 +176,12 @@ class _Part:
 
     def add_slopes(self, gradient: "_Sum", jacobian: "_Sum") -> None:
         """Derivative of the share of the cost."""
-        places = self.piece.places
         (slopes,) = self.mapped(self.block.slopes)
-        if self.weight:
-            entries, s = self.block.of_slopes, self.selection
-            column = np.zeros((1, places), np.int64)
-            gradient.transposed(entries, column, s, slopes, self.weight)
-        if self.bounded >= 0:
-            row = np.full((1, places), self.bounded)
-            jacobian.add(self.block.of_slopes, row, self.selection, slopes)
+        bounded = float(self.bounded >= 0)
+        for matrix, row, weight in ((gradient, 0, self.weight), (jacobian, self.bounded, bounded)):
+            if weight:
+                rows = np.full((1, self.piece.places), row)
+                matrix.add(self.block.of_slopes, rows, self.selection, slopes, weight)
 
     def add_jacobian(self, jacobian: "_Sum") -> ca.MX:
         """Derivative of the rows; returns their values as `rows_alone`."""
@@ -241,19 +233,18 @@ class _Sum:
         kept = values != 0.0
         self.fixed.append((rows[kept], columns[kept], values[kept]))
 
-    def add(self, entries: Entries, rows: Indices, selection: Selection, values: ca.MX) -> None:
+    def add(
+        self,
+        entries: Entries,
+        rows: Indices,
+        selection: Selection,
+        values: ca.MX,
+        weight: float = 1,
+    ) -> None:
         """Add a derivative by v: `rows` (m, places) of the matrix, `values` (nv, places)."""
         source, columns, weights = _terms(selection, entries.columns)
         at = rows[entries.rows[source]].T
-        self._put(entries, source, at, columns, weights, values)
-
-    def transposed(
-        self, entries: Entries, columns: Indices, selection: Selection, values: ca.MX, weight: float
-    ) -> None:
-        """Add the transpose of a derivative by v times `weight`."""
-        source, rows, weights = _terms(selection, entries.columns)
-        at = columns[entries.rows[source]].T
-        self._put(entries, source, rows, at, weight * weights, values)
+        self._put(entries, source, at, columns, weight * weights, values)
 
     def symmetric(self, entries: Entries, selection: Selection, values: ca.MX) -> None:
         """Add the upper triangle of S' H S; `entries` are those of the upper triangle of H."""
@@ -262,10 +253,10 @@ class _Sum:
         a, b = _pairs(first, second, entries.rows.size)
         source, left, right = first[a], left[:, a], right[:, b]
         weights = by_left[:, a] * by_right[:, b]
-        beside = (entries.rows != entries.columns)[source]
-        # An entry beside the diagonal of H stands for two: both meet where its unknowns share one.
-        weights = weights * np.where(beside & (left == right), 2.0, 1.0)
-        weights = weights * (beside | (left <= right))
+        off = (entries.rows != entries.columns)[source]
+        # An entry off the diagonal of H stands for two: both meet where its unknowns share one.
+        weights = weights * np.where(off & (left == right), 2.0, 1.0)
+        weights = weights * (off | (left <= right))
         upper = np.minimum(left, right), np.maximum(left, right)
         self._put(entries, source, *upper, weights, values)
 
@@ -301,8 +292,7 @@ class _Sum:
 
     def matrix(self) -> ca.MX:
         """The matrix, with the entries that may be there."""
-        fixed = [np.concatenate(part) for part in zip(*self.fixed, strict=True)]
-        rows, columns, numbers = fixed if fixed else _none()
+        rows, columns, numbers = map(np.concatenate, zip(EMPTY, *self.fixed, strict=True))
         count = rows.size
         rows, columns = np.concatenate([rows, *self.rows]), np.concatenate([columns, *self.columns])
         keys, number = np.unique(columns * self.shape[0] + rows, return_inverse=True)
@@ -341,10 +331,6 @@ def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:
     return ca.vertcat(*parts)[index.tolist()]
 
 
-def _none() -> list[Indices]:
-    return [np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)]  # type: ignore[list-item]
-
-
 def _terms(selection: Selection, unknowns: Indices) -> tuple[Indices, Indices, Array]:
     """For entries of the local `unknowns`: entry of each term, its columns and weights in w."""
     first = np.searchsorted(selection.local, unknowns, side="left")
@@ -376,6 +362,3 @@ def _sparsity(rows: Indices, columns: Indices, shape: tuple[int, int]) -> ca.Spa
     """The pattern of entries in columnwise order."""
     starts = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=shape[1]))])
     return ca.Sparsity(*shape, starts.tolist(), rows.tolist())
-
-
-__all__: Iterable[str] = ("Assembled", "Slot", "assemble", "row_numbers")

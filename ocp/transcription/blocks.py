@@ -32,7 +32,7 @@ OPTIONS = {"cse": True}
 @final
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Which entries of a derivative there are, and which of them never change.
+    """Entries of a derivative, and those of them that never change.
 
     Attributes:
         rows, columns: of all structural nonzeros, columnwise, shape (nnz,).
@@ -47,7 +47,7 @@ class Entries:
 
     @cached_property
     def still(self) -> Indices:
-        """Which of them are constant, shape (nnz - nv,)."""
+        """Numbers of the constant ones, shape (nnz - nv,)."""
         return np.setdiff1d(np.arange(self.rows.size), self.varying)
 
 
@@ -139,7 +139,7 @@ class Selection:
 
     @cached_property
     def plain(self) -> bool:
-        """Whether each local unknown is one of w."""
+        """True if each local unknown is one of w."""
         return bool(
             np.array_equal(self.local, np.arange(self.local.size)) and (self.weights == 1.0).all()
         )
@@ -265,7 +265,7 @@ class Piece:
 
     @property
     def places(self) -> int:
-        """How many there are."""
+        """Number of places."""
         return self.order.size
 
 

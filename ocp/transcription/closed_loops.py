@@ -7,7 +7,7 @@ interval by the smallest correction, with multipliers mu, nu as further unknowns
     v_(k+1) = v_end + phi_q' nu,   phi_q v_(k+1) + phi_t = 0
 
 phi_q is taken at q_end, which makes a node an explicit function of the interval before. Coordinates
-may be named wherever values are asked for, dependent ones too: those that follow from the others
+may be named wherever values are given, dependent ones too: those that follow from the others
 are set free again, so that no condition stands twice.
 
 Source: Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12/13, 1985, 77-90 (constraints on two
@@ -149,25 +149,25 @@ def _range(A: Array, size: float) -> Array:
 
 
 CLOSED = 1e-7
-"""How far constraints may be off where named coordinates are said to satisfy them, over the change
+"""Largest residual of constraints that named coordinates count as satisfying, over the change
 by nominal coordinates; numbers that users write down have six digits or more."""
 BRANCH = 0.1
-"""How far named coordinates that follow from others may be off on the way to the solution, over
+"""Largest error of named coordinates that follow from others on the way to the solution, over
 nominal ones: beyond that the loops might close in another way."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of the coordinates, or of the rates, at a node with conditions.
+    """Known coordinates, or rates, at a node with conditions.
 
     Attributes:
-        asked: whether the constraints are rows there; not where they follow from links.
+        imposed: whether the constraints are rows there; not where they follow from links.
         released: states that are named and follow from others, and the range they get instead of
             their value.
     """
 
-    asked: bool = True
+    imposed: bool = True
     released: Mapping[int, Box] = field(default_factory=dict[int, Box])
 
 
@@ -196,7 +196,7 @@ class Closing:
 
     @property
     def released(self) -> dict[float, dict[int, Box]]:
-        """Fraction of T -> states whose values are not asked for there -> range instead."""
+        """Fraction of T -> states whose values are not conditions there -> range instead."""
         return {at: {**q.released, **v.released} for at, (q, v) in self.known.items()}
 
     def consistent(self, points: SpanPoints, nodes: Array, inner: Array) -> SpanPoints:
@@ -237,7 +237,7 @@ class Closing:
         number = self.local.number
         own = layout.spans[number]
         for level, what in enumerate(("loop", "rate of loop")):
-            dropped = {nodes[at] for at, known in self.known.items() if not known[level].asked}
+            dropped = {nodes[at] for at, known in self.known.items() if not known[level].imposed}
             every = range(own.intervals + 1 if everywhere else 1)
             at = np.array([k for k in every if k not in dropped], dtype=np.int64)
             if not at.size:
@@ -306,7 +306,7 @@ def _known(
     before: Span | None,
     start: tuple[Sequence[str], Collection[str]],
 ) -> tuple[Known, Known]:
-    """What is known at a node, and which of it follows from the rest.
+    """Known coordinates and rates at a node, and those among them that follow from the rest.
 
     `start` is periodic and named states of the start.
     """
@@ -330,7 +330,7 @@ def _known(
     for level in range(2):
         inside = range(level * n, (level + 1) * n)
         if all(linked.get(i, False) for i in range((level + 1) * n)):
-            found.append(Known(asked=False))  # rates are those of the same coordinates
+            found.append(Known(imposed=False))  # rates are those of the same coordinates
             continue
         given = [i - level * n for i in held if i in inside]
         plain = [i - level * n for i in inside if linked.get(i) is True or i in default]
@@ -350,9 +350,9 @@ def _known(
                 around = BRANCH * loops.nominal[i]
                 ranges[i] = meet(ranges[i], (target[i] - around, target[i] + around))
         found.append(Known(released=ranges))
-    asked = [i for i in held if i not in default]
-    if off := _rate_error(span, loops, (A, A_t), asked, target):
-        rates = [names[i] for i in asked if i >= n]
+    stated = [i for i in held if i not in default]
+    if off := _rate_error(span, loops, (A, A_t), stated, target):
+        rates = [names[i] for i in stated if i >= n]
         raise ValueError(_inconsistent(span, at, rates, off))
     return found[0], found[1]
 
@@ -374,7 +374,7 @@ def _linked(
 def _rate_error(
     span: Span, loops: Loops, rows: tuple[Array, Array], held: Sequence[int], target: Array
 ) -> float:
-    """How far rates are off that no motion through known coordinates has; 0 where there is one."""
+    """Error of rates that no motion through known coordinates has; 0 if there is one."""
     (A, A_t), n = rows, loops.n
     known = [i for i in held if i >= n]
     free_q = [i for i in range(n) if i not in held]

@@ -58,7 +58,7 @@ class Engine:
     @cached_property
     def _instructions(self) -> int:
         if not self.block.rows.is_a("SXFunction"):
-            return 0  # calls of other functions, which nobody writes as one C file
+            return 0  # calls of other functions are not one C file
         return sum(function.n_instructions() for function in self._functions.values())
 
     @cached_property
@@ -93,7 +93,7 @@ class Engine:
 
 
 LEAST, MOST = 1e-6, 1e6
-"""How far rows that have no nominal value are scaled by their derivatives."""
+"""Range of the scales of rows without nominal value, which are their derivatives."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""What holds at single nodes and between spans: ends, via points, links, joins, end costs."""
+"""Conditions at single nodes and between spans: ends, via points, links, joins, end costs."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ def columns_at(
     span, d = layout.spans[local.number], scheme.degree
     interval, offset = (0, 0.0) if node == 0 else (node - 1, 1.0)
     x: Columns = span.nodes[:, [node]]
-    z: Columns = span.z[:, :1]  # under shooting nobody asks
+    z: Columns = span.z[:, :1]  # not used under shooting
     if node and d:
         points = slice(interval * d, node * d)
         z = _sum(span.z[:, points], scheme.inner_ends)
@@ -135,7 +135,7 @@ def at_starts(local: Local, rows: Sequence[Row]) -> AtStarts:
 
 
 def _knows_inside(span: Span, expression: ca.SX) -> bool:
-    """Whether an expression holds algebraic variables or inputs."""
+    """True if an expression holds algebraic variables or inputs."""
     inside = ca.vertcat(span.model.vector("z"), span.model.vector("u"))
     return bool(inside.numel()) and bool(ca.depends_on(expression, inside))
 

@@ -16,7 +16,7 @@ from symfric.foundation import checks
 
 SAME_NODE = 1e-9
 MOST_INTERVALS = 10**6
-"""Beyond these a program has no room in any memory."""
+"""Programs with more intervals exceed any memory."""
 
 WHAT = "their number or increasing fractions of T from 0 to 1"
 
@@ -36,10 +36,15 @@ def make_mesh(span: Span, intervals: int | ArrayLike) -> Array:
         mesh = np.linspace(0.0, 1.0, count + 1)
     else:
         mesh = checks.array("intervals", intervals, what=WHAT)
-        if mesh.size < 2 or mesh[0] != 0.0 or mesh[-1] != 1.0 or not (np.diff(mesh) > 0).all():
+        if not _bounds_intervals(mesh):
             raise ValueError(f"intervals: expected {WHAT}, got {intervals!r}")
     missing = [s for s in span.nodes if np.abs(mesh - s).min() > SAME_NODE]
     return np.sort(np.concatenate([mesh, missing]))
+
+
+def _bounds_intervals(mesh: Array) -> bool:
+    """Increasing fractions from 0 to 1, at least two."""
+    return mesh.size > 1 and mesh[0] == 0.0 and mesh[-1] == 1.0 and bool((np.diff(mesh) > 0).all())
 
 
 def make_meshes(problem: Problem, intervals: int | ArrayLike | Sequence[ArrayLike]) -> list[Array]:
@@ -71,7 +76,7 @@ def _first(intervals: object) -> Any:
 
 
 def _counts(intervals: Sequence[object], phases: int) -> bool:
-    """Whether these are numbers of intervals, one a phase, and no fractions."""
+    """True if these are numbers of intervals, one a phase, and no fractions."""
     return len(intervals) == phases and all(
         (number := checks.as_number(value)) is not None and number >= 1 for value in intervals
     )
@@ -112,7 +117,7 @@ def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]
             f"{len(given)}"
         )
     for span, mesh in zip(spans, given, strict=True):
-        if mesh.size < 2 or mesh[0] != 0.0 or mesh[-1] != 1.0 or not (np.diff(mesh) > 0).all():
+        if not _bounds_intervals(mesh):
             raise ValueError(
                 f"mesh of {span.name}: expected increasing fractions of T from 0 to 1, got "
                 f"{mesh.size} numbers from {mesh[0]:g} to {mesh[-1]:g}"

@@ -17,7 +17,7 @@ from ocp.transcription.unknowns import Layout
 @final
 @dataclass(frozen=True)
 class Place:
-    """What a row or an unknown of the program is about.
+    """Name and place of a row or an unknown of the program.
 
     Attributes:
         name: "the equation of v", "force".
@@ -34,7 +34,7 @@ class Place:
 
 @final
 class Places(Sequence[Place]):
-    """Places of all rows or unknowns, made only when somebody asks."""
+    """Places of all rows or unknowns, made on demand."""
 
     def __init__(
         self, count: int, make: Callable[[], tuple[Sequence[str], Indices, Indices, Array, Array]]
@@ -77,7 +77,7 @@ class Stages:
 
 
 def no_structure() -> tuple[Stages | None, str]:
-    """Of a program that nobody has looked at."""
+    """Structure of a program that was not analysed."""
     return None, "no known structure"
 
 
@@ -97,7 +97,7 @@ class Program:
         values: numbers of p.
         rows, unknowns: what each row and each unknown is about.
         scale: SI values of the unknowns divided by w.
-        structure: looks for stages when somebody asks.
+        structure: finds the stages, on demand.
     """
 
     w: ca.MX
@@ -180,7 +180,7 @@ def stages_of(
 
 
 def _common(problem: Problem, layout: Layout) -> str:
-    """What all of the motion has in common, if there is such a thing."""
+    """Name of an unknown that all of the motion has in common, if there is one."""
     if len(problem.scenarios) > 1:
         return "several scenarios"
     if problem.chosen:
@@ -215,7 +215,7 @@ def _rows(
 
 
 def _named(pieces: tuple[Piece, ...], made: Assembled, row: int) -> str:
-    """What a row is called."""
+    """Name of a row."""
     for piece, at in zip(pieces, made.at, strict=True):
         for name, numbers in zip(piece.names, at, strict=True):
             if row in numbers:

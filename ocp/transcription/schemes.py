@@ -1,4 +1,4 @@
-"""How a motion is put on a mesh: collocation after Radau or Gauss-Legendre, or shooting."""
+"""Discretisation of a motion on a mesh: collocation after Radau or Gauss-Legendre, or shooting."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -48,7 +48,7 @@ class Coefficients:
 
     @property
     def meets_end(self) -> bool:
-        """Whether the last collocation point is the end of the interval."""
+        """True if the last collocation point is the end of the interval."""
         return bool(self.nodes[-1] == 1.0)
 
 
@@ -76,7 +76,7 @@ class Radau:
         return 2 * self.degree - 1
 
     def coefficients(self) -> Coefficients:
-        """What defines the method on an interval."""
+        """Coefficients of the method on an interval."""
         return _collocation("radau", self.degree)
 
 
@@ -105,7 +105,7 @@ class Legendre:
         return 2 * self.degree
 
     def coefficients(self) -> Coefficients:
-        """What defines the method on an interval."""
+        """Coefficients of the method on an interval."""
         return _collocation("legendre", self.degree)
 
 

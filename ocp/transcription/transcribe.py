@@ -39,6 +39,7 @@ from ocp.transcription.conditions import (
     whole,
 )
 from ocp.transcription.grid import bounds_of, check_meshes, nodes_of, scale_of
+from ocp.transcription.program import Program
 from ocp.transcription.schemes import Coefficients, Scheme, Shooting
 from ocp.transcription.shooting import Shot, pieces_of_intervals, shot
 from ocp.transcription.transcription import LARGEST, Skeleton, Transcription, numbers_of
@@ -118,19 +119,23 @@ def skeleton_of(
         lower_g[at], upper_g[at] = (
             (bound / rows.scale)[:, None] for bound in (rows.lower, rows.upper)
         )
-    return Skeleton(
-        problem,
-        layout,
-        assembled,
+    program = Program(
         w,
         p,
-        tuple(pieces),
-        scale_of(problem, layout),
+        assembled.f,
+        assembled.g,
+        assembled.gradient,
+        assembled.jacobian,
+        assembled.hessian,
         *bounds_of(problem, layout, scheme, nodes, made.released),
         lower_g,
         upper_g,
-        made.closing,
+        values=np.zeros(0),
+        rows=(),
+        unknowns=(),
+        scale=scale_of(problem, layout),
     )
+    return Skeleton(problem, layout, program, tuple(pieces), assembled, made.closing)
 
 
 def _layout(made: Equations, scheme: Coefficients, meshes: Sequence[Array]) -> Layout:
@@ -215,12 +220,12 @@ class Discretisation:
 
     @property
     def problem(self) -> Problem:
-        """What was discretised."""
+        """The problem that was discretised."""
         return self.equations.problem
 
     @property
     def scheme(self) -> Scheme:
-        """How it was discretised."""
+        """The scheme of the discretisation."""
         return self.equations.scheme
 
     def on(self, meshes: Sequence[Array]) -> Transcription:

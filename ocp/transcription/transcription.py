@@ -25,25 +25,30 @@ from symfric.foundation.parameters import check_names
 @final
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """What programs on all meshes of the same numbers of intervals share."""
+    """The part that programs on all meshes of the same numbers of intervals share.
+
+    Attributes:
+        program: without numbers of parameters and names of rows and unknowns.
+        pieces, assembled: rows and costs, and their places in the program.
+        closing: of each span the constraints of its mechanism; None where it has none.
+    """
 
     problem: Problem
     layout: Layout
-    assembled: Assembled
-    w: ca.MX
-    p: ca.MX
+    program: Program
     pieces: tuple[Piece, ...]
-    scale: Array
-    lower: Array
-    upper: Array
-    lower_g: Array
-    upper_g: Array
+    assembled: Assembled
     closing: tuple[Closing | None, ...]
+
+    @property
+    def p(self) -> ca.MX:
+        """Parameters of the program."""
+        return self.program.p
 
     @cached_property
     def structure(self) -> tuple[Stages | None, str]:
         """Stages, or why there are none."""
-        equality = self.lower_g == self.upper_g
+        equality = self.program.lower_g == self.program.upper_g
         return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
 
 
@@ -83,11 +88,19 @@ class Transcription:
     program: Program = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "program", self._program())
+        shared, meshes = self.skeleton, self.meshes
+        program = replace(
+            shared.program,
+            values=numbers_of(self.problem, meshes, {}),
+            rows=Places(shared.program.g.numel(), lambda: _row_places(shared, meshes)),
+            unknowns=Places(self.layout.size, lambda: _unknown_places(self)),
+            structure=lambda: shared.structure,
+        )
+        object.__setattr__(self, "program", program)
 
     @property
     def layout(self) -> Layout:
-        """Where each unknown stands in w."""
+        """Places of the unknowns in w."""
         return self.skeleton.layout
 
     def pack(self, points: Points) -> Array:
@@ -100,7 +113,7 @@ class Transcription:
                 w[own.T] = span.T
         for column, choice in zip(self.layout.chosen, self.problem.chosen, strict=True):
             w[column] = points.chosen.get(choice.name, choice.guess)
-        w /= self.skeleton.scale
+        w /= self.program.scale
         if self.layout.largest >= 0:
             rows = [i for i, place in enumerate(self.program.rows) if place.name == LARGEST]
             g = np.asarray(self.program.jacobian(w, self.program.values)[0]).ravel()
@@ -109,7 +122,7 @@ class Transcription:
 
     def unpack(self, w: ArrayLike) -> Points:
         """The points in SI units that the vector `w` stands for."""
-        values = np.asarray(w, dtype=float).ravel() * self.skeleton.scale
+        values = np.asarray(w, dtype=float).ravel() * self.program.scale
         spans = tuple(
             SpanPoints(
                 float(values[own.T]) if own.T >= 0 else float(fixed_duration(span)),
@@ -136,7 +149,7 @@ class Transcription:
         return points.spans[span].T if isinstance(T, Free) else float(T)
 
     def inner_fractions(self, span: int) -> Array:
-        """Where the collocation points of a span are, as fractions of T, shape (N d,)."""
+        """Collocation points of a span as fractions of T, shape (N d,)."""
         mesh, nodes = self.meshes[span], self.scheme.coefficients().nodes[1:]
         inner = mesh[:-1, None] + np.diff(mesh)[:, None] * nodes
         if nodes.size and nodes[-1] == 1.0:
@@ -169,35 +182,13 @@ class Transcription:
         check_names("values", p or {}, sorted(known))
         return numbers_of(self.problem, given, p or {})
 
-    def _program(self) -> Program:
-        made = self.skeleton.assembled
-        s = self.skeleton
-        return Program(
-            w=s.w,
-            p=s.p,
-            f=made.f,
-            g=made.g,
-            gradient=made.gradient,
-            jacobian=made.jacobian,
-            hessian=made.hessian,
-            lower_w=s.lower,
-            upper_w=s.upper,
-            lower_g=s.lower_g,
-            upper_g=s.upper_g,
-            values=numbers_of(self.problem, self.meshes, {}),
-            rows=Places(made.g.numel(), lambda: _row_places(s, self.meshes)),
-            unknowns=Places(s.w.numel(), lambda: _unknown_places(self)),
-            scale=s.scale,
-            structure=lambda: s.structure,
-        )
-
 
 Columns = tuple[list[str], Indices, Indices, Array, Array]
 
 
 def _row_places(skeleton: Skeleton, meshes: Sequence[Array]) -> Columns:
     """Names of rows, and of each row number of the name, span, fraction, scale."""
-    m = skeleton.assembled.g.numel()
+    m = skeleton.program.g.numel()
     names: list[str] = []
     name, span = np.zeros(m, np.int64), np.zeros(m, np.int64)
     fraction, scale = np.zeros(m), np.ones(m)
@@ -242,4 +233,4 @@ def _unknown_places(transcription: Transcription) -> Columns:
     if layout.largest >= 0:
         name[layout.largest] = len(names)
         names.append(LARGEST)
-    return names, name, owner, fraction, transcription.skeleton.scale
+    return names, name, owner, fraction, transcription.program.scale

@@ -51,7 +51,7 @@ class Points:
 @final
 @dataclass(frozen=True, eq=False)
 class SpanLayout:
-    """Where the unknowns of one span stand in w; what it shares with another stands there.
+    """Places of the unknowns of one span in w; shared ones are those of another span.
 
     Attributes:
         T: of the duration; -1 where it is fixed.
@@ -213,7 +213,7 @@ class Local:
 
     @property
     def free(self) -> bool:
-        """Whether the duration is chosen."""
+        """True if the duration is chosen."""
         return isinstance(self.span.T, Free)
 
     @property
