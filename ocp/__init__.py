@@ -7,8 +7,8 @@ done about friction.
 from ocp.checking.verification import Miss as Miss
 from ocp.checking.verification import Verification as Verification
 from ocp.checking.verify import verify as verify
-from ocp.friction.exact import set_valued as set_valued
-from ocp.friction.referee import verify_exactly as verify_exactly
+from ocp.friction.event_check import set_valued as set_valued
+from ocp.friction.event_check import verify_exactly as verify_exactly
 from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
 from ocp.mpc.closed_loop import plot_loops as plot_loops
 from ocp.mpc.controller import Controller as Controller

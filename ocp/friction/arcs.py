@@ -33,7 +33,7 @@ from typing import TypeVar, final
 import casadi as ca
 
 from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
-from ocp.friction.release import SIDES, excess, rubbing
+from ocp.friction.mode_models import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
 from ocp.text.problem import Duration, Problem

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
 from ocp.solve import solve
-from ocp.solving.perturbed import perturbed
+from ocp.solving.random_starts import perturbed
 from ocp.solving.starts import Start, initial_points
 from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes

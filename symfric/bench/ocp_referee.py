@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.friction.exact import set_valued
+from ocp.friction.event_check import set_valued
 from ocp.result.solution import Solution
 from ocp.text.problem import Problem
 from ocp.text.span import Span

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ocp.checking.holding import holding_losses
-from ocp.checking.refine import MeshErrors, refined
+from ocp.checking.interval_errors import zoh_losses
+from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.problems.others import brachistochrone, bryson_denham
 from ocp.solvers.ipopt import Ipopt
 from ocp.solving.one_solve import solve_on
@@ -34,7 +34,7 @@ def losses_of(problem: Problem, intervals: int) -> tuple[float, tuple[Array, ...
     solution = solve_on(transcription, Ipopt().prepared(transcription.program))
     assert solution.status.ok
     iterate = solution.iterate
-    return solution.cost, holding_losses(transcription, iterate.w, iterate.lam_g)
+    return solution.cost, zoh_losses(transcription, iterate.w, iterate.lam_g)
 
 
 def double_integrator(

@@ -7,9 +7,8 @@ import casadi as ca
 import pytest
 
 import ocp.job as job
-from ocp.friction.mode_models import mode_model
-from ocp.friction.release import holding
-from ocp.friction.sharpen import FINE
+from ocp.friction.homotopy import FINE
+from ocp.friction.mode_models import holding, mode_model
 from ocp.problems.friction import out_and_back
 from ocp.solve import solve
 from ocp.text.cost import integral

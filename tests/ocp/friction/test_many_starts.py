@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from ocp.friction.many_starts import starts_around
 from ocp.problems.friction import cart_pendulum, load_through_spring
+from ocp.solving.random_starts import starts_around
 from ocp.solving.starts import initial_points
 from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes

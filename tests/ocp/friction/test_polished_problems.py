@@ -3,7 +3,7 @@
 import casadi as ca
 import pytest
 
-from ocp.friction.referee import verify_exactly
+from ocp.friction.event_check import verify_exactly
 from ocp.problems.friction import cart_pendulum, load_through_spring
 from ocp.solve import solve
 from ocp.text.cost import integral

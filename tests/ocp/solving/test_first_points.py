@@ -6,7 +6,7 @@ from motions import double_integrator
 from phases import UNIT, there_and_back, unit_move
 
 from ocp.solving.one_solve import solve_once
-from ocp.solving.perturbed import perturbed
+from ocp.solving.random_starts import perturbed
 from ocp.solving.starts import Guess, initial_points, resample, start_of
 from ocp.text.cost import integral
 from ocp.text.phase import Phase
