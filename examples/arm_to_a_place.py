@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ocp import Phase, Problem, Signals, integral, solve
-from ocp.friction.mode_models import smooth_model
+from ocp.friction.smooth_models import smooth_model
 from symfric import BrownMcPhee
 from symfric.scenes import Arm
 

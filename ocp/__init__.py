@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from ocp.formulation.phase import Phase as Phase
     from ocp.formulation.problem import Problem as Problem
     from ocp.formulation.templates import rest_to_rest as rest_to_rest
-    from ocp.friction.exact import set_valued as set_valued
-    from ocp.friction.referee import verify_exactly as verify_exactly
+    from ocp.friction.event_check import set_valued as set_valued
+    from ocp.friction.event_check import verify_exactly as verify_exactly
     from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
     from ocp.mpc.closed_loop import plot_loops as plot_loops
     from ocp.mpc.controller import Controller as Controller
@@ -58,8 +58,7 @@ else:
             "ocp.formulation.phase": "Chain Phase",
             "ocp.formulation.problem": "Problem",
             "ocp.formulation.templates": "rest_to_rest",
-            "ocp.friction.exact": "set_valued",
-            "ocp.friction.referee": "verify_exactly",
+            "ocp.friction.event_check": "set_valued verify_exactly",
             "ocp.mpc.closed_loop": "ClosedLoop plot_loops",
             "ocp.mpc.controller": "Controller controller_of",
             "ocp.result.solution": "Mode Solution load plot_solutions",

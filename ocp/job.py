@@ -8,22 +8,21 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.checking.refining import Goals, refined_solve
+from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verification import Verification
 from ocp.checking.verify import verified
 from ocp.checking.verify import verify as verify_solution
 from ocp.formulation.problem import Problem
-from ocp.friction.own_law import STEPS, OwnLaw
-from ocp.friction.polish import polish, refusal
-from ocp.friction.referee import verify_exactly
-from ocp.friction.scales import has_jumps, own_level, speeds_at
-from ocp.friction.sharpen import FINE, LAST, Sharp, sharpened
+from ocp.friction.event_check import verify_exactly
+from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
+from ocp.friction.mode_optimisation import polish, refusal
+from ocp.friction.smooth_models import has_jumps, own_level, speeds_at
+from ocp.original_law import STEPS, OriginalLaw
 from ocp.result.motion import Stored
 from ocp.result.solution import Solution
 from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
-from ocp.solving.clock import Clock
-from ocp.solving.one_solve import Solver
+from ocp.solving.one_solve import Clock, Solver
 from ocp.solving.starts import Start
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau, Scheme, Shooting
@@ -283,7 +282,7 @@ class Job:
             self.scheme if isinstance(self.scheme, Shooting) else Shooting("exponential", STEPS)
         )
         solver = self.solver if isinstance(self.solver, Ipopt) else Ipopt()
-        way = OwnLaw(self.problem, scheme, solver, self.tolerance, self.clock, self.progress)
+        way = OriginalLaw(self.problem, scheme, solver, self.tolerance, self.clock, self.progress)
         try:
             own = way.solved(exact)
         except FAILURES as error:  # mechanisms, algebraic variables

@@ -1,4 +1,4 @@
-"""Solve a problem: as it is, or with friction by way of smooth layers and modes; then look."""
+"""Solve an optimal control problem, directly or by homotopy in the width of friction; verify it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,8 +11,7 @@ from ocp.formulation.validate import doubts
 from ocp.result.solution import Solution
 from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Report
-from ocp.solving.clock import Clock
-from ocp.solving.one_solve import Solver
+from ocp.solving.one_solve import Clock, Solver
 from ocp.solving.starts import STARTS, Start
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
@@ -55,10 +54,10 @@ def solve(
         "auto"     "modes" where the layer of the law is narrower than a hundredth of the speeds;
                    else "sharpen" down to the law itself. Without contacts that hold, "smooth".
         "modes"    layers from wide to narrow, then the modes of each contact, slip and stick, with
-                   the instants between them (`ocp.friction.polish`): for exact Coulomb friction
-                   with stiction, whatever smooths it. `solution.modes` tells them. A law with
-                   states (LuGre, GMS) is replaced by its steady sliding and its static level, and
-                   the result verified with the law itself. If it misses, `Shooting` with
+                   the instants between them (`ocp.friction.mode_optimisation`): for exact Coulomb
+                   friction with stiction, whatever smooths it. `solution.modes` lists them. A law
+                   with states (LuGre, GMS) is replaced by its steady sliding and its static level,
+                   and the result verified with the law itself. If it misses, `Shooting` with
                    exponential steps goes on from there with the law itself where it can; the
                    message says so. `scheme=Shooting(...)` with "auto" always does.
         "sharpen"  layers from wide to narrow, down to those of the law, or as far as it gets.

@@ -7,8 +7,7 @@ from typing import Any
 import casadi as ca
 
 from ocp.formulation.phase import Span
-from ocp.friction.mode_models import mode_model, with_outputs
-from ocp.friction.release import SIDES, holding, rubbing
+from ocp.friction.mode_models import SIDES, holding, mode_model, rubbing, with_outputs
 from symfric.foundation.parameters import Variable
 from symfric.model import Contact, Model, Output
 

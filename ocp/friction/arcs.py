@@ -37,7 +37,7 @@ from ocp.formulation.phase import Chain, Phase, Start
 from ocp.formulation.problem import Problem
 from ocp.formulation.statement import Duration
 from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
-from ocp.friction.release import SIDES, excess, rubbing
+from ocp.friction.mode_models import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from symfric.foundation.symbols import stacked
 from symfric.model import Contact, Model

@@ -1,12 +1,30 @@
-"""The models that friction is solved with: smoothed over widths, and in one mode of each contact.
+"""The models in one mode of each contact, and what would hold a contact that slips.
 
-    smooth      F = the law with its widths as parameters, or a smooth stand-in for it
     slip, +-1   F = law.sliding(v, N, side)              its force on that side of v = 0
     stick, 0    F with dv/dt = 0, an algebraic unknown   while -level(-1) <= F <= level(+1)
 
-All of them have the names of the user's model, so that a cost, a bound or an output written for it
-holds for them; only the states of laws are gone. Mechanisms keep their implicit equations, with
-`F` and `0 = dv/dt` in the accelerations among them, and normal forces that follow from reactions.
+They have the names of the user's model, so that a cost, a bound or an output written for it holds
+for them; only the states of laws are gone. Mechanisms keep their implicit equations, with `F` and
+`0 = dv/dt` in the accelerations among them, and normal forces that follow from reactions.
+
+Contacts of a loop of one degree of freedom rest together. The slips are s_i = g_i(q) omega, with
+omega the speed along the tangent of the constraints. No equation tells how the contacts share the
+force T = sum g_i F_i that holds the loop. They hold it as long as they can, and that is with equal
+shares of what each can hold at most,
+
+    F_i = sign(g_i) S_i T / sum |g_k| S_k,   S_i the static level
+
+as in `symfric.multibody.applied`. All of them are at their levels at the same instant.
+
+A contact at rest stays there while the force this takes is below its static level. Whether it
+leaves rest depends on the control *after* that instant, which may differ from the one before, and
+is evaluated in the mode of slipping, where nothing holds the contact (`holding`): the force is part
+of the algebraic unknowns of the model in which it rests,
+
+    0 = alg(x, z, u),    with 0 = d slip / dt among its rows and the force among z,
+
+found by Newton's method from the values of slipping: in one step where the equations are affine in
+z, as without normal forces that follow from reactions.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,165 +35,86 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from ocp.friction.loops import Loop, loops_of
+from ocp.friction.smooth_models import (
+    jumps,
+)
 from symfric.foundation import checks
-from symfric.foundation.numeric import tanh
-from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
+from symfric.foundation.coupling import coupled
+from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked
-from symfric.laws import Law
 from symfric.laws.base import smooth
-from symfric.model import Contact, Model, Monitor, Output
+from symfric.model import Contact, Model, Output
+from symfric.multibody.mass import null_direction
 
+MINORS = 8
+"""Coordinates of a loop at most; its tangent is made of their minors."""
 RANK = 1e-11
 """Singular values below this share of the scaled equations count as zero."""
 UNLOADED = 1e-9
 """Static level [N] at the start below which nothing presses there."""
-WIDTH = 1e-3
-"""Width [m/s] of a stand-in by default, where the law has no velocity scale."""
+SIDES = {1: "up", -1: "down"}
+"""Outputs of mode models: room of a contact at rest to both sides, "<contact>_grip_<side>"."""
+NEWTON_STEPS = 2
+"""A normal force is the smoothed absolute value of reactions, affine but near zero."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Width:
-    """A parameter of a smooth model that sets how wide the layer around v = 0 is.
+class Loop:
+    """Contacts that rest together.
 
     Attributes:
-        contact: whose it is.
-        parameter: its name in `Model.p`, "<contact>_<width>".
-        number: its value in the user's model.
-        exponent: of the width in it: 1 for a width, -1 for a steepness.
-        layer: width of the layer [m/s] at `number`; None for one of a load, as `JointFriction.eps`.
+        members: the contacts, two or more.
+        along: g_i of each, in the coordinates.
     """
 
-    contact: str
-    parameter: str
-    number: float
-    exponent: int
-    layer: float | None
+    members: tuple[Contact, ...]
+    along: tuple[ca.SX, ...]
 
-    def at(self, layer: float) -> float:
-        """Its value for a layer of that width [m/s].
+    @property
+    def name(self) -> str:
+        """Of the force that holds it."""
+        return f"{self.members[0].name}_loop"
 
-        Raises:
-            ValueError: it is not one of velocities.
-        """
-        if self.layer is None:
-            raise checks.refused(self.parameter, "a width of velocities", "one of a load [N]")
-        return self.number * (layer / self.layer) ** self.exponent
-
-
-def smooth_model(model: Model) -> Model:
-    """`model` with the widths of all contacts as parameters, see `widths`.
-
-    Laws that neither smooth nor are smooth (with modes, with states, without regularisation) have
-    a stand-in with the same sliding force and static level. With s = tanh 4x, x = v / width,
-
-        F = (1 + s)/2 sliding(|v|, +1) + (1 - s)/2 sliding(-|v|, -1) + excess x / (x^2/4 + 3/4)^2
-
-    where the excess is what the static level has above sliding at v = 0.
-    Raises ValueError for laws without a force on each side of v = 0.
-    """
-    return _smoothed(model)[0]
-
-
-def widths(model: Model) -> tuple[Width, ...]:
-    """The widths of `smooth_model(model)`."""
-    return _smoothed(model)[1]
-
-
-def _smoothed(model: Model) -> tuple[Model, tuple[Width, ...]]:
-    kept: dict[str, Any] = model.memory
-    if "smooth model" not in kept:
-        kept["smooth model"] = _made_smooth(model) if model.contacts else (model, ())
-    return kept["smooth model"]
-
-
-def _made_smooth(model: Model) -> tuple[Model, tuple[Width, ...]]:
-    forces, p, found = dict[str, ca.SX](), list[Variable](), list[Width]()
-    watched: list[Monitor] = []
-    for c in model.contacts:
-        try:
-            force, own, scale = _smooth_force(model, c)
-        except ValueError as error:
-            raise ValueError(f"model '{model.name}': contact '{c.name}': {error}") from None
-        forces[c.name] = force
-        p += own
-        layer = float(at_start(scale, (*model.p, *own)))
-        if isfinite(layer):
-            watched.append(Monitor(c.slip, scale))
-        exponents = c.law.widths
-        found += [
-            Width(c.name, v.name, float(v.start), exponents.get(_local(c, v), 1), layer)
-            for v in own
+    def shares(self, force: ca.SX) -> list[ca.SX]:
+        """F_i [N] of each member, where `force` T holds the loop."""
+        levels = [(c.static_level(1) + c.static_level(-1)) / 2 for c in self.members]
+        weights = [
+            ca.SX(smooth.choose(g < 0, -1.0, 1.0)) * S
+            for g, S in zip(self.along, levels, strict=True)
         ]
-    loads = {v.name: (c.name, v) for c in model.contacts for v in c.widths.values()}
-    found += [Width(name, v.name, float(v.start), 1, None) for name, v in loads.values()]
-    p += [v for _, v in loads.values()]
-    return model.with_forces(forces, p=tuple(p), monitors=tuple(watched)), tuple(found)
+        total = sum((g * w for g, w in zip(self.along, weights, strict=True)), start=ca.SX(0))
+        return [w / total * force for w in weights]
+
+    def projected(self, changes: Sequence[ca.SX]) -> ca.SX:
+        """What is zero at rest, of the rates of change of the members' slips."""
+        pairs = zip(self.along, changes, strict=True)
+        return sum((g * change for g, change in pairs), start=ca.SX(0))
 
 
-def _local(contact: Contact, parameter: Variable) -> str:
-    return parameter.name.removeprefix(f"{contact.name}_")
-
-
-def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable], Any]:
-    """Force [N], its widths as parameters, and the velocity [m/s] over which it changes."""
-    law = _law(contact)
-    by_itself = not law.states and not any(i.name not in contact.further for i in law.inputs)
-    if by_itself and (law.widths or not jumps(model, contact)):
-        known = parameters(law)
-        own = [_parameter(model, contact, known[name]) for name in law.widths]
-        pairs = zip(law.widths, own, strict=True)
-        law = with_values(law, {name: v.symbol for name, v in pairs})
-        force = ca.SX(law.force(contact.slip, contact.N, (), **contact.further))
-        return force, [v for v in own if ca.depends_on(force, v.symbol)], law.velocity_scale
-    scale = float(at_start(law.velocity_scale, model.p))
-    width = Variable(
-        f"{contact.name}_width", contact.unit("m/s"), start=scale if isfinite(scale) else WIDTH,
-        nominal=scale if isfinite(scale) else WIDTH, lower=0.0, doc="width of the smoothed jump",
-    )  # fmt: skip
-    return _stand_in(contact, width.symbol), [width], width.symbol
-
-
-def _parameter(model: Model, contact: Contact, width: Parameter) -> Variable:
-    """A width of a law as a parameter of the model."""
-    number = float(at_start(width.value, model.p))
-    return Variable(
-        f"{contact.name}_{width.name}", contact.unit(width.unit), start=number, nominal=number,
-        lower=width.lower, upper=width.upper, doc=width.doc,
-    )  # fmt: skip
-
-
-def _stand_in(contact: Contact, width: ca.SX) -> ca.SX:
-    v, N, law, given = contact.slip, contact.N, _law(contact), contact.further
-    x, speed = v / width, smooth.magnitude(v, width)
-    s, bump = tanh(4 * x), x / (0.25 * (x * x) + 0.75) ** 2
-    force = ca.SX(0)
-    for side in (1, -1):
-        share = (1 + side * s) / 2
-        sliding = law.sliding(side * speed, N, side, **given)
-        top = law.static_level(N, side, **given) - side * law.sliding(0.0, N, side, **given)
-        force += share * (sliding + top * bump)
-    return force
-
-
-def _law(contact: Contact) -> Law:
-    law = contact.law
-    if not isinstance(law, Law):
-        raise checks.refused(f"contact '{contact.name}': law", "a law such as LuGre()", law)
-    return law
-
-
-def jumps(model: Model, contact: Contact) -> bool:
-    """Whether friction holds at rest at all, at the start of the parameters.
-
-    Viscous friction does not, nor does a contact that nothing presses.
-    """
-    law = _law(contact)
-    if ca.SX(contact.N).is_zero():
-        return False
-    one = law.static_level(1.0, 1, **dict.fromkeys(contact.further, 0.0))
-    return float(at_start(one, model.p)) != 0.0
+def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
+    """The loops of a mechanism in which several of `contacts` rest together."""
+    mechanics = model.holonomic
+    if mechanics is None or not mechanics.phi.numel() or ca.depends_on(mechanics.phi, model.t):
+        return ()
+    q, qd = model.vector("x")[: mechanics.n], model.vector("x")[mechanics.n : 2 * mechanics.n]
+    found: list[Loop] = []
+    pattern = ca.DM(ca.jacobian(mechanics.phi, q).sparsity(), 1).full() != 0
+    for columns, rows in coupled(pattern):
+        if len(columns) != len(rows) + 1 or len(columns) > MINORS:
+            continue
+        tangent = ca.SX(mechanics.n, 1)
+        tangent[columns] = null_direction(ca.jacobian(mechanics.phi, q)[rows, columns])
+        slopes = [(c, ca.jacobian(c.slip, qd)) for c in contacts]
+        touched = {c.name: {*G.sparsity().get_col()} for c, G in slopes}
+        members = [
+            (c, ca.SX(G @ tangent))
+            for c, G in slopes
+            if touched[c.name] and touched[c.name] <= {*columns}
+        ]
+        if len(members) > 1:
+            found.append(Loop(tuple(c for c, _ in members), tuple(g for _, g in members)))
+    return tuple(found)
 
 
 def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
@@ -185,8 +124,8 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
     "<contact>_grip_up" and "<contact>_grip_down" are what the static level leaves of it to both
     sides; both are above zero while the contact holds. What started at rest stays so; a sliding
     velocity that is not zero at the start of rest is kept. Contacts without a level at rest may be
-    left out. Contacts of a loop of one degree of freedom rest together, see `ocp.friction.loops`;
-    their reactions are outputs. The same modes of the same model give the same object.
+    left out. Contacts of a loop of one degree of freedom rest together (see above); their
+    reactions are outputs. The same modes of the same model give the same object.
 
     Raises:
         ValueError: names that are no contacts, contacts without a mode, modes that are none, and
@@ -348,3 +287,43 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
         f"determine, got {names} at rest together; in a loop of few degrees of freedom, or under a "
         "prescribed motion, how they share what holds them is open: let friction act in one of them"
     )
+
+
+def rubbing(model: Model) -> tuple[Contact, ...]:
+    """The contacts that can rest: friction that is zero at v = 0 has no modes."""
+    return tuple(contact for contact in model.contacts if jumps(model, contact))
+
+
+def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX, dict[int, ca.SX]]:
+    """The force [N] that holds `contact` at rest, or would, and what the static level leaves of it.
+
+    Args:
+        model: the model with contacts.
+        modes: +1, 0 or -1 of each contact; `contact` may slip or rest.
+        contact: name of the one in question.
+
+    Returns:
+        The force, and side -> room to that side, negative where friction cannot hold; SX (1, 1) in
+        the symbols of the mode model of `modes`. They do not depend on algebraic variables where
+        the equations are affine in these: at the start of an interval they are what states and
+        inputs there ask for.
+    """
+    moving, held = mode_model(model, modes), mode_model(model, {**modes, contact: 0})
+    symbols = [held.t, *(held.vector(letter) for letter in "xzup")]
+    z = symbols[2]
+    newton = z - ca.solve(ca.densify(ca.jacobian(held.alg, z)), held.alg)
+    step = ca.Function("step", symbols, [newton])
+    names = [f"{contact}_reaction", *(f"{contact}_grip_{side}" for side in SIDES.values())]
+    asked = ca.Function("asked", symbols, [held.expression(name) for name in names])
+    t, x, u, p = moving.t, *(moving.vector(letter) for letter in "xup")
+    known = {v.name: v.symbol for v in moving.z}  # each mode model has its own reactions
+    found = ca.vertcat(*(known.get(v.name, ca.SX(0)) for v in held.z))
+    for _ in range(NEWTON_STEPS):
+        found = step(t, x, found, u, p)
+    force, *rooms = (ca.SX(value) for value in asked.call([t, x, found, u, p]))
+    return force, dict(zip(SIDES, rooms, strict=True))
+
+
+def excess(model: Model, modes: Mapping[str, int], contact: str, side: int) -> ca.SX:
+    """By how much [N] the force that would hold `contact` exceeds its static level to a side."""
+    return -holding(model, modes, contact)[1][side]

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
 SAME_INSTANT = 1e-9
 """Part of the whole duration below which two instants are one."""
 
@@ -251,3 +250,55 @@ def _without(leg: Leg, shortest: float) -> Leg:
         replace(s, begin=a, end=b) for s, (a, b) in zip(merged, pairwise(starts), strict=True)
     ]
     return replace(leg, arcs=tuple(fitted))
+
+
+def neighbours(legs: Sequence[Leg], width: float) -> Iterator[tuple[Leg, ...]]:
+    """Sequences with one arc more, of about `width` [s], where changes of mode meet.
+
+    At the end of a leg the modes of the next one come earlier, or its own last longer, contact by
+    contact; inside a leg contacts that change together change one after the other.
+    """
+    for k, (leg, then) in enumerate(pairwise(legs)):
+        last, first = leg.arcs[-1], then.arcs[0]
+        for contact in _changes(last, first):
+            early = {**last.modes, contact: first.modes[contact]}
+            yield _with_leg(legs, k, _appended(leg, early, width))
+            late = {**first.modes, contact: last.modes[contact]}
+            yield _with_leg(legs, k + 1, _prepended(then, late, width))
+    for k, leg in enumerate(legs):
+        for i, (before, after) in enumerate(pairwise(leg.arcs)):
+            changes = _changes(before, after)
+            for contact in changes if len(changes) > 1 else ():
+                modes = {**before.modes, contact: after.modes[contact]}
+                half = min(width, before.duration, after.duration) / 2
+                t = before.end
+                parts = (
+                    replace(before, end=t - half),
+                    Arc(modes, t - half, t + half),
+                    replace(after, begin=t + half),
+                )
+                yield _with_leg(
+                    legs, k, replace(leg, arcs=(*leg.arcs[:i], *parts, *leg.arcs[i + 2 :]))
+                )
+
+
+def _changes(before: Arc, after: Arc) -> list[str]:
+    """Contacts of both arcs whose modes differ."""
+    both = [name for name in before.modes if name in after.modes]
+    return [name for name in both if before.modes[name] != after.modes[name]]
+
+
+def _with_leg(legs: Sequence[Leg], number: int, leg: Leg) -> tuple[Leg, ...]:
+    return (*legs[:number], leg, *legs[number + 1 :])
+
+
+def _appended(leg: Leg, modes: dict[str, int], width: float) -> Leg:
+    last = leg.arcs[-1]
+    t = last.end - min(width, last.duration / 2)
+    return replace(leg, arcs=(*leg.arcs[:-1], replace(last, end=t), Arc(modes, t, last.end)))
+
+
+def _prepended(leg: Leg, modes: dict[str, int], width: float) -> Leg:
+    first = leg.arcs[0]
+    t = first.begin + min(width, first.duration / 2)
+    return replace(leg, arcs=(Arc(modes, first.begin, t), replace(first, begin=t), *leg.arcs[1:]))

@@ -3,31 +3,143 @@
 Nothing is refined, sharpened or verified here; `ocp.solve` does these by calling this.
 """
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
 from time import perf_counter
+from typing import Any, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Solution
 from ocp.solvers.methods import Fatrop, Ipopt, Sqp
-from ocp.solvers.outcome import Outcome, Report
+from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solvers.prepared import Prepared
-from ocp.solving.kinks import narrow_widths
 from ocp.solving.starts import Start, start_of
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place
 from ocp.transcription.schemes import Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
-from ocp.transcription.unknowns import Points
+from ocp.transcription.unknowns import (
+    Points,
+    SpanPoints,
+)
+from symfric.foundation import checks
+from symfric.foundation.parameters import parameters
 from symfric.foundation.status import Status
+from symfric.model.contact import Contact
 
+LEAST = 1e-3
+"""A solver is given some time at least [s], and stops at once."""
 Array = NDArray[np.float64]
-
+NARROW = 0.02
+"""A width below this share of the largest sliding velocity is one that Newton steps jump over."""
+NAMED = 3
+"""Contacts that a sentence names."""
 Solver = Ipopt | Fatrop | Sqp
+
+
+@final
+@dataclass(frozen=True)
+class Clock:
+    """Runs from when it is made.
+
+    Attributes:
+        allowed: wall time [s] for all, or None for any.
+    """
+
+    allowed: float | None = None
+    started: float = field(default_factory=perf_counter)
+
+    @property
+    def left(self) -> float | None:
+        """What is left [s]; None for any."""
+        if self.allowed is None:
+            return None
+        return max(LEAST, self.allowed - (perf_counter() - self.started))
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left."""
+        return self.left == LEAST
+
+    def within(self, prepared: Prepared) -> Prepared:
+        """`prepared` with what is left as its limit, if that is less than its own."""
+        left = self.left
+        if left is None or (prepared.max_time is not None and prepared.max_time <= left):
+            return prepared
+        return replace(prepared, max_time=left, told_time=self.allowed)
+
+    def run(
+        self,
+        transcription: Transcription,
+        prepared: Prepared,
+        start: Iterate,
+        progress: Report | None,
+        stage: str,
+        values: ArrayLike | None = None,
+    ) -> Outcome:
+        """One solve within what is left, whose progress is that of a `stage`."""
+        at = partial(when, transcription)
+        return self.within(prepared).run(start, values, in_stage(progress, stage), at=at)
+
+
+def narrow_widths(transcription: Transcription, points: Points) -> str:
+    """A sentence that names contacts with narrow widths; empty if there are none.
+
+    Named are contacts that come to rest or turn round on the way, or whose widths smooth something
+    else than their sliding velocity.
+    """
+    found: dict[str, str] = {}
+    for span, at in zip(transcription.problem.spans, points.spans, strict=True):
+        for contact in span.model.contacts:
+            widths = list(_narrow(contact, span, at))
+            if widths and contact.name not in found:
+                found[contact.name] = f"contact '{contact.name}' has {' and '.join(widths)}"
+    if not found:
+        return ""
+    names = checks.listed(list(found.values()), NAMED)
+    return f"Friction is smoothed over a small width: {names}; raise it or use friction='auto'."
+
+
+def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
+    """Widths of a contact that are small against how it moves, each with its number."""
+    slip = _along(span, at, contact.slip)
+    fastest = float(np.abs(slip).max(initial=0.0))
+    turns = slip.size > 0 and bool(slip.min() <= 0.0 <= slip.max())
+    law: Any = contact.law  # which is Parametric
+    known = parameters(law)
+    for name, exponent in law.widths.items():
+        value = _width_number(known[name].value, span)
+        width = value if exponent > 0 else 1.0 / value
+        if turns and 0.0 < width < NARROW * fastest:
+            unit = contact.unit(known[name].unit)
+            yield f"{name} = {value:.3g} {unit}".removesuffix(" 1")
+    for name, variable in contact.widths.items():
+        yield f"{name} = {_width_number(variable.start, span):.3g} {variable.unit}"
+
+
+def _width_number(value: Any, span: Span) -> float:
+    """The number of a parameter of a law, which may be one of the model."""
+    function = ca.Function("number", [span.model.vector("p")], [ca.SX(value)])
+    return float(function(span.p))
+
+
+def _along(span: Span, at: SpanPoints, expression: ca.SX) -> Array:
+    """An expression at the collocation points, or at the nodes where there are none."""
+    inner = at.inner.shape[1]
+    x, n = (at.inner, inner) if inner else (at.nodes[:, :-1], at.u.shape[1])
+    u = np.repeat(at.u, n // at.u.shape[1], axis=1)
+    z = at.z if at.z.shape[1] == n else np.zeros((at.z.shape[0], n))
+    p = np.tile(span.p[:, None], (1, n))
+    function = ca.Function("along", span.symbols, [expression])
+    return function.map(n)(np.zeros((1, n)), x, z, u, p).full().ravel()
 
 
 def solve_once(
@@ -89,7 +201,7 @@ def solve_on(
         numbers,
         progress,
         fits if warm is None else warm and fits,
-        lambda w, place: when(transcription, w, place),
+        partial(when, transcription),
     )
     return solution_of(transcription, outcome)
 

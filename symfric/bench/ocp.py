@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.friction.exact import set_valued
+from ocp.friction.event_check import set_valued
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
 from ocp.result.solution import Solution
 from ocp.solve import solve
-from ocp.solving.perturbed import perturbed
+from ocp.solving.random_starts import perturbed
 from ocp.solving.starts import Start, initial_points
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau

@@ -14,7 +14,7 @@ from examples import (
     through_a_spring,
 )
 from ocp import Problem, Solution, solve
-from ocp.friction.sharpen import smoothed
+from ocp.friction.smooth_models import smoothed
 from ocp.solving.one_solve import solve_once
 
 

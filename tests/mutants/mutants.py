@@ -50,7 +50,7 @@ T_ISOLATION = ("tests/symfric/integrator/running/test_isolation.py",)
 T_EVENTS = ("tests/symfric/integrator/running/test_events.py",)
 T_EMITTER = ("tests/symfric/emitter/test_emit.py",)
 T_SOLVE = ("tests/ocp/test_solve.py",)
-T_SHARPEN = ("tests/ocp/friction/test_sharpen.py",)
+T_SHARPEN = ("tests/ocp/friction/test_homotopy.py",)
 
 CONTROLLERS = (
     Mutant(
@@ -189,11 +189,11 @@ TRANSCRIPTION = (
         "if verification.ok or not solution.status.ok:", "if True:", T_SOLVE,
     ),
     Mutant(
-        "a jump to a motion that is worse is taken", "ocp/friction/sharpen.py",
+        "a jump to a motion that is worse is taken", "ocp/friction/homotopy.py",
         "if not step.good or step.outcome.cost > limit:", "if not step.good:", T_SHARPEN,
     ),
     Mutant(
-        "layers are no narrower than in the step before", "ocp/friction/sharpen.py",
+        "layers are no narrower than in the step before", "ocp/friction/homotopy.py",
         "level = max(step.level / factor, last)", "level = max(0.9 * step.level, last)", T_SHARPEN,
     ),
 )  # fmt: skip

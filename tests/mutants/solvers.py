@@ -159,7 +159,7 @@ RESULTS = (
         T_POINTS,
     ),
     Mutant(
-        "perturbations grow with their waves", "ocp/solving/perturbed.py",
+        "perturbations grow with their waves", "ocp/solving/random_starts.py",
         "* size / np.sqrt(WAVES)", "* size", T_POINTS,
     ),
     Mutant(
@@ -167,11 +167,11 @@ RESULTS = (
         "{begin + place.fraction", "{place.fraction", T_ONE,
     ),
     Mutant(
-        "contacts that never turn round are blamed", "ocp/solving/kinks.py",
+        "contacts that never turn round are blamed", "ocp/solving/one_solve.py",
         "if turns and 0.0 < width", "if 0.0 < width", ("tests/ocp/solving/test_kinks.py",),
     ),
     Mutant(
-        "one mode asks for the reactions of another", "ocp/friction/release.py",
+        "one mode asks for the reactions of another", "ocp/friction/mode_models.py",
         "for v in moving.z}", "for v in held.z}", T_FALLBACK,
     ),
     Mutant(

@@ -7,7 +7,7 @@ import pytest
 from bad_values import NAN, Thing, flag, number
 
 from ocp import Phase, Problem, Radau, Shooting, integral, solve
-from ocp.friction.sharpen import sharpened
+from ocp.friction.homotopy import sharpened
 from symfric import BrownMcPhee, ExactCoulomb, LuGre, drive
 
 HUGE = 10**400

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ocp.checking.holding import holding_losses
-from ocp.checking.refine import MeshErrors, refined
+from ocp.checking.interval_errors import zoh_losses
+from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.formulation.bounds import Free, Range
 from ocp.formulation.expressions import TIME, Cost, at_end, integral
 from ocp.formulation.phase import Phase
@@ -34,7 +34,7 @@ def losses_of(problem: Problem, intervals: int) -> tuple[float, tuple[Array, ...
     solution = solve_on(transcription, Ipopt().prepared(transcription.program))
     assert solution.status.ok
     iterate = solution.iterate
-    return solution.cost, holding_losses(transcription, iterate.w, iterate.lam_g)
+    return solution.cost, zoh_losses(transcription, iterate.w, iterate.lam_g)
 
 
 def double_integrator(

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ocp.checking.refining import Goals, refined_solve
+from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verify
 from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import TIME, integral

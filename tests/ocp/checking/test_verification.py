@@ -6,9 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ocp.checking.arcs import Arc, arcs_of
-from ocp.checking.local_errors import local_errors
-from ocp.checking.resimulate import resimulated
+from ocp.checking.interval_errors import local_errors
+from ocp.checking.resimulate import Arc, arcs_of, resimulated
 from ocp.checking.verify import verified, verified_arcs, verify
 from ocp.formulation.bounds import FREE
 from ocp.formulation.expressions import Signals, integral

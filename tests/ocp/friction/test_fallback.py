@@ -10,9 +10,8 @@ import ocp.job as job
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.friction.mode_models import mode_model
-from ocp.friction.release import holding
-from ocp.friction.sharpen import FINE
+from ocp.friction.homotopy import FINE
+from ocp.friction.mode_models import holding, mode_model
 from ocp.problems.friction import out_and_back
 from ocp.solve import solve
 from symfric import BrownMcPhee, ExactCoulomb, SolveError, Status

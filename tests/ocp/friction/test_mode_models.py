@@ -8,14 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs import blocks
 
-from ocp.friction.mode_models import (
-    WIDTH,
-    jumps,
-    mode_model,
-    restless,
-    smooth_model,
-    widths,
-)
+from ocp.friction.mode_models import mode_model, restless
+from ocp.friction.smooth_models import WIDTH, jumps, smooth_model, widths
 from symfric import (
     BrownMcPhee,
     Contact,

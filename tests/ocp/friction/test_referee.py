@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ocp import Phase, Problem, Solution, integral, solve
-from ocp.friction.referee import motions, verify_exactly
-from ocp.job import Friction
+from ocp.friction.event_check import motions, verify_exactly
+from ocp.solve import Friction
 from symfric import BrownMcPhee, Model, drive
 
 

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from ocp.formulation.phase import Chain
-from ocp.friction.carry import Known
-from ocp.friction.mode_models import smooth_model, widths
-from ocp.friction.polish import KICK, SHORTEST, Polisher, better, parameters_of, settled
-from ocp.friction.reading import sizes_of
-from ocp.friction.repair import neighbours
-from ocp.friction.sequence import Leg, Run, Track, cut, shown, with_rests
-from ocp.friction.solved import Solved
+from ocp.friction.arc_solution import Polisher, Solved
+from ocp.friction.mode_optimisation import KICK, SHORTEST, better, parameters_of, settled
+from ocp.friction.sequence import Leg, Run, Track, cut, neighbours, shown, with_rests
+from ocp.friction.smooth_models import smooth_model, widths
+from ocp.friction.transfer import Known, sizes_of
 from ocp.problems.friction import out_and_back
 from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_once

@@ -10,7 +10,7 @@ from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import solve_once
-from ocp.solving.perturbed import perturbed
+from ocp.solving.random_starts import perturbed
 from ocp.solving.starts import Guess, initial_points, resample, start_of
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme

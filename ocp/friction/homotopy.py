@@ -21,39 +21,43 @@ unless the number of intervals changes.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import reduce
 from math import sqrt
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.checking.arcs import arcs_of
-from ocp.checking.local_errors import local_errors
+from ocp.checking.interval_errors import cut_meshes, local_errors
+from ocp.checking.resimulate import arcs_of
 from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Chain
 from ocp.formulation.problem import Problem
-from ocp.friction.many_starts import starts_around
-from ocp.friction.mode_models import smooth_model
-from ocp.friction.scales import Scale, Scales, guessed, same_size, scales_of, widths_at
-from ocp.friction.steps import Step, finalists, least
-from ocp.result.motion import Stored, stored_spans
+from ocp.friction import smooth_models
+from ocp.friction.smooth_models import Scale, Scales, same_size, scales_of, widths_at
+from ocp.result.motion import (
+    Stored,
+    stored_spans,
+)
 from ocp.result.solution import Solution
-from ocp.solvers.methods import Fatrop, Ipopt, Sqp
-from ocp.solvers.outcome import Iterate, Report, SolverStatistics, in_stage
+from ocp.solvers.methods import Ipopt
+from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics
 from ocp.solvers.prepared import Prepared
-from ocp.solving.clock import Clock
-from ocp.solving.one_solve import solution_of, when
+from ocp.solving.one_solve import Clock, Solver, solution_of
+from ocp.solving.random_starts import starts_around
 from ocp.solving.starts import STARTS, Start, resample, start_of
-from ocp.transcription.grid import make_meshes, split
+from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points
+from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
-Solver = Ipopt | Fatrop | Sqp
-
+ENDED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+FINALISTS = 3
+"""Solutions on the coarse mesh that are solved on the finer one, where the best of them is seen."""
+ALIKE = 1e-3
+"""Share of J by which different motions differ at least."""
 FIRST = 0.3
 """Width of the layers of the first solves, in multiples of the largest sliding velocity."""
 LAST = 1e-2
@@ -71,6 +75,8 @@ COARSE = 30
 FINE = 60
 MOST = 300
 """More intervals are not made on the way."""
+MOST_PARTS = 4
+"""Into which one interval is cut at once."""
 TOLERANCE = 1e-3
 """Local error of an interval, relative to the size of the states, that asks for no refinement."""
 PASSES = 4
@@ -81,13 +87,64 @@ FURTHER = 2
 """Times that so many starts are made round straight lines when none has led to a solution."""
 SAME = 3.0
 """Factor by which the speeds of the first motion may differ from those the widths were made for."""
-
 EARLY = {"tol": 1e-4, "max_iter": 100}
 LATER = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
 BOUNDING = {"max_iter": 80}
 """Where the largest cost counts: with a small barrier parameter the multipliers of the bounds of
 the costs start wrong, and with them all curvature."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One solve: what was solved, and what came out."""
+
+    transcription: Transcription
+    values: Array
+    outcome: Outcome
+    points: Points
+    level: float
+    accepted: bool = True
+    error: float = np.inf
+    errors: tuple[Array, ...] = ()
+
+    @property
+    def good(self) -> bool:
+        """Whether the path may go on from here."""
+        return self.accepted and self.outcome.status.ok
+
+    @property
+    def ended(self) -> bool:
+        """Whether the user or the clock has stopped the solver."""
+        return self.outcome.status in ENDED
+
+    def better_than(self, other: "Step") -> bool:
+        """Solved before not solved, then the lower cost, or the smaller violation."""
+        if self.outcome.status.ok != other.outcome.status.ok:
+            return self.outcome.status.ok
+        if self.outcome.status.ok:
+            return self.outcome.cost < other.outcome.cost
+        return self.outcome.violation < other.outcome.violation
+
+
+def least(steps: Sequence[Step]) -> Step:
+    """The best of several steps, or the one that was stopped."""
+    best = steps[0]
+    for step in steps[1:]:
+        best = step if step.ended or (not best.ended and step.better_than(best)) else best
+    return best
+
+
+def finalists(steps: Sequence[Step]) -> list[Step]:
+    """The best few of several steps that are not the same motion: what costs the same is."""
+    found: list[Step] = []
+    for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
+        costs = [one.outcome.cost for one in found]
+        new = all(abs(step.outcome.cost - cost) > ALIKE * abs(cost) for cost in costs)
+        if not found or (new and step.good and len(found) < FINALISTS):
+            found.append(step)
+    return found
 
 
 @final
@@ -110,13 +167,6 @@ class Sharp:
     error: float
 
 
-def smoothed(problem: Problem) -> Problem:
-    """`problem` with smooth friction everywhere, its widths as parameters."""
-    made = {id(phase.model): smooth_model(phase.model) for phase in problem.chain}
-    phases = tuple(replace(phase, model=made[id(phase.model)]) for phase in problem.chain)
-    return replace(problem, phases=Chain(phases))
-
-
 def sharpened(
     problem: Problem,
     scheme: Scheme,
@@ -130,7 +180,7 @@ def sharpened(
     clock: Clock | None = None,
     progress: Report | None = None,
 ) -> Iterator[Sharp]:
-    """Solutions with narrower and narrower layers; whoever asks for the next one pays for it.
+    """Solutions with narrower and narrower layers, each solved when it is taken.
 
     The first has layers of `FIRST`, the last one of `last`, or as narrow as it got: where the
     solver fails or is stopped, the solution says so.
@@ -146,15 +196,8 @@ def sharpened(
         clock: when to stop.
         progress: called after each iteration.
     """
-    path = _Path(
-        user=problem,
-        problem=smoothed(problem),
-        scheme=scheme,
-        solver=solver,
-        tolerance=tolerance,
-        clock=clock or Clock(),
-        progress=progress,
-    )
+    smooth = smooth_models.smoothed(problem)
+    path = _Path(problem, smooth, scheme, solver, tolerance, clock or Clock(), progress)
     step = path.first(guess, starts, intervals)
     factor, steady = FACTOR, True
     yield path.told(step, steady)
@@ -166,7 +209,8 @@ def sharpened(
             yield path.told(following, False)
             return
         if following.good:
-            factor = min(1.5 * factor, FACTOR) if following.iterations <= QUICK else factor
+            if following.outcome.statistics.iterations <= QUICK:
+                factor = min(1.5 * factor, FACTOR)
             step = following
             yield path.told(step, steady)
             steady = True
@@ -204,7 +248,7 @@ class _Path:
         if guess is not None:
             tries += starts_around(coarse, straight, range(1, starts, 2), SPREAD)
         found = [scales_of(self.user, self.problem, points) for points in tries]
-        self.scales = guessed(self.user, found)
+        self.scales = smooth_models.guessed(self.user, found)
         found = self.each(coarse, tries)
         best = least(found)
         for more in range(1, FURTHER + 1):
@@ -289,46 +333,25 @@ class _Path:
             if isinstance(solver, Ipopt):
                 solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
             prepared = self.prepared[key] = solver.prepared(transcription.program)
-        rows = transcription.program.g.numel()
-        start = Iterate.cold(transcription.pack(points), rows)
-        outcome = self.clock.within(prepared).run(
-            start, values, in_stage(self.progress, stage), at=partial(when, transcription)
-        )
+        start = Iterate.cold(transcription.pack(points), transcription.program.g.numel())
+        outcome = self.clock.run(transcription, prepared, start, self.progress, stage, values)
         self.solves.append(outcome.statistics)
         found = transcription.unpack(outcome.iterate.w)
         return Step(transcription, values, outcome, found, level)
 
     def moved(self, step: Step, into: Transcription) -> Points:
         """The motion of a step on other meshes."""
-        old = step.transcription
-        spans = stored_spans(self.problem, self.scheme, old.meshes, step.points)
-        iterate = step.outcome.iterate
-        return resample(
-            into,
-            Stored(
-                name="",
-                status="",
-                message="",
-                cost=0.0,
-                structure="",
-                spans=spans,
-                chosen=step.points.chosen,
-                iterate=iterate,
-            ),
-        )
+        spans = stored_spans(self.problem, self.scheme, step.transcription.meshes, step.points)
+        chosen, iterate = step.points.chosen, step.outcome.iterate
+        return resample(into, Stored("", "", "", 0.0, "", spans, chosen, iterate))
 
     def judged(self, step: Step) -> Step:
         """`step` with the local errors of its intervals."""
         widths = widths_at(self.user, self.scales, step.level)
-        arcs = [
-            replace(
-                arc,
-                p=np.array(
-                    [widths.get(v.name, x) for v, x in zip(arc.span.model.p, arc.p, strict=True)]
-                ),
-            )
-            for arc in arcs_of(self.problem, step.transcription.meshes, step.points)
-        ]
+        arcs = [*arcs_of(self.problem, step.transcription.meshes, step.points)]
+        for k, arc in enumerate(arcs):
+            pairs = zip(arc.span.model.p, arc.p, strict=True)
+            arcs[k] = replace(arc, p=np.array([widths.get(v.name, x) for v, x in pairs]))
         errors = local_errors(arcs, min(1e-6, 1e-2 * self.tolerance))
         worst = max((float(e.max()) for e in errors), default=0.0)
         return replace(step, error=worst, errors=errors)
@@ -336,16 +359,9 @@ class _Path:
     def finer(self, step: Step) -> list[Array] | None:
         """Meshes with the intervals that err cut into pieces; None where there are none."""
         meshes, phases = step.transcription.meshes, len(self.problem.chain)
-        if step.error <= self.tolerance or sum(m.size - 1 for m in meshes) > MOST:
+        if sum(m.size - 1 for m in meshes) > MOST:
             return None
-        made: list[Array] = []
-        for number, mesh in enumerate(meshes):
-            same = range(number % phases, len(meshes), phases)  # scenarios share their meshes
-            error = np.max([step.errors[k] for k in same], axis=0)
-            error = np.where(np.isfinite(error), error, 1.0)
-            parts = np.clip(np.ceil((error / self.tolerance) ** (1 / 3)), 2, 4).astype(int)
-            made.append(split(mesh, np.where(error > self.tolerance, parts, 1).tolist()))
-        return made
+        return cut_meshes(meshes, step.errors, phases, self.tolerance, order=3, most=MOST_PARTS)
 
     def predicted(self, step: Step, level: float) -> float:
         """The largest cost at another width that belongs to the motion of `step`.

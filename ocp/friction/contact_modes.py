@@ -22,8 +22,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.friction.loops import loops_of
-from ocp.friction.mode_models import jumps, mode_model, nominal_load, slip_change
+from ocp.friction.mode_models import loops_of, mode_model, nominal_load, slip_change
+from ocp.friction.smooth_models import jumps
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
 from symfric.foundation.symbols import at_start

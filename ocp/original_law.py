@@ -5,7 +5,7 @@ with stiction misses with them. Collocation does not follow them: their time con
 microseconds in sliding to milliseconds at rest. Shooting by exponential steps does.
 
 1. The control nearest to the given one with which the law itself does what is asked for
-   (`ocp.solving.nearest`).
+   (`project_control`).
 2. The problem itself from there, for a few iterations: the kink of the law at reversals makes
    Newton's method go round, and the best motion on the way that keeps all conditions is taken.
 3. The nearest control again, on intervals that are cut where steps err, until the simulation
@@ -14,33 +14,29 @@ microseconds in sliding to milliseconds at rest. Shooting by exponential steps d
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from time import perf_counter
 from typing import final
 
+import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ocp.checking.arcs import arcs_of
-from ocp.checking.local_errors import local_errors
+from ocp.checking.interval_errors import cut_meshes, local_errors
+from ocp.checking.resimulate import arcs_of
 from ocp.checking.verify import verified
 from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
 from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
-from ocp.solvers.prepared import Prepared
-from ocp.solving.clock import Clock
-from ocp.solving.nearest import nearest
-from ocp.solving.one_solve import solution_of, when
+from ocp.solvers.outcome import Iterate, Report
+from ocp.solving.one_solve import Clock, solution_of
 from ocp.solving.starts import start_of
-from ocp.transcription.grid import split
+from ocp.transcription.program import Program
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
-
 STEPS = 20
 """Steps of an interval where the user has not named a scheme."""
 PASSES = 6
@@ -59,7 +55,7 @@ KEPT = 1e-6
 
 @final
 @dataclass(frozen=True, eq=False)
-class OwnLaw:
+class OriginalLaw:
     """What the solves share.
 
     Attributes:
@@ -118,12 +114,12 @@ class OwnLaw:
             begin = perf_counter()
             on = made.on(meshes)
             start = start_of(on, guess)[0]
-            program = nearest(on, start.w)
+            program = project_control(on, start.w)
             prepared = self.solver.with_options(**(CLOSE | dict(self.solver.options))).prepared(
                 program
             )
             built = perf_counter() - begin
-            outcome = self.run(on, prepared, start, f"law itself {number}")
+            outcome = self.clock.run(on, prepared, start, self.progress, f"law itself {number}")
             own = replace(outcome.statistics, build_time=outcome.statistics.build_time + built)
             past = own if past is None else past.then(own)
             cost = float(on.program.gradient(outcome.iterate.w, on.program.values)[0])
@@ -150,7 +146,7 @@ class OwnLaw:
             on.program
         )
         start = Iterate.cold(near.iterate.w, on.program.g.numel())
-        outcome = self.run(on, prepared, start, "law itself, cost")
+        outcome = self.clock.run(on, prepared, start, self.progress, "law itself, cost")
         statistics = near.statistics.then(outcome.statistics)
         found = solution_of(on, outcome)
         if not found.ok and outcome.status not in STOPPED:
@@ -158,24 +154,40 @@ class OwnLaw:
             found = replace(found if better else near, status=Status.ACCEPTABLE)
         return replace(found, statistics=statistics)
 
-    def run(self, on: Transcription, prepared: Prepared, start: Iterate, stage: str) -> Outcome:
-        """One solve within what is left of the time."""
-        return self.clock.within(prepared).run(
-            start, None, in_stage(self.progress, stage), at=partial(when, on)
-        )
-
     def finer(self, found: Solution, goal: float) -> list[Array] | None:
         """Meshes with the intervals cut whose steps err; None where there are none."""
         phases = len(self.problem.chain)
         arcs = arcs_of(self.problem, found.meshes, found.points)
         errors = local_errors(arcs, min(1e-6, 1e-2 * self.tolerance))
-        if max(float(e.max()) for e in errors) <= goal:
-            return None
-        made: list[Array] = []
-        for number, mesh in enumerate(found.meshes):
-            same = range(number % phases, len(errors), phases)  # scenarios share their meshes
-            error = np.max([errors[k] for k in same], axis=0)
-            error = np.where(np.isfinite(error), error, np.inf)
-            parts = np.ceil(np.minimum(np.sqrt(error / goal), MOST_PARTS))  # of order 1
-            made.append(split(mesh, np.maximum(parts, 1).astype(int).tolist()))
-        return made
+        return cut_meshes(found.meshes, errors, phases, goal, order=2, most=MOST_PARTS)
+
+
+def project_control(transcription: Transcription, w: ArrayLike) -> Program:
+    """The program of `transcription` with the distance from the controls in `w` as its cost.
+
+    Free durations and chosen parameters count like inputs; everything is scaled.
+    """
+    program, layout = transcription.program, transcription.layout
+    weights = np.zeros(layout.size)
+    for span, mesh in zip(layout.spans, transcription.meshes, strict=True):
+        weights[span.u] = np.diff(mesh)
+        if span.T >= 0:
+            weights[span.T] = 1.0
+    weights[layout.chosen] = 1.0
+    scale, there = ca.DM(weights), ca.DM(np.asarray(w, dtype=float))
+    x, p = ca.MX.sym("x", program.w.numel()), ca.MX.sym("p", program.p.numel())
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", program.g.numel())
+    curved = ca.MX(program.hessian(x, p, 0.0, lam_g))
+    hessian = ca.triu(curved + lam_f * ca.diag(scale))
+    return replace(
+        program,
+        f=_half_square(program.w, there, scale),
+        gradient=ca.Function(
+            "gradient", [x, p], [_half_square(x, there, scale), scale * (x - there)]
+        ),
+        hessian=ca.Function("hessian", [x, p, lam_f, lam_g], [hessian]),
+    )
+
+
+def _half_square(w: ca.MX, there: ca.DM, scale: ca.DM) -> ca.MX:
+    return ca.dot(scale, (w - there) ** 2) / 2

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs import blocks
 
-from ocp.friction.exact import set_valued
+from ocp.friction.event_check import set_valued
 from symfric import (
     GMS,
     BrownMcPhee,

@@ -8,7 +8,7 @@ unknowns, so that a solver finds them to its full precision, on few intervals:
 1. read the sequence; put a rest at every reversal and at the ends (`ocp.friction.sequence`);
 2. solve the problem of mode models with free durations (`ocp.friction.arcs`);
 3. prune arcs that have shrunk to nothing, repair the sequence where the motion presses against the
-   bounds of its modes (`ocp.friction.repair`), and solve again from there;
+   bounds of its modes (`ocp.friction.sequence`), and solve again from there;
 4. refine the intervals until holding the controls on each of them costs next to nothing.
 
 The result holds for exact Coulomb friction with stiction, the limit of smooth laws.
@@ -23,77 +23,114 @@ from itertools import product
 from math import inf, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ocp.checking.arcs import arcs_of
-from ocp.checking.local_errors import local_errors
-from ocp.checking.refine import MeshErrors, refined
+from ocp.checking.interval_errors import local_errors
+from ocp.checking.mesh_refinement import MeshErrors, refined
+from ocp.checking.resimulate import arcs_of
 from ocp.formulation.problem import Problem
+from ocp.friction.arc_solution import Polisher, Solved, reassemble
 from ocp.friction.arcs import MARGIN
-from ocp.friction.carry import Known
 from ocp.friction.mode_models import restless
-from ocp.friction.reading import Reading, sequence_of, sizes_of, starts_at_rest
-from ocp.friction.repair import neighbours, rests_inside
-from ocp.friction.sequence import Leg, pruned, shown
-from ocp.friction.solved import Polisher, Solved
-from ocp.friction.whole import whole_solution
+from ocp.friction.sequence import (
+    Leg,
+    flat,
+    inserted,
+    neighbours,
+    pruned,
+    shown,
+)
+from ocp.friction.transfer import Known, Reading, sequence_of, sizes_of, starts_at_rest
 from ocp.result.solution import Solution
 from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
-from ocp.solving.clock import Clock
+from ocp.solving.one_solve import Clock
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
 
+Array = NDArray[np.float64]
+TOUCH = 1e-5
+"""Share of the largest sliding velocity of a contact below which it touches zero: what an interior
+point leaves of a bound that presses."""
 CREEP = (3.0, 1.0, 10.0)
 """Multiples of the width below which a contact counts as resting: the first that leads to a
 solution. A smooth law is back at its dynamic level at a few widths."""
-
 SHORTEST = 5e-5
 """Least duration of an arc, as a share of the whole: what is needed is longer."""
-
 AGAIN = 0.1
 """Barrier parameter where the sequence is another one: smaller ones lose the way at times."""
-
 KICK = 2e-3
 """Share of the whole duration that an interval has at least in which a contact breaks away."""
-
 GONE = 4.0
 """Arcs shorter than so many times the least duration are pruned."""
-
 ROUNDS = 4
 """How often the sequence may be changed."""
-
 NEW_ARC = 5e-3
 """Share of the whole duration that an arc has where it is tried."""
-
 WORTH = 1e-4
 """Share of the cost by which another sequence must be better: more than the estimate of what
 holding the inputs costs on few intervals is wrong by."""
-
 FINE = 3e-4
 """Share of the cost that holding the inputs over the intervals may cost."""
-
 ZERO = 1e-8
 """Costs that differ less are the same to a solver."""
-
 LOCAL = 1e-7
 """Largest local error of an interval, relative."""
-
 HALVED = 4.0
 """Multiple of the largest local error that has an interval halved, of order 5."""
-
 MOST_ITERATIONS, PATIENT = 100, 400
 """Of one solve: a sequence that needs more is a wrong one as a rule. Where no sequence leads to a
 solution the first solves are repeated with more: an arm whose joints stop needs 350."""
-
 CLOSER = 5.0
 """Factor to the margin of a motion that only shows what a margin costs."""
-
 LEAST_INTERVALS = 40
 MOST = 800
-
 Keep = Callable[[Solved], Solved]
-
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+
+
+def rests_inside(solved: Solved) -> tuple[Leg, ...] | None:
+    """The sequence with rests where contacts touch zero as they slip; None where none does."""
+    legs, shift = solved.legs, 0
+    found = False
+    slips = [_slips(solved, k) for k in range(len(flat(legs)))]
+    largest: dict[str, float] = {}
+    for _, own in slips:
+        for contact, values in own.items():
+            largest[contact] = max(largest.get(contact, 0.0), float(np.abs(values).max()))
+    for number, arc in enumerate(flat(solved.legs)):
+        t, own = slips[number]
+        for contact, mode in arc.modes.items():
+            window = _touching(t, own[contact], TOUCH * largest[contact]) if mode else None
+            if window is not None:
+                before = len(flat(legs))
+                legs = inserted(legs, number + shift, contact, 0, *window)
+                shift += len(flat(legs)) - before
+                found = True
+                break
+    return pruned(legs, 0.0) if found else None
+
+
+def _slips(solved: Solved, number: int) -> tuple[Array, dict[str, Array]]:
+    """Times of all points of an arc, and sliding velocities there by contact."""
+    span = solved.transcription.problem.spans[number]
+    arc = flat(solved.legs)[number]
+    fractions = solved.transcription.fractions(number)
+    t = arc.begin + fractions * arc.duration
+    names = list(arc.modes)
+    values = [
+        solved.known.along(span.model, span.model.expression(f"{name}_slip"), t)[0]
+        for name in names
+    ]
+    return t, dict(zip(names, values, strict=True))
+
+
+def _touching(t: Array, slip: Array, touch: float) -> tuple[float, float] | None:
+    """From when to when the slip is next to nothing, away from the ends of the arc."""
+    near = np.flatnonzero(np.abs(slip[1:-1]) < touch) + 1
+    if not near.size:
+        return None
+    return float(t[near[0] - 1]), float(t[near[-1] + 1])
 
 
 class _StoppedError(Exception):
@@ -193,7 +230,7 @@ def polish(
 
 def _solution(problem: Problem, best: Solved | None, tried: Sequence[Solved]) -> Solution:
     """The best of several sequences, or the first, with what all have cost; why it ended early."""
-    found = whole_solution(problem, best or tried[0], [s.outcome.statistics for s in tried])
+    found = reassemble(problem, best or tried[0], [s.outcome.statistics for s in tried])
     last = tried[-1].outcome
     if last.status not in STOPPED:
         return found

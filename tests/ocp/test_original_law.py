@@ -7,8 +7,8 @@ import pytest
 from phases import unit_move
 
 from ocp import Phase, Problem, Shooting, integral, solve
+from ocp.original_law import project_control
 from ocp.solvers.methods import Ipopt
-from ocp.solving.nearest import nearest
 from ocp.solving.starts import start_of
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Scheme
@@ -21,7 +21,7 @@ def test_the_nearest_control_to_none_is_that_of_least_effort() -> None:
     on = discretise(problem, Shooting("rodas5p", 2)).on(make_meshes(problem, 30))
     start = start_of(on, {"a": 0.0})[0]
     least = Ipopt().prepared(on.program).run(start)
-    close = Ipopt().prepared(nearest(on, start.w)).run(start)
+    close = Ipopt().prepared(project_control(on, start.w)).run(start)
     assert close.status is Status.SOLVED
     np.testing.assert_allclose(close.iterate.w, least.iterate.w, atol=1e-6)
 
@@ -30,7 +30,7 @@ def test_the_nearest_control_to_one_that_arrives_is_itself() -> None:
     problem = unit_move()
     on = discretise(problem, Shooting("rodas5p", 2)).on(make_meshes(problem, 30))
     solved = Ipopt().prepared(on.program).run(start_of(on, None)[0])
-    same = Ipopt().prepared(nearest(on, solved.iterate.w)).run(solved.iterate)
+    same = Ipopt().prepared(project_control(on, solved.iterate.w)).run(solved.iterate)
     assert same.cost == pytest.approx(0.0, abs=1e-12)
 
 

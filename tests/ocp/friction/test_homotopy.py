@@ -11,9 +11,17 @@ from phases import unit_move
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.friction import sharpen
-from ocp.friction.scales import Scale, has_jumps, own_level, same_size, speeds_at, widths_at
-from ocp.friction.sharpen import FIRST, LAST, Sharp, sharpened, smoothed
+from ocp.friction import homotopy
+from ocp.friction.homotopy import FIRST, LAST, Sharp, sharpened
+from ocp.friction.smooth_models import (
+    Scale,
+    has_jumps,
+    own_level,
+    same_size,
+    smoothed,
+    speeds_at,
+    widths_at,
+)
 from ocp.problems.friction import out_and_back, parcel_on_tray
 from ocp.solvers.methods import Ipopt
 from ocp.transcription.schemes import Radau
@@ -62,7 +70,7 @@ def test_only_the_first_solves_are_many(steps: list[Sharp]) -> None:
 
 
 def test_a_step_to_something_worse_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sharpen, "ABOVE", -1.0)  # nothing is good enough
+    monkeypatch.setattr(homotopy, "ABOVE", -1.0)  # nothing is good enough
     steps = list(path(out_and_back(), starts=1))
     assert [step.level for step in steps] == [FIRST]
 

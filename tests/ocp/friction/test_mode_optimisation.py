@@ -7,8 +7,8 @@ import pytest
 
 from ocp.formulation.phase import Chain
 from ocp.formulation.problem import Problem
-from ocp.friction.mode_models import smooth_model, widths
-from ocp.friction.polish import polish
+from ocp.friction.mode_optimisation import polish
+from ocp.friction.smooth_models import smooth_model, widths
 from ocp.problems.friction import out_and_back
 from ocp.result.solution import Solution
 from ocp.solving.one_solve import solve_once

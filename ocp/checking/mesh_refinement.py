@@ -1,19 +1,20 @@
-"""One problem on meshes that follow from its errors, until all intervals are right."""
+"""One problem on meshes that follow from their errors, until all intervals are right.
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+A mesh is made finer where it has to be, and stays as coarse as it may be elsewhere.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, inf, sqrt
 from time import perf_counter
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.checking.arcs import Arc, arcs_of
-from ocp.checking.conditions import left_between
-from ocp.checking.holding import holding_losses
-from ocp.checking.local_errors import local_errors
-from ocp.checking.refine import MeshErrors, refined
-from ocp.checking.verify import TOLERANCE, near_runs
+from ocp.checking.interval_errors import local_errors, zoh_losses
+from ocp.checking.resimulate import Arc, arcs_of
+from ocp.checking.verify import TOLERANCE, left_between, near_runs
 from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
 from ocp.solvers.methods import Ipopt
@@ -22,12 +23,24 @@ from ocp.solvers.prepared import Prepared
 from ocp.solving.one_solve import Solver, solve_on
 from ocp.solving.starts import Start
 from ocp.transcription.schemes import Radau, Scheme, Shooting
-from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
+from ocp.transcription.transcribe import Discretisation, discretise
+from ocp.transcription.transcription import Skeleton
+from symfric.foundation.brief import brief
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
+GROWTH = 3.0
+"""A mesh grows by no more than this factor at once: errors are estimates."""
+LEAST_PARTS = 0.5
+"""At most two intervals of the same density become one at once."""
+MOST_PARTS = 16.0
+"""An interval is split in at most so many parts at once."""
+STEEPEST = 2.0
+"""Neighbouring intervals differ in length by no more than about this factor."""
+SAME_NUMBER = 0.4
+"""A mesh that needs no more intervals than it has keeps them down to this share: nothing that
+depends on their number is made again."""
 Limit = Callable[[Prepared], Prepared]
-
 LATER = 1e-2
 """Barrier parameter of Ipopt at the start of all passes but the first, which start close by."""
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
@@ -37,6 +50,108 @@ FULL = 0.9
 """Share of the largest mesh from which on it counts as that."""
 LEAST_TRUST = 0.2
 """Where path conditions are active, estimates of losses are too large by a few times."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class MeshErrors:
+    """What the intervals of one span get wrong.
+
+    Attributes:
+        local: relative local error of each interval, shape (N,).
+        losses: cost lost in each of them by holding the inputs (see `zoh_losses`).
+        outside: which of them leave a bound between the nodes.
+    """
+
+    local: Array
+    losses: Array
+    outside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    __repr__ = brief
+
+
+def refined(
+    meshes: Sequence[Array],
+    errors: Sequence[MeshErrors],
+    keep: Sequence[Iterable[float]],
+    *,
+    local: float,
+    loss: float,
+    order: int = 5,
+    most: int = 1000,
+    for_loss: float = inf,
+) -> tuple[Array, ...]:
+    """New meshes on which local errors are below `local`, and the lost cost below `loss`.
+
+    Interval k needs n_k parts. A local error e falls as n^-(p+1) with the order p where the motion
+    is smooth, which is trusted for longer intervals only; where it is too large the motion is not,
+    and half of that is. Losses E_k fall as n^-2, so that their sum is `loss` with the fewest
+    intervals for
+
+        n_k = E_k^(1/3) sqrt(sum E^(1/3) / loss)
+
+    The larger of both, at least two parts where a bound is left between nodes, is spread evenly:
+    nodes move, and where their number may stay as it is it does.
+
+    Args:
+        meshes: fractions that bound the intervals of each span.
+        errors: what they get wrong.
+        keep: fractions of each span that stay nodes.
+        local, loss: what is allowed; `loss` for all spans together, in units of J.
+        order: of the scheme.
+        most: intervals of all spans together.
+        for_loss: intervals that are made for the sake of losses alone.
+    """
+    roots = [np.cbrt(e.losses) for e in errors]
+    total = sum(float(root.sum()) for root in roots)
+    share = sqrt(total / loss) if loss > 0 else 0.0
+    intervals = sum(mesh.size - 1 for mesh in meshes)
+    lost = min(1.0, min(GROWTH * intervals, for_loss) / max(share * total, 1.0))
+    parts: list[Array] = []
+    for mesh, own, root in zip(meshes, errors, roots, strict=True):
+        excess = 2.0 * np.where(np.isfinite(own.local), own.local, 1e30 * local) / local
+        n = np.where(excess > 1.0, excess ** (2.0 / (order + 1)), excess ** (1.0 / (order + 1)))
+        n = np.maximum(np.minimum(n, GROWTH), lost * share * root)
+        if own.outside.size:
+            n = np.where(own.outside, np.maximum(n, 2.0), n)
+        parts.append(_graded(np.clip(n, LEAST_PARTS, MOST_PARTS), np.diff(mesh)))
+    shrink = min(1.0, most / sum(float(n.sum()) for n in parts))
+    return tuple(
+        _spread(mesh, n * shrink, sorted({0.0, *fixed, 1.0}))
+        for mesh, n, fixed in zip(meshes, parts, keep, strict=True)
+    )
+
+
+def _graded(parts: Array, lengths: Array) -> Array:
+    """More parts beside short intervals, so that lengths change gradually."""
+    density = parts / lengths
+    for k in range(1, density.size):
+        density[k] = max(density[k], density[k - 1] / STEEPEST)
+    for k in range(density.size - 2, -1, -1):
+        density[k] = max(density[k], density[k + 1] / STEEPEST)
+    return density * lengths
+
+
+def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
+    """Nodes at equal amounts of `parts`, with whole numbers between the fractions to keep."""
+    done = np.concatenate([[0.0], np.cumsum(parts)])
+    at = np.interp(keep, mesh, done)
+    wanted = np.diff(at)
+    scale = 1.0
+    old = mesh.size - 1
+    if SAME_NUMBER * old <= sum(map(ceil, wanted)) <= old:
+        scale = old / max(float(wanted.sum()), 1e-9)
+    counts = [max(1, ceil(scale * n - 1e-9)) for n in wanted]
+    while scale > 1.0 and sum(counts) > old and max(counts) > 1:
+        counts[int(np.argmax(counts))] -= 1  # rounded up more than once
+    pieces = [
+        np.interp(np.linspace(low, high, n, endpoint=False), done, mesh)
+        for low, high, n in zip(at[:-1], at[1:], counts, strict=True)
+    ]
+    new = np.concatenate([*pieces, [1.0]])
+    first = np.cumsum([0, *counts[:-1]])
+    new[first] = keep[:-1]
+    return new
 
 
 @final
@@ -134,7 +249,8 @@ def refined_solve(
         if not new.ok and not spent:
             break
         finer, state = finer_meshes(made, new, goals, state)
-        fine = not finer or (state.stuck and _full(new.meshes, goals))
+        full = sum(mesh.size - 1 for mesh in new.meshes) >= FULL * goals.most
+        fine = not finer or (state.stuck and full)
         if fine and new.ok:
             found = _told(found, state)
             break
@@ -165,11 +281,6 @@ def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solve
     if problem.kind != "worst":  # whose multipliers must settle
         later["mu_init"] = LATER
     return solver.with_options(**{k: v for k, v in later.items() if k not in solver.options})
-
-
-def _full(meshes: Sequence[Array], goals: Goals) -> bool:
-    """Whether there is no room for more intervals."""
-    return sum(mesh.size - 1 for mesh in meshes) >= FULL * goals.most
 
 
 @final
@@ -222,7 +333,7 @@ def finer_meshes(
     losses = tuple(np.zeros(arc.intervals) for arc in arcs)
     if not isinstance(made.scheme, Shooting):
         iterate = solution.iterate
-        losses = holding_losses(made.on(solution.meshes), iterate.w, iterate.lam_g)
+        losses = zoh_losses(made.on(solution.meshes), iterate.w, iterate.lam_g)
     allowed = goals.loss * abs(solution.cost)
     worst = max(float(e.max(initial=0.0)) for e in local) / goals.local
     lost = sum(float(loss.sum()) for loss in losses)
@@ -250,16 +361,11 @@ def finer_meshes(
         [tuple(span.nodes) for span in problem.spans[:phases]],
         local=goals.local,
         loss=0.8 * allowed,
-        order=_order(made.scheme),
+        order=4 if isinstance(made.scheme, Shooting) else made.scheme.order,
         most=goals.most,
         for_loss=room * intervals,
     )
     return new * (len(arcs) // phases), now
-
-
-def _order(scheme: Scheme) -> int:
-    """Order of the scheme; of shooting that of most methods of `flow`."""
-    return 4 if isinstance(scheme, Shooting) else scheme.order
 
 
 def _outside(arcs: Sequence[Arc], goals: Goals) -> tuple[NDArray[np.bool_], ...]:

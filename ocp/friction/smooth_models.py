@@ -1,0 +1,312 @@
+"""The models with smooth friction, and how wide it is smoothed: in multiples of the speeds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.formulation.phase import Chain, Span
+from ocp.formulation.problem import Problem
+from ocp.transcription.unknowns import (
+    Points,
+    SpanPoints,
+)
+from symfric.foundation import checks
+from symfric.foundation.numeric import tanh
+from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
+from symfric.foundation.symbols import at_start
+from symfric.laws import Law
+from symfric.laws.base import smooth
+from symfric.model import Contact, Model, Monitor
+
+WIDTH = 1e-3
+"""Width [m/s] of a stand-in by default, where the law has no velocity scale."""
+Array = NDArray[np.float64]
+LEAST = 0.1
+"""Share of the scale before that a contact keeps which hardly moves: at rest it has none."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Width:
+    """A parameter of a smooth model that sets how wide the layer around v = 0 is.
+
+    Attributes:
+        contact: whose it is.
+        parameter: its name in `Model.p`, "<contact>_<width>".
+        number: its value in the user's model.
+        exponent: of the width in it: 1 for a width, -1 for a steepness.
+        layer: width of the layer [m/s] at `number`; None for one of a load, as `JointFriction.eps`.
+    """
+
+    contact: str
+    parameter: str
+    number: float
+    exponent: int
+    layer: float | None
+
+    def at(self, layer: float) -> float:
+        """Its value for a layer of that width [m/s].
+
+        Raises:
+            ValueError: it is not one of velocities.
+        """
+        if self.layer is None:
+            raise checks.refused(self.parameter, "a width of velocities", "one of a load [N]")
+        return self.number * (layer / self.layer) ** self.exponent
+
+
+def smooth_model(model: Model) -> Model:
+    """`model` with the widths of all contacts as parameters, see `widths`.
+
+    Laws that neither smooth nor are smooth (with modes, with states, without regularisation) have
+    a stand-in with the same sliding force and static level. With s = tanh 4x, x = v / width,
+
+        F = (1 + s)/2 sliding(|v|, +1) + (1 - s)/2 sliding(-|v|, -1) + excess x / (x^2/4 + 3/4)^2
+
+    where the excess is what the static level has above sliding at v = 0.
+    Raises ValueError for laws without a force on each side of v = 0.
+    """
+    return _smoothed(model)[0]
+
+
+def widths(model: Model) -> tuple[Width, ...]:
+    """The widths of `smooth_model(model)`."""
+    return _smoothed(model)[1]
+
+
+def _smoothed(model: Model) -> tuple[Model, tuple[Width, ...]]:
+    kept: dict[str, Any] = model.memory
+    if "smooth model" not in kept:
+        kept["smooth model"] = _made_smooth(model) if model.contacts else (model, ())
+    return kept["smooth model"]
+
+
+def _made_smooth(model: Model) -> tuple[Model, tuple[Width, ...]]:
+    forces, p, found = dict[str, ca.SX](), list[Variable](), list[Width]()
+    watched: list[Monitor] = []
+    for c in model.contacts:
+        try:
+            force, own, scale = _smooth_force(model, c)
+        except ValueError as error:
+            raise ValueError(f"model '{model.name}': contact '{c.name}': {error}") from None
+        forces[c.name] = force
+        p += own
+        layer = float(at_start(scale, (*model.p, *own)))
+        if isfinite(layer):
+            watched.append(Monitor(c.slip, scale))
+        exponents = c.law.widths
+        found += [
+            Width(c.name, v.name, float(v.start), exponents.get(_local(c, v), 1), layer)
+            for v in own
+        ]
+    loads = {v.name: (c.name, v) for c in model.contacts for v in c.widths.values()}
+    found += [Width(name, v.name, float(v.start), 1, None) for name, v in loads.values()]
+    p += [v for _, v in loads.values()]
+    return model.with_forces(forces, p=tuple(p), monitors=tuple(watched)), tuple(found)
+
+
+def _local(contact: Contact, parameter: Variable) -> str:
+    return parameter.name.removeprefix(f"{contact.name}_")
+
+
+def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable], Any]:
+    """Force [N], its widths as parameters, and the velocity [m/s] over which it changes."""
+    law = _law(contact)
+    by_itself = not law.states and not any(i.name not in contact.further for i in law.inputs)
+    if by_itself and (law.widths or not jumps(model, contact)):
+        known = parameters(law)
+        own = [_parameter(model, contact, known[name]) for name in law.widths]
+        pairs = zip(law.widths, own, strict=True)
+        law = with_values(law, {name: v.symbol for name, v in pairs})
+        force = ca.SX(law.force(contact.slip, contact.N, (), **contact.further))
+        return force, [v for v in own if ca.depends_on(force, v.symbol)], law.velocity_scale
+    scale = float(at_start(law.velocity_scale, model.p))
+    width = Variable(
+        f"{contact.name}_width", contact.unit("m/s"), start=scale if isfinite(scale) else WIDTH,
+        nominal=scale if isfinite(scale) else WIDTH, lower=0.0, doc="width of the smoothed jump",
+    )  # fmt: skip
+    return _stand_in(contact, width.symbol), [width], width.symbol
+
+
+def _parameter(model: Model, contact: Contact, width: Parameter) -> Variable:
+    """A width of a law as a parameter of the model."""
+    number = float(at_start(width.value, model.p))
+    return Variable(
+        f"{contact.name}_{width.name}", contact.unit(width.unit), start=number, nominal=number,
+        lower=width.lower, upper=width.upper, doc=width.doc,
+    )  # fmt: skip
+
+
+def _stand_in(contact: Contact, width: ca.SX) -> ca.SX:
+    v, N, law, given = contact.slip, contact.N, _law(contact), contact.further
+    x, speed = v / width, smooth.magnitude(v, width)
+    s, bump = tanh(4 * x), x / (0.25 * (x * x) + 0.75) ** 2
+    force = ca.SX(0)
+    for side in (1, -1):
+        share = (1 + side * s) / 2
+        sliding = law.sliding(side * speed, N, side, **given)
+        top = law.static_level(N, side, **given) - side * law.sliding(0.0, N, side, **given)
+        force += share * (sliding + top * bump)
+    return force
+
+
+def _law(contact: Contact) -> Law:
+    law = contact.law
+    if not isinstance(law, Law):
+        raise checks.refused(f"contact '{contact.name}': law", "a law such as LuGre()", law)
+    return law
+
+
+def jumps(model: Model, contact: Contact) -> bool:
+    """Whether friction holds at rest at all, at the start of the parameters.
+
+    Viscous friction does not, nor does a contact that nothing presses.
+    """
+    law = _law(contact)
+    if ca.SX(contact.N).is_zero():
+        return False
+    one = law.static_level(1.0, 1, **dict.fromkeys(contact.further, 0.0))
+    return float(at_start(one, model.p)) != 0.0
+
+
+@final
+@dataclass(frozen=True)
+class Scale:
+    """What the widths of one contact are relative to.
+
+    Attributes:
+        speed: largest sliding velocity on the way [m/s or rad/s].
+        load: largest normal force [N]; 1 where it is not known.
+    """
+
+    speed: float
+    load: float = 1.0
+
+
+Scales = Mapping[str, Scale]
+"""Contact -> its scale."""
+
+
+def smoothed(problem: Problem) -> Problem:
+    """`problem` with smooth friction everywhere, its widths as parameters."""
+    made = {id(phase.model): smooth_model(phase.model) for phase in problem.chain}
+    phases = tuple(replace(phase, model=made[id(phase.model)]) for phase in problem.chain)
+    return replace(problem, phases=Chain(phases))
+
+
+def scales_of(
+    problem: Problem, smooth: Problem, points: Points, before: Scales | None = None
+) -> Scales:
+    """The scales of the motion `points`; none is below `LEAST` of that before.
+
+    Args:
+        problem: the user's.
+        smooth: the same with smooth models, to which the points belong.
+    """
+    found: dict[str, list[float]] = {}
+    for span, own in zip(smooth.spans, points.spans, strict=True):
+        for contact in problem.chain[span.phase].model.contacts:
+            largest = np.abs(values_at(span, contact, own)).max(axis=1)
+            kept = found.setdefault(contact.name, [0.0, 0.0])
+            kept[:] = [max(a, float(b)) for a, b in zip(kept, largest, strict=True)]
+    return {
+        name: Scale(
+            max(speed, LEAST * before[name].speed if before and name in before else 0.0),
+            load if load > 0.0 else 1.0,
+        )
+        for name, (speed, load) in found.items()
+    }
+
+
+def same_size(a: Scales, b: Scales, factor: float) -> bool:
+    """Whether no speed differs by more than `factor`."""
+    speeds = [(a[name].speed, b[name].speed) for name in a]
+    return all(max(pair) <= factor * min(pair) for pair in speeds)
+
+
+def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
+    """What to expect of a motion from those of several starts.
+
+    The largest median speed of all contacts that slide, or that turn: a body that stands still in
+    straight lines from end to end will move, and layers that are too wide do no harm.
+    """
+    turning = {c.name: c.turning for phase in problem.chain for c in phase.model.contacts}
+    speeds = {name: float(np.median([s[name].speed for s in scales])) for name in turning}
+    return {
+        name: Scale(
+            max(speeds[other] for other in turning if turning[other] == turning[name]),
+            float(np.median([s[name].load for s in scales])),
+        )
+        for name in turning
+    }
+
+
+def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
+    """Values of the widths of the smooth models: layers of `level` times the scales.
+
+    Those of the user's laws are the smallest.
+    """
+    found: dict[str, float] = {}
+    for phase in problem.chain:
+        laws = {c.name: c.law for c in phase.model.contacts}
+        for width in widths(phase.model):
+            own = scales[width.contact]
+            if width.layer is None:
+                found[width.parameter] = max(width.number, level * own.load)
+            else:
+                least = width.layer if laws[width.contact].widths else 0.0
+                found[width.parameter] = width.at(max(least, level * own.speed))
+    return found
+
+
+def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
+    """Contact -> width of its layer [m/s or rad/s] at `level`."""
+    found: dict[str, float] = {}
+    for phase in problem.chain:
+        laws = {c.name: c.law for c in phase.model.contacts}
+        for width in widths(phase.model):
+            if width.layer is not None:
+                least = width.layer if laws[width.contact].widths else 0.0
+                found[width.contact] = max(least, level * scales[width.contact].speed)
+    return found
+
+
+def own_level(problem: Problem, scales: Scales) -> float:
+    """How wide the layers of the user's own laws are, in multiples of the speeds.
+
+    The narrowest counts; 0 for laws without layers.
+    """
+    found = [
+        width.layer / scales[width.contact].speed
+        for phase in problem.chain
+        for width in widths(phase.model)
+        if width.layer is not None and scales[width.contact].speed > 0.0
+        if next(c for c in phase.model.contacts if c.name == width.contact).law.widths
+    ]
+    return min(found, default=0.0)
+
+
+def has_jumps(problem: Problem) -> bool:
+    """Whether any contact of any phase holds at rest, so that there is something to sharpen."""
+    return any(jumps(phase.model, c) for phase in problem.chain for c in phase.model.contacts)
+
+
+def values_at(span: Span, contact: Contact, points: SpanPoints) -> Array:
+    """Sliding velocities and normal forces at the collocation points, shape (2, N d).
+
+    A normal force that needs the friction force of another contact is zero here.
+    """
+    at = ca.Function(
+        "at", span.symbols, [ca.vertcat(contact.slip, ca.SX(contact.N))], {"allow_free": True}
+    )
+    if at.has_free():
+        at = ca.Function("at", span.symbols, [ca.vertcat(contact.slip, 0.0)])
+    count = points.inner.shape[1]
+    held = np.repeat(points.u, count // points.u.shape[1], axis=1)
+    p = np.tile(span.p[:, None], count)
+    return np.asarray(at.map(count)(np.zeros((1, count)), points.inner, points.z, held, p))
