@@ -16,8 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ocp import TIME, Free, Phase, Problem, Solution, integral, solve
-from ocp.result.picture import plot_solutions
+from ocp import TIME, Free, Phase, Problem, Solution, integral, plot_solutions, solve
 from symfric import BrownMcPhee, drive
 
 

@@ -4,40 +4,69 @@
 done about friction.
 """
 
-from ocp.checking.verification import Miss as Miss
-from ocp.checking.verification import Verification as Verification
-from ocp.checking.verify import verify as verify
-from ocp.friction.exact import set_valued as set_valued
-from ocp.friction.referee import verify_exactly as verify_exactly
-from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
-from ocp.mpc.closed_loop import plot_loops as plot_loops
-from ocp.mpc.controller import Controller as Controller
-from ocp.mpc.controller import controller_of as controller_of
-from ocp.result.solution import Mode as Mode
-from ocp.result.solution import Solution as Solution
-from ocp.result.solution import load as load
-from ocp.solve import solve as solve
-from ocp.solvers.fatrop import Fatrop as Fatrop
-from ocp.solvers.ipopt import Ipopt as Ipopt
-from ocp.solvers.outcome import Progress as Progress
-from ocp.solvers.outcome import SolverStatistics as SolverStatistics
-from ocp.solvers.sqp import Sqp as Sqp
-from ocp.solving.starts import Guess as Guess
-from ocp.text.cost import TIME as TIME
-from ocp.text.cost import Cost as Cost
-from ocp.text.cost import at_end as at_end
-from ocp.text.cost import effort as effort
-from ocp.text.cost import integral as integral
-from ocp.text.cost import track as track
-from ocp.text.cost import worst as worst
-from ocp.text.moves import rest_to_rest as rest_to_rest
-from ocp.text.phase import Chain as Chain
-from ocp.text.phase import Phase as Phase
-from ocp.text.problem import Problem as Problem
-from ocp.text.ranges import FREE as FREE
-from ocp.text.ranges import Free as Free
-from ocp.text.ranges import Range as Range
-from ocp.text.signals import Signals as Signals
-from ocp.transcription.schemes import Legendre as Legendre
-from ocp.transcription.schemes import Radau as Radau
-from ocp.transcription.schemes import Shooting as Shooting
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from ocp.checking.verification import Miss as Miss
+    from ocp.checking.verification import Verification as Verification
+    from ocp.checking.verify import verify as verify
+    from ocp.formulation.bounds import FREE as FREE
+    from ocp.formulation.bounds import Free as Free
+    from ocp.formulation.bounds import Range as Range
+    from ocp.formulation.expressions import TIME as TIME
+    from ocp.formulation.expressions import Cost as Cost
+    from ocp.formulation.expressions import Signals as Signals
+    from ocp.formulation.expressions import at_end as at_end
+    from ocp.formulation.expressions import effort as effort
+    from ocp.formulation.expressions import integral as integral
+    from ocp.formulation.expressions import track as track
+    from ocp.formulation.expressions import worst as worst
+    from ocp.formulation.phase import Chain as Chain
+    from ocp.formulation.phase import Phase as Phase
+    from ocp.formulation.problem import Problem as Problem
+    from ocp.formulation.templates import rest_to_rest as rest_to_rest
+    from ocp.friction.exact import set_valued as set_valued
+    from ocp.friction.referee import verify_exactly as verify_exactly
+    from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
+    from ocp.mpc.closed_loop import plot_loops as plot_loops
+    from ocp.mpc.controller import Controller as Controller
+    from ocp.mpc.controller import controller_of as controller_of
+    from ocp.result.solution import Mode as Mode
+    from ocp.result.solution import Solution as Solution
+    from ocp.result.solution import load as load
+    from ocp.result.solution import plot_solutions as plot_solutions
+    from ocp.solve import solve as solve
+    from ocp.solvers.methods import Fatrop as Fatrop
+    from ocp.solvers.methods import Ipopt as Ipopt
+    from ocp.solvers.methods import Sqp as Sqp
+    from ocp.solvers.outcome import Progress as Progress
+    from ocp.solvers.outcome import SolverStatistics as SolverStatistics
+    from ocp.solving.starts import Guess as Guess
+    from ocp.transcription.schemes import Legendre as Legendre
+    from ocp.transcription.schemes import Radau as Radau
+    from ocp.transcription.schemes import Shooting as Shooting
+else:
+    hand_out(
+        __name__,
+        {
+            "ocp.checking.verification": "Miss Verification",
+            "ocp.checking.verify": "verify",
+            "ocp.formulation.bounds": "FREE Free Range",
+            "ocp.formulation.expressions": "Cost Signals TIME at_end effort integral track worst",
+            "ocp.formulation.phase": "Chain Phase",
+            "ocp.formulation.problem": "Problem",
+            "ocp.formulation.templates": "rest_to_rest",
+            "ocp.friction.exact": "set_valued",
+            "ocp.friction.referee": "verify_exactly",
+            "ocp.mpc.closed_loop": "ClosedLoop plot_loops",
+            "ocp.mpc.controller": "Controller controller_of",
+            "ocp.result.solution": "Mode Solution load plot_solutions",
+            "ocp.solve": "solve",
+            "ocp.solvers.methods": "Fatrop Ipopt Sqp",
+            "ocp.solvers.outcome": "Progress SolverStatistics",
+            "ocp.solving.starts": "Guess",
+            "ocp.transcription.schemes": "Legendre Radau Shooting",
+        },
+    )

@@ -12,19 +12,19 @@ from ocp.checking.refining import Goals, refined_solve
 from ocp.checking.verification import Verification
 from ocp.checking.verify import verified
 from ocp.checking.verify import verify as verify_solution
+from ocp.formulation.problem import Problem
 from ocp.friction.own_law import STEPS, OwnLaw
 from ocp.friction.polish import polish, refusal
 from ocp.friction.referee import verify_exactly
 from ocp.friction.scales import has_jumps, own_level, speeds_at
 from ocp.friction.sharpen import FINE, LAST, Sharp, sharpened
+from ocp.result.motion import Stored
 from ocp.result.solution import Solution
-from ocp.result.stored import Stored
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver
 from ocp.solving.starts import Start
-from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau, Scheme, Shooting
 from symfric.foundation import checks

@@ -2,27 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 from numpy.typing import ArrayLike
 
-from ocp.friction.sharpen import STARTS
-from ocp.job import Friction, Job
+from ocp.formulation.problem import Problem, cost_size, sized
+from ocp.formulation.validate import doubts
 from ocp.result.solution import Solution
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Report
-from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver
-from ocp.solving.starts import Start
-from ocp.text.doubts import doubts
-from ocp.text.problem import Problem
-from ocp.text.sizes import cost_size, sized
+from ocp.solving.starts import STARTS, Start
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
+
+if TYPE_CHECKING:
+    from ocp.job import Friction
 
 OVER = "obj_scaling_factor"
 """Option of Ipopt: what it multiplies the cost by."""
@@ -35,7 +33,7 @@ def solve(
     intervals: int | ArrayLike | Sequence[ArrayLike] | None = None,
     solver: Solver | None = None,
     guess: Start = None,
-    friction: Friction = "auto",
+    friction: "Friction" = "auto",
     tolerance: float = 1e-3,
     refine: bool = True,
     verify: bool = True,
@@ -99,6 +97,8 @@ def solve(
 
     Limits: a local optimum. With friction it is the best of a few starts.
     """
+    from ocp.job import Friction, Job  # noqa: PLC0415  (slow to load)
+
     checks.kind("solve", problem, Problem, "a problem, such as Problem(Phase(model, T=1.0), cost)")
     tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
     for name, flag in (("refine", refine), ("verify", verify), ("throw", throw)):

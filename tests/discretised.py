@@ -2,10 +2,10 @@
 
 import casadi as ca
 
-from ocp.text.cost import TIME, at_end, integral, worst
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import TIME, at_end, integral, worst
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from symfric import BrownMcPhee, Model, Output, Variable, drive
 from symfric.multibody import JointSpringDamper, Mechanism, Revolute
 from symfric.multibody.constraints import Constraint

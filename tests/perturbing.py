@@ -123,7 +123,7 @@ def verdict(job: Job, quick: bool) -> str:
     try:
         gallery = import_module("symfric.gallery")
         for name in gallery.chosen(job.plates):
-            import_module(gallery.scripts()[name]).plate(quick=quick)
+            gallery.script(name)(quick=quick)
     except Exception as error:  # noqa: BLE001  (a figure that cannot be drawn is a verdict)
         return f"{name}: {type(error).__name__}: {' '.join(str(error).split())[:400]}"
     return ""

@@ -4,10 +4,10 @@ from typing import Any
 
 from motions import double_integrator, stage
 
-from ocp.text.cost import TIME, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import TIME, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 
 UNIT = double_integrator()
 

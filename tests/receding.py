@@ -5,10 +5,10 @@ from typing import Any
 
 import casadi as ca
 
+from ocp.formulation.expressions import at_end, effort, track
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.mpc.controller import Controller, controller_of
-from ocp.text.cost import at_end, effort, track
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric import BrownMcPhee, drive
 from symfric.foundation.parameters import Variable
 from symfric.model import Model

@@ -34,11 +34,13 @@ def keys() -> dict[str, str]:
     """Plate -> what it depends on: the library, what the gallery shares, its paper, its size."""
     found: dict[str, str] = {}
     shared = [code_of(p) for p in sorted((ROOT / "symfric" / "gallery").glob("*.py")) if p != ASIDE]
+    figures = {
+        ROOT.joinpath(*module.split(".")).with_suffix(".py") for module in scripts().values()
+    }
     for name, module in scripts().items():
-        folder = ROOT.joinpath(*module.split(".")).parent
-        own = [code_of(p) for p in sorted(folder.glob("_*.py"))]
-        stem = module.rpartition(".")[2]
-        said = [(folder / f"{file}.py").read_text("utf-8") for file in (stem, "__init__")]
+        file = ROOT.joinpath(*module.split(".")).with_suffix(".py")
+        own = [code_of(p) for p in sorted(file.parent.glob("*.py")) if p not in figures]
+        said = [path.read_text("utf-8") for path in (file, file.parent / "__init__.py")]
         found[name] = digest([code_hash(), *shared, *own, *said, str(quick())])
     return found
 
@@ -83,10 +85,10 @@ def index(papers: Mapping[str, list[Mapping[str, Any]]]) -> str:
     """All figures by paper, with how far we are."""
     text = rst.title("Figures of the papers")
     text += (
-        "Figures of the papers that the laws come from, computed again by scripts of less than a "
-        "hundred lines. Beside each: what is compared, how far we are, and three kinds of "
-        "verdicts: an observation of the paper is reproduced, an explanation is refuted, or the "
-        "text does not decide. ``symfric gallery`` computes them on your machine.\n\n"
+        "Figures of the papers that the laws come from, computed again. Beside each: what is "
+        "compared, how far we are, and three kinds of verdicts: an observation of the paper is "
+        "reproduced, an explanation is refuted, or the text does not decide. ``symfric gallery`` "
+        "computes them on your machine.\n\n"
     )
     if quick():
         text += rst.directive("note", "", "These figures are computed at reduced size.\n")
@@ -148,11 +150,16 @@ def page(record: Mapping[str, Any]) -> str:
     module = scripts()[record["name"]]
     source = ROOT.joinpath(*module.split(".")).with_suffix(".py")
     text += rst.title("Script", "-") + f"``{source.relative_to(ROOT)}``\n\n"
-    return text + rst.literal(without_docstring(source.read_text("utf-8")), "python")
+    function = record["name"].rpartition("/")[2]
+    return text + rst.literal(without_docstring(source.read_text("utf-8"), function), "python")
 
 
-def without_docstring(source: str) -> str:
-    """A script without its first words, which stand above it already."""
-    first = ast.parse(source).body[0]
+def without_docstring(source: str, function: str) -> str:
+    """The source of a function without its docstring, which stands above it already."""
+    found = next(
+        n for n in ast.parse(source).body if isinstance(n, ast.FunctionDef) and n.name == function
+    )
+    first, lines = found.body[0], source.splitlines(keepends=True)
     said = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
-    return "".join(source.splitlines(keepends=True)[first.end_lineno if said else 0 :]).lstrip()
+    begin = first.end_lineno if said else first.lineno - 1
+    return "".join(lines[found.lineno - 1 : first.lineno - 1] + lines[begin : found.end_lineno])

@@ -12,7 +12,7 @@ from docs.machine.formula import name as symbol
 from docs.machine.names import linked
 from symfric import ALL_LAWS, POPULATIONS, parameters
 from symfric.cli.laws import costs
-from symfric.figures.requirements import phenomena
+from symfric.figures.magnitudes import phenomena
 from symfric.foundation.parameters import options
 from symfric.laws import PHENOMENA, AnyLaw
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum

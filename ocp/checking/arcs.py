@@ -8,9 +8,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.problem import Problem
-from ocp.text.span import Span
-from ocp.transcription.points import Points
+from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
+from ocp.transcription.unknowns import Points
 
 Array = NDArray[np.float64]
 

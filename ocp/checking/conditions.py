@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ocp.checking.arcs import Arc
 from ocp.checking.resimulate import Run
 from ocp.checking.verification import Miss
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE, Box, fixed
-from ocp.text.span import Row
+from ocp.formulation.bounds import FREE, Box, fixed
+from ocp.formulation.phase import Row
+from ocp.formulation.problem import Problem
 from symfric.foundation.symbols import stacked
 
 Array = NDArray[np.float64]

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.transcription.blocks import Entries, Piece, Selection
-from ocp.transcription.points import SpanLayout
-from ocp.transcription.skeleton import LARGEST
-from ocp.transcription.transcription import Transcription
+from ocp.transcription.transcription import LARGEST, Transcription
+from ocp.transcription.unknowns import SpanLayout
 
 Array = NDArray[np.float64]
 

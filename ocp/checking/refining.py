@@ -14,16 +14,15 @@ from ocp.checking.holding import holding_losses
 from ocp.checking.local_errors import local_errors
 from ocp.checking.refine import MeshErrors, refined
 from ocp.checking.verify import TOLERANCE, near_runs
+from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report, in_stage
 from ocp.solvers.prepared import Prepared
 from ocp.solving.one_solve import Solver, solve_on
 from ocp.solving.starts import Start
-from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme, Shooting
-from ocp.transcription.skeleton import Skeleton
-from ocp.transcription.transcribe import Discretisation, discretise
+from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from ocp.checking.conditions import against_optimised, at_nodes, between_nodes, 
 from ocp.checking.local_errors import local_errors
 from ocp.checking.resimulate import RTOL, Run, resimulated, run_from
 from ocp.checking.verification import Miss, Verification
+from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
-from ocp.text.problem import Problem
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import casadi as ca
 
+from ocp.formulation.phase import Span
 from ocp.friction.mode_models import mode_model, with_outputs
 from ocp.friction.release import SIDES, holding, rubbing
-from ocp.text.span import Span
 from symfric.foundation.parameters import Variable
 from symfric.model import Contact, Model, Output
 
@@ -61,8 +61,9 @@ def arc_model(
         modes: of all contacts that can rest.
         released: contacts that break away at the start of the arc.
         leaving: contacts that leave rest at its end by a force that cannot jump, and to which side.
-        caught: contacts that come to rest at its start, and to which side they slipped until then.
-        stopped: those that do by a force that cannot jump.
+        caught: contacts that come to rest at its start under a control that may jump, and to which
+            side they slipped until then.
+        stopped: the same of all contacts that come to rest.
         sizes: contact -> typical static level [N].
         margin: share of the level that a rest keeps away from it, and how long before the end of
             the arc it begins to give that up where it leaves [s].

@@ -15,8 +15,9 @@ which the arcs are a motion with exact Coulomb friction and stiction, for each c
   turn it round. Then it slips back for this moment, and stops only if the force under the control
   after is below that of sliding, not just below the static level.
 
-* what comes to rest by a force that cannot jump is stopped by a share of the sliding force: where
-  slip only touches zero, the least deviation lets it slip on, past the rest.
+* what comes to rest is stopped by a share of the sliding force: where slip only touches zero, or
+  more than that force would be needed after a jump of the control, the least deviation lets it slip
+  on, past the rest.
 
 Conditions that depend on each other are written once, for solvers need independent ones: at rest
 slip stays zero by itself, so nothing is asked of it at the end of a rest.
@@ -31,12 +32,13 @@ from typing import TypeVar, final
 
 import casadi as ca
 
+from ocp.formulation.bounds import Free, Range, meet
+from ocp.formulation.phase import Chain, Phase, Start
+from ocp.formulation.problem import Problem
+from ocp.formulation.statement import Duration
 from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
 from ocp.friction.release import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
-from ocp.text.phase import Chain, Phase, Start
-from ocp.text.problem import Duration, Problem
-from ocp.text.ranges import Free, Range, meet
 from symfric.foundation.symbols import stacked
 from symfric.model import Contact, Model
 
@@ -265,16 +267,18 @@ def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
 
 
 def _caught(place: Place, limited: Collection[str]) -> tuple[dict[str, int], dict[str, int]]:
-    """Contacts that come to rest, and the side they slipped to.
+    """Contacts that come to rest under a control that may jump, and all that come to rest.
 
-    First those under a control that may jump, then those by a force that cannot.
+    With the sides to which they slipped.
     """
     modes = place.arc.modes
-    found: tuple[dict[str, int], dict[str, int]] = {}, {}
-    for name, side in place.before.items():
-        if side and modes.get(name) == 0:
-            found[not _jumps(place.model, {**modes, name: 1}, name, limited)][name] = side
-    return found
+    stopped = {n: side for n, side in place.before.items() if side and modes.get(n) == 0}
+    caught = {
+        name: side
+        for name, side in stopped.items()
+        if _jumps(place.model, {**modes, name: 1}, name, limited)
+    }
+    return caught, stopped
 
 
 def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:

@@ -8,13 +8,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Span
 from ocp.friction.arc_models import LEFT
 from ocp.friction.sequence import Arc
 from ocp.result.motion import Motion
-from ocp.text.ranges import Free
-from ocp.text.span import Span
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.model import Model
 
 Array = NDArray[np.float64]

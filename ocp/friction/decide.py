@@ -140,7 +140,7 @@ class Machine:
                 share = room / size
                 events.append(Event(f"{c.name}_slips_{side}", share + OVERLOAD, -1, terminal=True))
                 rooms[f"{c.name}_room_{side}"] = share
-        seen = ca.vertcat(*(ca.horzcat(*map(ca.SX, row)) for row in rows))
+        seen = ca.vertcat(ca.SX(0, 5), *(ca.horzcat(*map(ca.SX, row)) for row in rows))
         return InModes(
             _ending(model, tuple(events), rooms),
             dict(modes),

@@ -18,7 +18,6 @@ import casadi as ca
 from symfric.foundation.coupling import coupled
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model
-from symfric.multibody.mass import null_direction
 
 MINORS = 8
 """Coordinates of a loop at most; its tangent is made of their minors."""
@@ -60,6 +59,8 @@ class Loop:
 
 def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
     """The loops of a mechanism in which several of `contacts` rest together."""
+    from symfric.multibody.mass import null_direction  # noqa: PLC0415  (of mechanisms only)
+
     mechanics = model.holonomic
     if mechanics is None or not mechanics.phi.numel() or ca.depends_on(mechanics.phi, model.t):
         return ()

@@ -6,10 +6,10 @@ from math import isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.bounds import Box
 from ocp.solving.starts import rates_of
-from ocp.text.ranges import Box
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 
 Array = NDArray[np.float64]
 

@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.verify import verified
+from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solvers.prepared import Prepared
 from ocp.solving.clock import Clock
 from ocp.solving.nearest import nearest
 from ocp.solving.one_solve import solution_of, when
 from ocp.solving.starts import start_of
-from ocp.text.problem import Problem
 from ocp.transcription.grid import split
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, discretise

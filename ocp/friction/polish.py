@@ -19,6 +19,7 @@ Applied Optimal Control, 1975, 3.7 (conditions at instants that are free).
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from math import inf, sqrt
 
 import numpy as np
@@ -26,6 +27,7 @@ import numpy as np
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.refine import MeshErrors, refined
+from ocp.formulation.problem import Problem
 from ocp.friction.arcs import MARGIN
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import restless
@@ -35,10 +37,9 @@ from ocp.friction.sequence import Leg, pruned, shown
 from ocp.friction.solved import Polisher, Solved
 from ocp.friction.whole import whole_solution
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
-from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
 
@@ -80,8 +81,9 @@ LOCAL = 1e-7
 HALVED = 4.0
 """Multiple of the largest local error that has an interval halved, of order 5."""
 
-MOST_ITERATIONS = 100
-"""Of one solve: a sequence that needs more is a wrong one."""
+MOST_ITERATIONS, PATIENT = 100, 400
+"""Of one solve: a sequence that needs more is a wrong one as a rule. Where no sequence leads to a
+solution the first solves are repeated with more: an arm whose joints stop needs 350."""
 
 CLOSER = 5.0
 """Factor to the margin of a motion that only shows what a margin costs."""
@@ -139,6 +141,10 @@ def polish(
     """
     if reason := refusal(problem):
         raise ValueError(f"polish: {reason}")
+    solver = solver or Ipopt()
+    limits = [MOST_ITERATIONS, PATIENT]
+    if "max_iter" in solver.options:
+        limits = [int(solver.options["max_iter"])]
     known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
     whole, first = known.motion.T, max(MARGIN, margin)
@@ -146,7 +152,7 @@ def polish(
         problem=problem,
         sizes=sizes_of(problem, known),
         at_rest=starts_at_rest(problem, known, widths),
-        solver=_patient(solver or Ipopt()),
+        solver=solver.with_options(max_iter=limits[0]),
         scheme=scheme or Radau(3),
         shortest=SHORTEST * whole,
         kick=KICK * whole,
@@ -164,8 +170,9 @@ def polish(
 
     best: Solved | None = None
     with suppress(_StoppedError):
-        for legs in _readings(problem, known, widths):
-            found = keep(polisher.solve(legs, known, N, 1e-2))
+        for limit, legs in _attempts(limits, problem, known, widths):
+            patient = replace(polisher, solver=solver.with_options(max_iter=limit))
+            found = keep(patient.solve(legs, known, N, 1e-2))
             if found.ok:
                 best = found
                 best = settled(polisher, best, keep)
@@ -221,13 +228,6 @@ def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, fl
     return found | dict(chosen)
 
 
-def _patient(solver: Ipopt) -> Ipopt:
-    """`solver` with a limit of iterations, where the user has set none."""
-    if "max_iter" in solver.options:
-        return solver
-    return solver.with_options(max_iter=MOST_ITERATIONS)
-
-
 def _readings(
     problem: Problem, known: Known, widths: Mapping[str, float]
 ) -> Iterator[tuple[Leg, ...]]:
@@ -240,6 +240,17 @@ def _readings(
             if shown(legs) not in seen:
                 seen.add(shown(legs))
                 yield legs
+
+
+def _attempts(
+    limits: Sequence[int], problem: Problem, known: Known, widths: Mapping[str, float]
+) -> Iterator[tuple[int, tuple[Leg, ...]]]:
+    """Limits of iterations and sequences: all of these with the first limit, then with the next."""
+    sequences: list[tuple[Leg, ...]] = []
+    for legs in _readings(problem, known, widths):
+        sequences.append(legs)
+        yield limits[0], legs
+    yield from product(limits[1:], sequences)
 
 
 def settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:

@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import mode_model
 from ocp.friction.release import excess, rubbing
 from ocp.friction.sequence import Leg, Track, cut, read, with_rests
-from ocp.text.problem import Problem
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from ocp.checking.conditions import at_nodes, between_nodes, joined, periodic
 from ocp.checking.resimulate import Run
 from ocp.checking.verification import Miss, Verification
 from ocp.checking.verify import cost_of
+from ocp.formulation.problem import Problem
 from ocp.friction.exact import set_valued
 from ocp.friction.pieces import SetValued
 from ocp.result.solution import Solution
-from ocp.text.problem import Problem
 from symfric import Hold
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status

@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
 from ocp.friction.mode_models import jumps, widths
-from ocp.text.problem import Problem
-from ocp.text.span import Span
-from ocp.transcription.points import Points, SpanPoints
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.model import Contact
 
 Array = NDArray[np.float64]

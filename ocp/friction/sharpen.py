@@ -30,28 +30,26 @@ from numpy.typing import NDArray
 
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
+from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Chain
+from ocp.formulation.problem import Problem
 from ocp.friction.many_starts import starts_around
 from ocp.friction.mode_models import smooth_model
 from ocp.friction.scales import Scale, Scales, guessed, same_size, scales_of, widths_at
 from ocp.friction.steps import Step, finalists, least
+from ocp.result.motion import Stored, stored_spans
 from ocp.result.solution import Solution
-from ocp.result.stored import Stored, stored_spans
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Iterate, Report, SolverStatistics, in_stage
 from ocp.solvers.prepared import Prepared
-from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import solution_of, when
-from ocp.solving.starts import Start, resample, start_of
-from ocp.text.phase import Chain
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.solving.starts import STARTS, Start, resample, start_of
 from ocp.transcription.grid import make_meshes, split
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 
 Array = NDArray[np.float64]
 Solver = Ipopt | Fatrop | Sqp
@@ -77,7 +75,6 @@ TOLERANCE = 1e-3
 """Local error of an interval, relative to the size of the states, that asks for no refinement."""
 PASSES = 4
 """Refinements at one width."""
-STARTS = 6
 SPREAD = 0.5
 """How far the further starts are from the given one; see `starts_around`."""
 FURTHER = 2

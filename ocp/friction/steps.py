@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.solvers.outcome import Outcome
-from ocp.transcription.points import Points
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
 from ocp.friction.sequence import Leg, shown, tracks_of
 from ocp.friction.solved import Solved
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Mode, Solution
 from ocp.solvers.outcome import Iterate, SolverStatistics
-from ocp.text.problem import Problem
-from ocp.text.span import Span
-from ocp.transcription.points import Points, SpanPoints
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import Variable
 
 Array = NDArray[np.float64]

@@ -1,33 +1,109 @@
-"""A controller on a plant with equations of its own, and what became of it."""
+"""A controller on a plant with equations of its own, and a second opinion on its plans.
+
+The second opinion is the conditions of optimality by derivatives of CasADi: nothing in it is shared
+with the solver but the expressions of the horizon. The program over all states and inputs is
+written down whole, differentiated as one expression, and the multipliers of the equations are those
+that make the gradient in the states zero (a linear system).
+"""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.mpc.design import Design
-from ocp.mpc.gauss_newton import CycleStatus
-from ocp.mpc.optimality import Optimality
-from ocp.mpc.session import Session
+from ocp.mpc.gauss_newton import CycleStatus, Plan
+from ocp.mpc.interior_point import Given
+from ocp.mpc.session import Action, Session
 from symfric.foundation import checks
 from symfric.foundation.brief import brief
 from symfric.foundation.files import write_table
+from symfric.foundation.numeric import evaluate_all
 from symfric.foundation.panels import panels, save
 from symfric.foundation.style import line
-from symfric.integrator.plant import Plant
 from symfric.integrator.stepper import stepper
 from symfric.model import Model, check_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+
+Array = NDArray[np.float64]
+
+
+@final
+class Optimality:
+    """Residuals of plans of a design."""
+
+    def __init__(self, design: Design) -> None:
+        h = design.horizon
+        self._design = design
+        X, U = ca.MX.sym("X", h.x.numel(), h.count + 1), ca.MX.sym("U", h.u.numel(), h.count)
+        R, t = ca.MX.sym("R", h.r.numel(), h.count + 1), ca.MX.sym("t", 1, h.count + 1)
+        p, b = ca.MX.sym("p", h.p.numel()), ca.MX.sym("b", h.b.numel())
+        symbols = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
+        limits = [*h.limits, *h.end_limits]
+        rows = [
+            limit.sign * (limit.expression - h.b[i]) / limit.unit for i, limit in enumerate(limits)
+        ]
+        first = len(h.limits)
+        v = ca.vertcat(ca.SX(0, 1), *rows[:first])
+        cost = h.early.value + h.late.value
+        to = h.x
+        for _ in range(h.substeps):
+            to = h.advance(to, h.u, h.r, h.p)
+        interval = ca.Function("interval", symbols, [to - h.after, v, cost])
+        last = ca.vertcat(ca.SX(0, 1), *rows[first:])
+        end = ca.Function("end", [h.x, h.r, h.p, h.t, h.b], [last, h.end.value])
+        c, v, q = interval.map(h.count, [False] * 5 + [True, False, True], [False] * 3)(
+            X[:, :-1], U, X[:, 1:], R[:, :-1], R[:, 1:], p, t[:, :-1], b
+        )
+        v_end, q_end = end(X[:, -1], R[:, -1], p, t[:, -1], b)
+        every = ca.vertcat(ca.vec(v), v_end)
+        m = ca.MX.sym("m", every.numel())
+        w = ca.vertcat(ca.vec(X[:, 1:]), ca.vec(U))
+        lagrangian = ca.sum2(q) + q_end - ca.dot(m, every)
+        gradient = ca.vertcat(
+            ca.vec(ca.gradient(lagrangian, X)[:, 1:]), ca.vec(ca.gradient(lagrangian, U))
+        )
+        slopes = ca.horzcat(ca.jacobian(ca.vec(c), X)[:, h.x.numel() :], ca.jacobian(ca.vec(c), U))
+        results = [ca.densify(gradient), ca.densify(slopes), ca.vec(c), every]
+        self._states = h.x.numel() * h.count
+        self._whole = ca.Function("whole", [X, U, R, t, p, b, m], results)
+        self._size = w.numel()
+
+    def residual(self, plan: Plan, given: Given) -> float:
+        """As `gauss_newton` defines it."""
+        h, prices = self._design.horizon, self._design.prices
+        gradient, slopes, c, v = evaluate_all(
+            self._whole, plan.X, plan.U, given.R, given.t, given.p, given.b, plan.z
+        )
+        n, model = self._states, h.model
+        by_states, by_inputs = slopes[:, :n], slopes[:, n:]
+        multipliers = np.linalg.solve(by_states.T, -gradient[:n, 0])
+        left = (gradient[n:, 0] + by_inputs.T @ multipliers) * np.tile(model.nominal("u"), h.count)
+        defects = c[:, 0] / np.tile(model.nominal("x"), h.count)
+        v, below = v[:, 0], np.maximum(-v[:, 0], 0.0)
+        kept = np.maximum(below, np.abs(plan.z * v) / np.maximum(plan.z, h.curvature))
+        price = np.where(prices.soft, prices.rho, 1.0)
+        owed = (prices.rho + prices.sigma * below - plan.z) * v / price
+        rows = np.where(prices.soft & (v < 0.0), np.minimum(kept, np.abs(owed)), kept)
+        parts = (left / h.curvature, defects, rows)
+        return max(float(np.abs(part).max(initial=0.0)) for part in parts)
+
+
 Array = NDArray[np.float64]
 Reference = float | Callable[[Array], ArrayLike]
 """A number, or a function of times [s]."""
 
+COLUMNS = (
+    "residual", "seconds", "cpu", "iterations", "program_iterations", "violation",
+)  # fmt: skip
+"""Values of each action that a loop keeps."""
 SLACK = 1e-3
 """By what share a residual may differ from the second opinion on it: rounding."""
 
@@ -238,8 +314,7 @@ def run_closed_loop(
     going = stepper(plant, h.step, x0=x0, p=plant_p)
     look = Optimality(design) if check else None
     random = np.random.default_rng(seed)
-    rows = _Rows([*plant.signals], [c.name for c in design.controls])
-    rows.look(going)
+    log = _Log({name: [value] for name, value in going.signals.items()})
     for k in range(cycles):
         t = k * h.step
         times = t + h.step * np.arange(h.count + 1.0)
@@ -252,13 +327,15 @@ def run_closed_loop(
         opinion = np.nan
         if look is not None and action.status is not CycleStatus.BAD_INPUT:
             opinion = look.residual(session.plan, session.given(wanted, t, p, None))
-        rows.add(action.controls, action, opinion, wanted)
+        log.actions.append(action)
+        log.opinions.append(opinion)
+        log.wanted.append({name: float(values[0]) for name, values in wanted.items()})
         going.step(action.controls)
-        rows.look(going)
+        for name, value in going.signals.items():
+            log.signals[name].append(value)
         if going.terminated:
-            cycles = k + 1
             break
-    return rows.loop(design, plant, h.step, cycles)
+    return log.loop(design, plant)
 
 
 def _values(reference: Reference, times: Array) -> Array:
@@ -267,53 +344,34 @@ def _values(reference: Reference, times: Array) -> Array:
 
 
 @final
-class _Rows:
-    """What a closed loop gathers on its way."""
+@dataclass(frozen=True, eq=False)
+class _Log:
+    """Values of a closed loop so far: signals, actions, second opinions, references."""
 
-    def __init__(self, signals: list[str], controls: list[str]) -> None:
-        self._signals: dict[str, list[float]] = {name: [] for name in signals}
-        self._controls: dict[str, list[float]] = {name: [] for name in controls}
-        self._references: dict[str, list[float]] = {}
-        self._actions: list[Any] = []
-        self._opinions: list[float] = []
+    signals: dict[str, list[float]]
+    actions: list[Action] = field(default_factory=list[Action])
+    opinions: list[float] = field(default_factory=list[float])
+    wanted: list[dict[str, float]] = field(default_factory=list[dict[str, float]])
 
-    def look(self, plant: Plant) -> None:
-        """Take the signals of the plant now."""
-        for name, value in plant.signals.items():
-            self._signals[name].append(value)
+    def loop(self, design: Design, plant: Model) -> ClosedLoop:
+        """All of it as arrays."""
+        step, cycles = design.horizon.step, len(self.actions)
+        names, references = [c.name for c in design.controls], self.wanted[0]
 
-    def add(
-        self, u: Mapping[str, float], action: Any, opinion: float, wanted: Mapping[str, Array]
-    ) -> None:
-        """Take what was decided in a cycle, and the references it saw."""
-        for name, value in u.items():
-            self._controls[name].append(value)
-        for name, values in wanted.items():
-            self._references.setdefault(name, []).append(float(values[0]))
-        self._actions.append(action)
-        self._opinions.append(opinion)
+        def column(name: str) -> NDArray[Any]:
+            return np.array([getattr(action, name) for action in self.actions])
 
-    def loop(self, design: Design, plant: Model, step: float, cycles: int) -> ClosedLoop:
-        """All that was gathered, as arrays."""
-        actions = self._actions
-        controls = {name: np.array(values) for name, values in self._controls.items()}
-        signals = {n: np.array(v) for n, v in self._signals.items() if n not in controls}
         return ClosedLoop(
             plant=plant.name,
             controller=design.name,
             t=step * np.arange(float(cycles)),
             t_end=step * cycles,
-            signals=signals,
+            signals={n: np.array(v) for n, v in self.signals.items() if n not in names},
             units=dict(plant.signals) | {c.name: c.unit for c in design.controls},
-            controls=controls,
-            references={name: np.array(values) for name, values in self._references.items()},
-            residual=np.array([a.residual for a in actions]),
-            checked=np.array(self._opinions),
-            seconds=np.array([a.seconds for a in actions]),
-            cpu=np.array([a.cpu for a in actions]),
-            iterations=np.array([a.iterations for a in actions]),
-            program_iterations=np.array([a.program_iterations for a in actions]),
-            violation=np.array([a.violation for a in actions]),
-            status=np.array([int(a.status) for a in actions]),
+            controls={n: np.array([a.controls[n] for a in self.actions]) for n in names},
+            references={n: np.array([row[n] for row in self.wanted]) for n in references},
+            checked=np.array(self.opinions),
+            status=np.array([int(action.status) for action in self.actions]),
             tolerance=design.settings.tolerance,
+            **{name: column(name) for name in COLUMNS},
         )

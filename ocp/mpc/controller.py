@@ -10,15 +10,15 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import ClosedLoop, Reference, run_closed_loop
 from ocp.mpc.design import Control, Design
+from ocp.mpc.from_problem import horizon_of
 from ocp.mpc.gauss_newton import Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.reading import horizon_of
 from ocp.mpc.session import Session
 from ocp.mpc.source import timed
 from ocp.mpc.to_c import GeneratedController, write_c
-from ocp.text.problem import Problem
 from symfric.codegen.blocks.block import KEYWORDS
 from symfric.foundation import checks
 from symfric.model import Model

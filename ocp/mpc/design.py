@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from ocp.mpc.gauss_newton import Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.interior_point import Prices
+from ocp.mpc.interior_point import Prices, Sweeps
 from ocp.mpc.kernels import Kernels, kernels
-from ocp.mpc.sweeps import Sweeps
 from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]

@@ -30,8 +30,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.mpc.interior_point import Prices, solve_program, total
-from ocp.mpc.sweeps import Given, Move, Sweeps
+from ocp.mpc.interior_point import Given, Move, Prices, Sweeps, solve_program, total
 
 Array = NDArray[np.float64]
 

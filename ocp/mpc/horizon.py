@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.span import Row, Span
+from ocp.formulation.phase import Row, Span
 from symfric.foundation.symbols import stacked
 from symfric.integrator.flow import flow
 from symfric.model import Model

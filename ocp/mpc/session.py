@@ -1,18 +1,169 @@
-"""A controller at work: from cycle to cycle, with the plan of the last one as the start."""
+"""A controller at work: cycles in compiled C, or in the virtual machine with the same bits."""
 
+import ctypes
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import final
+from dataclasses import dataclass, replace
+from math import inf
+from pathlib import Path
+from time import perf_counter, thread_time
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.mpc.design import Design
-from ocp.mpc.engines import Engine, InC, InVm
-from ocp.mpc.gauss_newton import CycleStatus, Plan
-from ocp.mpc.sweeps import Given
+from ocp.mpc.gauss_newton import CycleStatus, Plan, Report, improved
+from ocp.mpc.interior_point import Given
+from ocp.mpc.source import header, sizes, source, timed
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
+from symfric.foundation.numeric import address
+from symfric.integrator.compiled.compiler import FLAGS, library, opened
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """What one cycle gave.
+
+    Attributes:
+        u: controls.
+        seconds, cpu: time it took on the clock, and of the processor [s]; of the C without Python
+            around it, but for its call.
+    """
+
+    u: Array
+    report: Report
+    seconds: float
+    cpu: float
+
+
+@final
+class InVm:
+    """The loops in NumPy, the kernels in CasADi's virtual machine."""
+
+    def __init__(self, design: Design) -> None:
+        self._design = design
+        self.forget()
+
+    def forget(self) -> None:
+        """Start afresh, from a plan that rests."""
+        design = self._design
+        n = design.horizon.count
+        self._warm = False
+        self._plan = Plan(
+            np.tile(design.x0, (n + 1, 1)),
+            np.tile(design.u0, (n, 1)),
+            np.zeros(design.prices.soft.size),
+        )
+
+    @property
+    def plan(self) -> Plan:
+        """A copy of the plan."""
+        return Plan(self._plan.X.copy(), self._plan.U.copy(), self._plan.z.copy())
+
+    def cycle(self, measured: Array, given: Given, tolerance: float, iterations: int) -> Cycle:
+        """One cycle, as the C goes through it."""
+        began, busy = perf_counter(), thread_time()
+
+        def cycle(report: Report, u: Array) -> Cycle:
+            return Cycle(u, report, perf_counter() - began, thread_time() - busy)
+
+        design = self._design
+        if self._warm:
+            self._plan = self._plan.shifted(design.sweeps)
+        numbers = (measured, given.R, given.t, given.p, given.b, np.array([tolerance]))
+        if not all(np.isfinite(n).all() for n in numbers):
+            report = Report(CycleStatus.BAD_INPUT, inf, 0.0, 0, 0)
+            return cycle(report, self._shown(given))
+        X = self._plan.X.copy()
+        X[0, list(design.measured)] = measured
+        if not self._warm:
+            X[1:] = X[0]
+        self._plan = Plan(X, self._plan.U, self._plan.z)
+        u = self._shown(given)
+        with np.errstate(all="ignore"):
+            settings = replace(design.settings, tolerance=tolerance, iterations=iterations)
+            plan, report = improved(design.sweeps, self._plan, given, design.prices, settings)
+        self._plan, self._warm = plan, report.status is not CycleStatus.FAILED
+        if self._warm:
+            u = self._shown(given)
+        else:
+            self.forget()
+        return cycle(report, u)
+
+    def _shown(self, given: Given) -> Array:
+        plan = self._plan
+        return np.array([c.of(plan.X, plan.U, given.b) for c in self._design.controls])
+
+
+SCALAR = (*FLAGS, "-fno-tree-vectorize")
+"""Between calls of libm, which has tanh in SSE, a few vector instructions of AVX would make a cycle
+seven times longer (measured: 1.1 -> 7.9 ms)."""
+
+WRAPPER = Path(__file__).with_name("wrapper.c").read_text(encoding="utf-8")
+"""C between ctypes and a controller, called NAME in it."""
+
+
+@final
+class InC:
+    """The C of the controller, compiled: made here, or read from files."""
+
+    def __init__(self, design: Design, head: str = "", body: str = "") -> None:
+        self._design = design
+        parts = sizes(design)
+        self._doubles = len(design.controls) + 2
+        params = parts["NPAR"] + parts["NB"] + 1
+        text = body or source(design)
+        text = text.replace(f'#include "{design.name}.h"', head or header(design))
+        text += "#include <string.h>\n"
+        text += f"#define SF_PARAM {params}\n#define SF_OUT {self._doubles}\n"
+        text += "\n" + WRAPPER.replace("NAME", design.name)
+        names = ("sf_cycle", "sf_init", "sf_bytes", "sf_plan")
+        self._library = opened(library(text, *names, flags=SCALAR), names)
+        self.bytes = int(self._library.sf_bytes())
+        self._self = np.zeros(self.bytes // 8 + 1)
+        self._timed = timed(design)
+        self._cycle = self._library.sf_cycle
+        pointer = ctypes.c_void_p
+        self._cycle.argtypes = [pointer, pointer, ctypes.c_int, pointer, pointer, pointer]
+        self._cycle.restype = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Start afresh, from a plan that rests."""
+        self._library.sf_init(ctypes.c_void_p(address(self._self)))
+
+    @property
+    def plan(self) -> Plan:
+        """A copy of the plan."""
+        parts = sizes(self._design)
+        X, U = np.zeros((parts["N"] + 1, parts["NX"])), np.zeros((parts["N"], parts["NU"]))
+        z = np.zeros(parts["ALL"])
+        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (self._self, X, U, z)]
+        self._library.sf_plan(*arrays)
+        return Plan(X, U, z)
+
+    def cycle(self, measured: Array, given: Given, tolerance: float, iterations: int) -> Cycle:
+        """One cycle; `given` has the reference of every node."""
+        columns = [measured, given.R.T.ravel()]
+        if self._timed:
+            columns.append(given.t[:1])
+        into = np.concatenate(columns)
+        param = np.concatenate([given.p, given.b, [tolerance]])
+        out, counts = np.zeros(self._doubles), np.zeros(3, dtype=np.int32)
+        arguments: list[Any] = [address(self._self), address(param), iterations]
+        arguments += [address(into), address(out), counts.ctypes.data]
+        busy, began = thread_time(), perf_counter()
+        self._cycle(*arguments)
+        seconds, cpu = perf_counter() - began, thread_time() - busy
+        residual, violation = out[-2:].tolist()
+        iterations, program, status = counts.tolist()
+        report = Report(CycleStatus(status), residual, violation, iterations, program)
+        return Cycle(out[:-2], report, seconds, cpu)
+
 
 Array = NDArray[np.float64]
 
@@ -59,7 +210,7 @@ class Session:
         if backend == "auto":
             backend = "vm" if find_compiler() is None else "compiled"
         self._design = design
-        self._engine: Engine = InVm(design) if backend == "vm" else InC(design)
+        self._engine: InVm | InC = InVm(design) if backend == "vm" else InC(design)
         self.backend = backend
 
     def step(

@@ -8,19 +8,25 @@ wanted; `NAME_out_t` controls and how the cycle went; `NAME_init`, `NAME_step`.
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
+from pathlib import Path
 
 import casadi as ca
 
-from ocp.mpc.cycle_in_c import CYCLE
 from ocp.mpc.design import Control, Design
 from ocp.mpc.gauss_newton import ARMIJO, PLAIN, ROUNDING, CycleStatus
 from ocp.mpc.interior_point import AWAY, BACK, CLOSE
-from ocp.mpc.program_in_c import PROGRAM
 from symfric.codegen.writing.text import folded
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
+
+LOOPS = Path(__file__).with_name("cycle.c").read_text(encoding="utf-8")
+"""The loops of a cycle, those of `gauss_newton` and `interior_point`, to the bit.
+
+One text for all controllers, called NAME in it: sizes are macros, kernels are functions. Every loop
+is bounded, nothing is allocated, all memory is in the caller's struct.
+"""
 
 
 def header(design: Design) -> str:
@@ -119,7 +125,7 @@ def source(design: Design) -> str:
         for c in sorted(set(calls) & set(TRANSCENDENTAL.values()))
     )
     booleans = "#include <stdbool.h>\n" if any("bool " in f for f in functions) else ""
-    loops = (PROGRAM.lstrip() + CYCLE).replace("NAME", name).replace("move_t", f"{name}_move_t")
+    loops = LOOPS.replace("NAME", name).replace("move_t", f"{name}_move_t")
     return f"""{_banner(f"{name}.c")}
  */
 #include "{name}.h"

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.mpc.design import Design
-from ocp.mpc.engines import InC, InVm
+from ocp.mpc.interior_point import Given
+from ocp.mpc.session import InC, InVm
 from ocp.mpc.source import header, source
-from ocp.mpc.sweeps import Given
 from symfric.codegen.running.compiler import compile_object, needed_symbols
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks

@@ -2,7 +2,7 @@
 
 from ocp.problems.friction import FRICTION
 from ocp.problems.others import OTHERS
-from ocp.problems.ready import Ready, by_name
+from ocp.problems.ready import Ready
 
-READY: dict[str, Ready] = by_name(*FRICTION, *OTHERS)
+READY: dict[str, Ready] = {one.name: one for one in (*FRICTION, *OTHERS)}
 """Name -> problem."""

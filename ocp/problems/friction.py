@@ -4,14 +4,15 @@ All minimise the integral of the squared input. `v_t` is the width of the law [m
 1e-6 it is sharp, and the optimum is that of Coulomb's law with stiction.
 """
 
+from functools import partial
 from math import pi
 
 import casadi as ca
 
-from ocp.problems.ready import Ready
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.problems.ready import Ready, ready
 from symfric.foundation.parameters import Variable
 from symfric.laws import BrownMcPhee
 from symfric.model import Model
@@ -25,6 +26,9 @@ from symfric.multibody import (
 )
 from symfric.scenes.drive import drive
 
+FRICTION: list[Ready] = []
+frictional = partial(ready, FRICTION, friction=True)
+BEST = "best of many starts"
 V_T = 1e-6
 GRAVITY = 9.81
 FORCE = integral(lambda s: s.force**2)
@@ -35,6 +39,12 @@ def guide(v_t: float) -> BrownMcPhee:
     return BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=0.5, v_t=v_t, N_t=1e-3)
 
 
+@frictional(
+    "1 m out and back in 2 s on a guide with stiction",
+    64.59984,
+    1e-4,
+    "closed form 40 + 0.5 / (1 - 4 tanh 0.25)",
+)
 def out_and_back(v_t: float = V_T) -> Problem:
     """1 kg goes 1 m out in 1 s, and back to rest in another."""
     stage = drive(guide(v_t), m=1.0, N=1.0)
@@ -43,6 +53,7 @@ def out_and_back(v_t: float = V_T) -> Problem:
     return Problem(out >> back, FORCE, bounds={"force": (-20.0, 20.0)})
 
 
+@frictional("swing-up with friction in the bearing", 20.979, 1e-2, BEST)
 def pendulum(v_t: float = V_T) -> Problem:
     """A motor of 3 N m swings a pendulum of 1 kg and 1 m up that it cannot lift at once."""
     law = BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=v_t)
@@ -63,6 +74,7 @@ def pendulum(v_t: float = V_T) -> Problem:
     return Problem(up, integral(lambda s: s.torque**2), bounds={"torque": (-3.0, 3.0)})
 
 
+@frictional("swing-up by a cart on a rail", 71.534, 2e-2, BEST)
 def cart_pendulum(v_t: float = V_T) -> Problem:
     """A cart of 1 kg swings a pendulum of 0.3 kg and 0.5 m up, and stops 0.8 m further on."""
     law = BrownMcPhee(mu_s=2.2, mu_d=1.5, mu_v=0.1, v_t=v_t, N_t=1e-3)
@@ -123,16 +135,19 @@ def _there_and_back(model: Model) -> Problem:
     return Problem(there >> back, FORCE, bounds={"force": (-40.0, 40.0)})
 
 
+@frictional("a load on a guide, there and back through a spring", 28.480, 3e-2, BEST)
 def load_through_spring(v_t: float = V_T) -> Problem:
     """A load on a guide goes 0.3 m there and back, moved through a spring."""
     return _there_and_back(_coupled("load_through_spring", v_t, 0.0))
 
 
+@frictional("two coupled blocks with a contact each", 59.18, 1e-2, BEST)
 def two_blocks(v_t: float = V_T) -> Problem:
     """The same with friction under the motor, too: two contacts."""
     return _there_and_back(_coupled("two_blocks", v_t, 0.5))
 
 
+@frictional("a parcel slides along a tray that a torque tilts", 8.8827, 1e-2, BEST)
 def parcel_on_tray(v_t: float = V_T) -> Problem:
     """A parcel slides 0.3 m along a tray that a torque tilts; its normal force follows the motion.
 
@@ -163,63 +178,3 @@ def parcel_on_tray(v_t: float = V_T) -> Problem:
     move = Phase(model, T=1.5, start={"x": 0.3, **level}, end={"x": 0.0, **level})
     bounds = {"torque": (-15.0, 15.0), "tilt": (-1.2, 1.2)}
     return Problem(move, integral(lambda s: s.torque**2), bounds=bounds)
-
-
-BEST = "best of many starts"
-
-FRICTION = (
-    Ready(
-        "out_and_back",
-        "1 m out and back in 2 s on a guide with stiction",
-        out_and_back,
-        64.59984,
-        1e-4,
-        "closed form 40 + 0.5 / (1 - 4 tanh 0.25)",
-        friction=True,
-    ),
-    Ready(
-        "pendulum",
-        "swing-up with friction in the bearing",
-        pendulum,
-        20.979,
-        1e-2,
-        BEST,
-        friction=True,
-    ),
-    Ready(
-        "cart_pendulum",
-        "swing-up by a cart on a rail",
-        cart_pendulum,
-        71.534,
-        2e-2,
-        BEST,
-        friction=True,
-    ),
-    Ready(
-        "load_through_spring",
-        "a load on a guide, there and back through a spring",
-        load_through_spring,
-        28.480,
-        3e-2,
-        BEST,
-        friction=True,
-    ),
-    Ready(
-        "two_blocks",
-        "two coupled blocks with a contact each",
-        two_blocks,
-        59.18,
-        1e-2,
-        BEST,
-        friction=True,
-    ),
-    Ready(
-        "parcel_on_tray",
-        "a parcel slides along a tray that a torque tilts",
-        parcel_on_tray,
-        8.8827,
-        1e-2,
-        BEST,
-        friction=True,
-    ),
-)

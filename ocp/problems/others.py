@@ -5,15 +5,25 @@ Each is stated with the data of its source, so that its optimum can be compared 
 
 import casadi as ca
 
-from ocp.problems.ready import Ready
-from ocp.text.cost import TIME, at_end, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import TIME, at_end, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.problems.ready import Ready, ready
 from symfric.foundation.parameters import Variable
 from symfric.model import Model, Output
 
+OTHERS: list[Ready] = []
+"""Brachistochrone, Bryson-Denham, Goddard's rocket, hang glider, alp rider."""
 
+
+@ready(
+    OTHERS,
+    "a bead slides from (0, 10) to (10, 5) m in the least time",
+    1.80160312,
+    1e-8,
+    "closed form, a cycloid; data of the example of Dymos, 1.8016 s",
+)
 def brachistochrone() -> Problem:
     """Fastest slide from (0, 10) to (10, 5) m along a wire of angle theta; the curve is a cycloid.
 
@@ -28,6 +38,13 @@ def brachistochrone() -> Problem:
     return Problem(Phase(bead, Free(0.5, 10.0), end={"x": 10.0, "y": 5.0}), TIME)
 
 
+@ready(
+    OTHERS,
+    "a cart turns round before a wall with the least squared acceleration",
+    4.0,
+    0.0,
+    "closed form 4 / (9 wall); Bryson and Ho, Applied Optimal Control, 1975, 3.11",
+)
 def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
     """A cart between walls turns round without touching, with the least squared acceleration.
 
@@ -46,6 +63,14 @@ def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
     )
 
 
+@ready(
+    OTHERS,
+    "a rocket flies as high as it can",
+    -1.01283692,
+    1e-8,
+    "1.01283 in Dolan, More and Munson, Benchmarking Optimization Software with COPS 3.0, "
+    "2004, 10; further digits by 800 intervals here, 3e-9 from those by 200",
+)
 def goddard() -> Problem:
     """Highest flight of a rocket with 40 % fuel: full thrust, a singular arc against drag, none.
 
@@ -67,6 +92,13 @@ def goddard() -> Problem:
     )
 
 
+@ready(
+    OTHERS,
+    "a hang glider flies as far as it can through a thermal",
+    -1248.03,
+    5e-3,
+    "Dolan, More and Munson, COPS 3.0, 2004, 11; Betts, Practical Methods, 2010, 6.5",
+)
 def hang_glider() -> Problem:
     """Farthest flight of a hang glider through a thermal, by its lift coefficient.
 
@@ -97,6 +129,13 @@ def hang_glider() -> Problem:
     )
 
 
+@ready(
+    OTHERS,
+    "stiff and unstable states ride over four peaks",
+    2030.85609,
+    1e-5,
+    "Betts, Practical Methods for Optimal Control and Estimation, 2010, 6.14",
+)
 def alp_rider() -> Problem:
     """Four stiff states, two of them unstable together, ride over four peaks that grow from below.
 
@@ -129,49 +168,3 @@ def alp_rider() -> Problem:
         ),
         bounds={"clearance": (0.0, None)},
     )
-
-
-OTHERS = (
-    Ready(
-        "brachistochrone",
-        "a bead slides from (0, 10) to (10, 5) m in the least time",
-        brachistochrone,
-        1.80160312,
-        1e-8,
-        "closed form, a cycloid; data of the example of Dymos, 1.8016 s",
-    ),
-    Ready(
-        "bryson_denham",
-        "a cart turns round before a wall with the least squared acceleration",
-        bryson_denham,
-        4.0,
-        0.0,
-        "closed form 4 / (9 wall); Bryson and Ho, Applied Optimal Control, 1975, 3.11",
-    ),
-    Ready(
-        "goddard",
-        "a rocket flies as high as it can",
-        goddard,
-        -1.01283692,
-        1e-8,
-        "1.01283 in Dolan, More and Munson, Benchmarking Optimization Software with COPS 3.0, "
-        "2004, 10; further digits by 800 intervals here, 3e-9 from those by 200",
-    ),
-    Ready(
-        "hang_glider",
-        "a hang glider flies as far as it can through a thermal",
-        hang_glider,
-        -1248.03,
-        5e-3,
-        "Dolan, More and Munson, COPS 3.0, 2004, 11; Betts, Practical Methods, 2010, 6.5",
-    ),
-    Ready(
-        "alp_rider",
-        "stiff and unstable states ride over four peaks",
-        alp_rider,
-        2030.85609,
-        1e-5,
-        "Betts, Practical Methods for Optimal Control and Estimation, 2010, 6.14",
-    ),
-)
-"""Brachistochrone, Bryson-Denham, Goddard's rocket, hang glider, alp rider."""

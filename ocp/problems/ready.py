@@ -1,11 +1,10 @@
-"""What a ready problem is: a text, its known optimum, and where that is from."""
+"""Ready problems: a problem, its known optimum, and the source of that."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from typing import Any, TypeVar, final
 
-if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+from ocp.formulation.problem import Problem
 
 
 @final
@@ -25,13 +24,22 @@ class Ready:
 
     name: str
     title: str
-    make: Callable[..., "Problem"]
+    make: Callable[..., Problem]
     optimum: float
     uncertain: float
     source: str
     friction: bool = False
 
 
-def by_name(*ready: Ready) -> dict[str, Ready]:
-    """Name -> problem."""
-    return {r.name: r for r in ready}
+Make = TypeVar("Make", bound=Callable[..., Problem])
+
+
+def ready(to: list[Ready], *about: Any, friction: bool = False) -> Callable[[Make], Make]:
+    """Add the decorated function to a list: `about` is title, optimum, its error and source."""
+
+    def add(make: Make) -> Make:
+        title, *numbers = about
+        to.append(Ready(make.__name__, title, make, *numbers, friction=friction))
+        return make
+
+    return add

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, final
@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.result.motion import Motion, Stretch
-from ocp.result.stored import Stored, stored_spans, structure_of
+from ocp.formulation.bounds import Free
+from ocp.formulation.problem import Problem
+from ocp.formulation.serialise import Posed, posed
+from ocp.result.motion import Motion, Stored, Stretch, stored_spans, structure_of
 from ocp.solvers.outcome import Iterate, SolverStatistics
-from ocp.text.posed import Posed, posed
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
-from symfric.foundation import packed
+from ocp.transcription.unknowns import Points
+from symfric.foundation import checks, packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
@@ -42,21 +41,17 @@ class Verdict(Protocol):
     @property
     def ok(self) -> bool:
         """Whether nothing missed by more than the tolerance."""
-        ...
 
     @property
     def largest(self) -> float:
         """The largest relative miss."""
-        ...
 
     @property
     def trajectories(self) -> Sequence[Trajectory]:
         """The re-simulated motion of each span that was simulated, in order."""
-        ...
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
-        ...
 
 
 @final
@@ -84,7 +79,7 @@ class Solution:
     `solution.scenarios["oiled"]["v"]` is that of another.
 
     Attributes:
-        problem: what was solved; of a stored solution its resolved form, `ocp.text.posed.Posed`.
+        problem: what was solved; of a stored solution its resolved form, `Posed`.
         status: how it ended; `message` says it in a sentence.
         cost: J.
         motions: what moves, for each scenario.
@@ -112,9 +107,8 @@ class Solution:
     cause: BaseException | None = None
 
     def __repr__(self) -> str:
-        checked = (
-            "" if self.verification is None else f", {'' if self.verified else 'not '}verified"
-        )
+        known = f", {'not ' * (not self.verified)}verified"
+        checked = "" if self.verification is None else known
         return (
             f"<Solution of '{self.problem.name}': {self.status.name}, J = {self.cost:.6g}, "
             f"T = {self.T:.6g} s{checked}>"
@@ -142,10 +136,8 @@ class Solution:
         if self.verification is not None:
             lines.append(str(self.verification).splitlines()[0])
         counts = self.statistics
-        lines.append(
-            f"solves: {counts.solves}, iterations: {counts.iterations}, "
-            f"{counts.build_time + counts.solve_time + counts.verify_time:.2g} s"
-        )
+        total = counts.build_time + counts.solve_time + counts.verify_time
+        lines.append(f"solves: {counts.solves}, iterations: {counts.iterations}, {total:.2g} s")
         return "\n".join(lines)
 
     def __getitem__(self, name: str) -> Array:
@@ -274,9 +266,17 @@ class Solution:
             names: signals to show; all of them if none is given.
             path: image file, its format taken from the ending.
         """
-        from ocp.result.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
-
         return plot_solutions({self.problem.name: self}, names, path)
+
+    def runs_of(self, motion: Motion) -> list[Trajectory]:
+        """The re-simulated spans of a motion; none where it was not verified."""
+        return [run for k, run in enumerate(self.trajectories) if k in motion.spans]
+
+    def ending(self, motion: Motion) -> str:
+        """Duration and cost of a motion, and how it ended, in a few words."""
+        ended = "" if self.ok else f", {self.status.name.lower().replace('_', ' ')}"
+        checked = ", verified" * self.verified
+        return f"T = {motion.T:.4g} s, J = {self.cost:.5g}{checked}{ended}"
 
     def to_csv(self, path: str | Path) -> None:
         """Write all signals as columns with units in the header, such as `v [m/s]`.
@@ -328,7 +328,10 @@ class Solution:
                 {
                     "scenario": motion.name,
                     "t": motion.t.tolist(),
-                    "signals": {name: _plain(row) for name, row in motion.signals.items()},
+                    "signals": {
+                        name: [v if isfinite(v) else None for v in row.tolist()]
+                        for name, row in motion.signals.items()
+                    },
                 }
                 for motion in self.motions
             ],
@@ -337,6 +340,44 @@ class Solution:
     def to_json(self, path: str | Path) -> None:
         """Write `to_dict` as JSON."""
         write_text(path, json.dumps(self.to_dict(), allow_nan=False))
+
+
+def plot_solutions(
+    solutions: Mapping[str, Solution],
+    names: Sequence[str] = (),
+    path: str | Path | None = None,
+) -> "Figure":
+    """Signals of one or several optimal motions over time, a panel each.
+
+    Circles are the optimised nodes of the mesh, lines the motion that was simulated under the same
+    control (the optimised one where nothing was simulated), steps the inputs. Thin upright lines
+    part the phases. Of a single solution, bounds are dashed, values and ranges to meet are crosses
+    and bars, and the modes of its contacts are shaded, a band for each contact.
+
+    Args:
+        solutions: legend entry -> solution; each scenario is a motion of its own.
+        names: signals to show; those that all solutions share if none is given.
+        path: image file, its format taken from the ending.
+
+    Raises:
+        ValueError: no solution, an unknown signal, or an ending that Matplotlib does not write.
+    """
+    from ocp.result.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
+
+    if not solutions:
+        raise checks.refused("plot", "at least one solution", solutions)
+    first = next(iter(solutions.values()))
+    shared = [n for n in first.signals if all(n in s.signals for s in solutions.values())]
+    check_names(f"plot of '{first.problem.name}'", names, shared)
+    drawn = [
+        Drawn(f"{label} {motion.name}".strip(), motion, one.runs_of(motion), one.ending(motion))
+        for label, one in solutions.items()
+        for motion in one.motions
+    ]
+    alone = len(solutions) == 1
+    spans = [first.problem.spans[i] for i in first.motions[0].spans] if alone else []
+    modes = {name: [*map(astuple, each)] for name, each in first.modes.items()} if alone else {}
+    return plot_motions(drawn, list(names) or shared, spans, modes, path)
 
 
 SOLUTION = Format("symfric ocp solution", 3, "ocp.load", "a saved solution", Solution)
@@ -354,7 +395,3 @@ def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Sol
             version, or classes that are not known.
     """
     return SOLUTION.load(path, own)
-
-
-def _plain(values: Array) -> list[float | None]:
-    return [float(v) if isfinite(v) else None for v in values]

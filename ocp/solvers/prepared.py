@@ -10,9 +10,18 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.solvers.answers import OVERDETERMINED, At, plainly, sentence
 from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, outside, worst_of
-from ocp.solvers.watch import Halt, Hook, Seen, Watch, interrupts
+from ocp.solvers.watch import (
+    OVERDETERMINED,
+    At,
+    Halt,
+    Hook,
+    Seen,
+    Watch,
+    interrupts,
+    plainly,
+    sentence,
+)
 from ocp.transcription.program import Program
 from symfric.foundation import checks
 from symfric.foundation.status import Status
@@ -43,9 +52,6 @@ HALTED = {
 }
 """Who stopped the solver -> how the solve ended."""
 
-PLUGINS = {"Ipopt": "ipopt", "Fatrop": "fatrop", "Sqp": "sqpmethod"}
-"""Solver -> what CasADi calls it."""
-
 LEAN: dict[str, Any] = {
     "print_time": False,
     "show_eval_warnings": False,
@@ -55,39 +61,22 @@ LEAN: dict[str, Any] = {
 """Nothing is printed, and no derivatives are made that nobody asks for."""
 
 
-def checked_options(where: str, options: Mapping[str, Any]) -> dict[str, Option]:
-    """`options`, each a text or a number.
-
-    Raises:
-        ValueError: anything else.
-    """
-    for name, value in options.items():
-        if not isinstance(value, str | float | int):
-            raise checks.refused(f"{where}: option {name}", "a number or a text", value)
-    return dict(options)
-
-
-def checked_time(where: str, max_time: float | None) -> float | None:
-    """`max_time` [s], a number above zero, or None."""
-    if max_time is None:
-        return None
-    return checks.number(f"{where}: max_time", max_time, unit="s", above=0.0)
-
-
 def made(
-    solver: str, program: Program, options: Mapping[str, Option], common: Mapping[str, Any]
+    solver: str,
+    plugin: str,
+    program: Program,
+    options: Mapping[str, Option],
+    common: Mapping[str, Any],
 ) -> ca.Function:
     """The CasADi solver of `program`; `options` are the user's and win over `common`, ours.
 
     Raises:
         ValueError: options that the solver refuses, with its name and its own words.
     """
-    plugin = PLUGINS[solver]
-    nlp = {"x": program.w, "p": program.p, "f": program.f, "g": program.g}
     prefix = "" if plugin == "sqpmethod" else f"{plugin}."
     own = {f"{prefix}{name}": value for name, value in options.items()}
     try:
-        return ca.nlpsol("solver", plugin, nlp, LEAN | dict(common) | own)
+        return ca.nlpsol("solver", plugin, program.nlp, LEAN | dict(common) | own)
     except (RuntimeError, NotImplementedError) as error:
         if not options:
             raise
@@ -164,30 +153,37 @@ class Prepared:
         else:
             solver = self._of(warm)
             built = perf_counter()
-            arguments = {
-                "x0": w,
-                "p": numbers,
-                "lbx": program.lower_w,
-                "ubx": program.upper_w,
-                "lbg": program.lower_g,
-                "ubg": program.upper_g,
-                "lam_x0": start.lam_w,
-                "lam_g0": start.lam_g,
-            }
-            result, answer, status = self._called(solver, watch, arguments)
+            sides = {"lbx": program.lower_w, "ubx": program.upper_w}
+            sides |= {"lbg": program.lower_g, "ubg": program.upper_g}
+            begins = {"x0": w, "p": numbers, "lam_x0": start.lam_w, "lam_g0": start.lam_g}
+            result, answer, status = self._called(solver, watch, sides | begins)
         if watch.halt is not None:
             status = HALTED[watch.halt]
         elif not status.ok and watch.last is not None and not watch.last.finite:
             status = Status.NOT_FINITE
         point = self._point(result, watch, status, w, numbers)
-        return self._outcome(
-            watch,
-            point,
-            status,
-            answer,
-            numbers,
-            at,
-            (built - begin, perf_counter() - built),
+        limit = self.told_time or self.max_time
+        return Outcome(
+            iterate=Iterate(point.w, point.lam_w, point.lam_g),
+            cost=point.f,
+            violations=outside(point.g, program.lower_g, program.upper_g),
+            bound_violations=outside(point.w, program.lower_w, program.upper_w),
+            status=status,
+            sentence=sentence(
+                program, watch, point, status, answer, self.solver, limit, numbers, at
+            ),
+            answer=answer,
+            cycles=not status.ok and watch.cycles,
+            statistics=SolverStatistics(
+                unknowns=program.w.numel(),
+                constraints=program.g.numel(),
+                jacobian_nonzeros=program.jacobian.nnz_out(1),
+                hessian_nonzeros=program.hessian.nnz_out(0),
+                iterations=watch.iterations,
+                build_time=built - begin,
+                solve_time=perf_counter() - built,
+            ),
+            cause=watch.error,
         )
 
     def _called(
@@ -241,43 +237,6 @@ class Prepared:
         f, g = program.gradient(w, values)[0], program.jacobian(w, values)[0].full().ravel()
         lam_w, lam_g = np.zeros(w.size), np.zeros(g.size)
         return Seen(w, float(f), g, lam_w, lam_g, worst_of(program, w, g))
-
-    def _outcome(
-        self,
-        watch: Watch,
-        point: Seen,
-        status: Status,
-        answer: str,
-        values: Array,
-        at: At,
-        times: tuple[float, float],
-    ) -> Outcome:
-        program = self.program
-        said = sentence(
-            program, watch, point, status, answer, self.solver, self.told_time or self.max_time,
-            values, at,
-        )  # fmt: skip
-        statistics = SolverStatistics(
-            unknowns=program.w.numel(),
-            constraints=program.g.numel(),
-            jacobian_nonzeros=program.jacobian.nnz_out(1),
-            hessian_nonzeros=program.hessian.nnz_out(0),
-            iterations=watch.iterations,
-            build_time=times[0],
-            solve_time=times[1],
-        )
-        return Outcome(
-            iterate=Iterate(point.w, point.lam_w, point.lam_g),
-            cost=point.f,
-            violations=outside(point.g, program.lower_g, program.upper_g),
-            bound_violations=outside(point.w, program.lower_w, program.upper_w),
-            status=status,
-            sentence=said,
-            answer=answer,
-            cycles=not status.ok and watch.cycles,
-            statistics=statistics,
-            cause=watch.error,
-        )
 
 
 def _numbers(values: ArrayLike, program: Program) -> Array:

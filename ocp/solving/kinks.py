@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.span import Span
-from ocp.transcription.points import Points, SpanPoints
+from ocp.formulation.phase import Span
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
 from symfric.model.contact import Contact

@@ -9,22 +9,20 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Solution
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Outcome, Report
 from ocp.solvers.prepared import Prepared
-from ocp.solvers.sqp import Sqp
 from ocp.solving.kinks import narrow_widths
 from ocp.solving.starts import Start, start_of
-from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
-from ocp.transcription.points import Points
 from ocp.transcription.program import Place
 from ocp.transcription.schemes import Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

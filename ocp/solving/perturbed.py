@@ -6,9 +6,9 @@ from math import isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.ranges import Box, Free
-from ocp.transcription.points import Points, SpanPoints
+from ocp.formulation.bounds import Box, Free
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]

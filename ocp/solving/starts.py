@@ -9,14 +9,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.bounds import Box, Free
+from ocp.formulation.phase import Link, Span
+from ocp.formulation.problem import Problem
+from ocp.result.motion import Stored, StoredSpan, along, structure_of
 from ocp.result.solution import Solution
-from ocp.result.stored import Stored, StoredSpan, along, structure_of
 from ocp.solvers.outcome import Iterate
-from ocp.text.problem import Problem
-from ocp.text.ranges import Box, Free
-from ocp.text.span import Link, Span
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 from symfric.model import Model
 
@@ -27,6 +27,9 @@ Guess = float | ArrayLike | Callable[[Array], ArrayLike]
 
 Start = Mapping[str, Guess] | Solution | Stored | Points | None
 """Guesses by name, a solution of this or of a similar problem, points, or nothing."""
+
+STARTS = 6
+"""Coarse solves of a problem with friction, of which the best goes on."""
 
 
 def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:

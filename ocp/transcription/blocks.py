@@ -19,6 +19,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Join, Row
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Symbols = Any
@@ -190,13 +192,44 @@ class Linear:
 
 @final
 @dataclass(frozen=True, eq=False)
+class Rows:
+    """Names, sizes and ranges of m rows.
+
+    Attributes:
+        names: of each row, for messages.
+        scale: SI value of a row divided by its value in the program, shape (m,).
+        lower, upper: bounds in SI units, shape (m,).
+    """
+
+    names: tuple[str, ...]
+    scale: Array
+    lower: Array
+    upper: Array
+
+    @staticmethod
+    def of(rows: Sequence[Row | Join]) -> "Rows":
+        """Conditions of a problem."""
+        columns = [[r.nominal for r in rows], [r.lower for r in rows], [r.upper for r in rows]]
+        return Rows(tuple(row.name for row in rows), *(np.array(c, dtype=float) for c in columns))
+
+    @staticmethod
+    def zero(names: Sequence[str], scale: Array) -> "Rows":
+        """Equations: rows that are zero."""
+        zeros = np.zeros(len(names))
+        return Rows(tuple(names), scale, zeros, zeros)
+
+    def __add__(self, other: "Rows") -> "Rows":
+        pairs = ((self.scale, other.scale), (self.lower, other.lower), (self.upper, other.upper))
+        return Rows(self.names + other.names, *map(np.concatenate, pairs))
+
+
+@final
+@dataclass(frozen=True, eq=False)
 class Piece:
     """Rows and costs of one kind at many places.
 
     Attributes:
-        names: what each row of a place is about, m of them.
-        scale: SI value of a row divided by its value in the program, shape (m,).
-        lower, upper: bounds of the rows, scaled, shape (m,).
+        rows: of each place.
         order: where the rows of each place stand among all rows: those with lower numbers first,
             shape (places,); see `order_of`.
         span: number of the span.
@@ -209,10 +242,7 @@ class Piece:
         slot: number of the cost that the shares go to.
     """
 
-    names: tuple[str, ...]
-    scale: Array
-    lower: Array
-    upper: Array
+    rows: Rows
     order: Indices
     span: int
     interval: Indices
@@ -224,6 +254,11 @@ class Piece:
     slot: int = 0
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the rows of a place."""
+        return self.rows.names
+
+    @property
     def m(self) -> int:
         """Rows a place."""
         return len(self.names)
@@ -232,6 +267,20 @@ class Piece:
     def places(self) -> int:
         """How many there are."""
         return self.order.size
+
+
+def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order: Indices) -> Piece:
+    """Rows that stand once: row i is the sum of weights[i, j] w[columns[i, j]]."""
+    numbers = np.repeat(np.arange(len(rows.names)), columns.shape[1])
+    kept = weights.ravel() != 0.0
+    return Piece(
+        rows=rows,
+        order=np.reshape(order, (1,)),
+        span=span,
+        interval=np.zeros(1, np.int64),
+        offset=np.zeros(1),
+        linear=Linear.of(numbers[kept], columns.ravel()[kept, None], weights.ravel()[kept, None]),
+    )
 
 
 LAST = 63

@@ -14,21 +14,139 @@ Source: Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12/13, 1985, 77-90 (c
 levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected collocation).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import final
 
 import casadi as ca
 import numpy as np
 
-from ocp.text.ranges import Box, Free, fixed, meet
-from ocp.text.span import Span
-from ocp.transcription.blocks import Array, Block, Indices, Piece, block, order_of, select
-from ocp.transcription.local import Data, Local
-from ocp.transcription.loops import RANK, Loops, dependent
-from ocp.transcription.points import Layout, SpanPoints
+from ocp.formulation.bounds import Box, Free, fixed, meet
+from ocp.formulation.phase import Span
+from ocp.transcription.blocks import Array, Block, Indices, Piece, Rows, block, order_of
 from ocp.transcription.schemes import Coefficients
+from ocp.transcription.unknowns import Data, Layout, Local, SpanPoints
 from symfric.foundation.checks import listed
+from symfric.model.holonomic import Holonomic
+
+RANK = 1e-8
+"""Singular values below this share of the largest one count as zero."""
+STEPS, ITERATIONS = 20, 30
+"""Stations on the way from the start of a model to named coordinates, and iterations at each."""
+FINE, NEAR = 4, 5
+"""The same from one point of a motion to the next."""
+
+
+@final
+class Loops:
+    """Numbers of the constraints of a span, by nominal coordinates."""
+
+    def __init__(self, span: Span, mechanics: Holonomic, begin: float, free: bool) -> None:
+        """The span starts at the time `begin` [s], which may be chosen, or its end (`free`)."""
+        self.span, self.n, self.begin = span, mechanics.n, begin
+        p = {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
+        self.start = span.model.initial_state(None, p)
+        q, t, p = span.model.vector("x")[: self.n], span.model.t, span.model.vector("p")
+        phi = mechanics.phi
+        outputs = [phi, ca.jacobian(phi, q), ca.jacobian(phi, t)]
+        self._function = ca.Function("loops", [q, t, p], [ca.densify(part) for part in outputs])
+        self.nominal = span.model.nominal("x")[: self.n]
+        self.sizes = np.ones(phi.numel())
+        A = np.abs(self.at(self.start[: self.n], 0.0)[1]).max(axis=1)
+        self.sizes = np.where(A > 0, A, 1.0)
+        chosen = [v.symbol for v in span.model.p if v.name in span.chosen]
+        unknown = [*chosen, *([t] if free else [])]
+        self.open = bool(unknown) and bool(ca.depends_on(phi, ca.vertcat(*unknown)))
+
+    def at(self, q: Array, t: float) -> tuple[Array, Array, Array]:
+        """Phi (m,), its Jacobian by nominal coordinates (m, n), and phi_t (m,), in span time."""
+        values = self._function(q, self.begin + t, self.span.p)
+        phi, slope, rate = (np.array(part) for part in values)
+        slope = slope * self.nominal / self.sizes[:, None]
+        return phi.ravel() / self.sizes, slope, rate.ravel() / self.sizes
+
+    def closed(self, q: Array, held: Sequence[int], t: float) -> tuple[Array, float]:
+        """Coordinates that satisfy the constraints best with those `held` as they are in q.
+
+        By Gauss and Newton on the way from the start of the model, the shortest change each time.
+        Returns also by how much the constraints are off.
+        """
+        now = self._towards(self.start[: self.n], q, held, t, (STEPS, ITERATIONS))
+        return now, float(np.abs(self.at(now, t)[0]).max())
+
+    def follow(self, x: Array, times: Array, lead: Sequence[int]) -> Array:
+        """Coordinates and rates x (2 n, points) moved onto the constraints, one after the other.
+
+        As many of the coordinates `lead` as the constraints leave open keep their values, the first
+        ones first.
+        """
+        n, found = self.n, x.copy()
+        now = self.start[:n]
+        for k, t in enumerate(times.tolist()):
+            spare = dependent(self.at(now, t)[1], lead, (), ()) or ()
+            held = [i for i in lead if i not in spare]
+            now = self._towards(now, x[:n, k], held, t, (FINE, NEAR))
+            free = np.setdiff1d(np.arange(n), held)
+            _, A, A_t = self.at(now, t)
+            v = x[n:, k] / self.nominal
+            v[free] += np.linalg.lstsq(A[:, free], -A @ v - A_t, rcond=RANK)[0]
+            found[:n, k], found[n:, k] = now, v * self.nominal
+        return found
+
+    def _towards(
+        self, start: Array, q: Array, held: Sequence[int], t: float, pace: tuple[int, int]
+    ) -> Array:
+        """From `start` to the values of q that are `held`, the others by the shortest change."""
+        free = np.setdiff1d(np.arange(self.n), held)
+        now, begin = start.copy(), start[list(held)]
+        for s in np.linspace(0.0, 1.0, pace[0] + 1)[1:]:
+            now[list(held)] = (1 - s) * begin + s * q[list(held)]
+            for _ in range(pace[1] if free.size else 0):
+                phi, A, _ = self.at(now, t)
+                if np.abs(phi).max() < 1e-13:
+                    break
+                change = np.linalg.lstsq(A[:, free], -phi, rcond=RANK)[0]
+                largest = float(np.abs(change).max())
+                now[free] += change * self.nominal[free] * min(1.0, 1.0 / max(largest, 1e-300))
+                if largest < 1e-14:
+                    break
+        return now
+
+
+def dependent(
+    A: Array, given: Sequence[int], plain: Sequence[int], strict: Sequence[int]
+) -> list[int] | None:
+    """Columns of A to release so that the others leave all its rows to be satisfied.
+
+    As few as possible: `plain` ones before those `given`; None where they do not suffice.
+    """
+    taken = {*given, *plain, *strict}
+    free = [i for i in range(A.shape[1]) if i not in taken]
+    u, s, _ = np.linalg.svd(A, full_matrices=False)
+    rank, size = int((s > RANK * s[0]).sum()), float(s[0])
+    rest = u[:, :rank].T @ A  # as many rows as are independent
+    basis = _range(rest[:, free], size)
+    released: list[int] = []
+    for candidates in (plain, given):
+        left = list(candidates)
+        while basis.shape[1] < rank and left:
+            beyond = rest[:, left] - basis @ (basis.T @ rest[:, left])
+            norms = np.linalg.norm(beyond, axis=0)
+            best = int(np.argmax(norms))
+            if norms[best] <= RANK * size:
+                break
+            basis = np.column_stack([basis, beyond[:, best] / norms[best]])
+            released.append(left.pop(best))
+    return released if basis.shape[1] == rank else None
+
+
+def _range(A: Array, size: float) -> Array:
+    """An orthonormal basis of the columns of A."""
+    if not A.size:
+        return np.zeros((A.shape[0], 0))
+    u, s, _ = np.linalg.svd(A, full_matrices=False)
+    return u[:, s > RANK * size]
+
 
 CLOSED = 1e-7
 """How far constraints may be off where named coordinates are said to satisfy them, over the change
@@ -97,31 +215,27 @@ class Closing:
         x[: 2 * n, order] = self.loops.follow(x[: 2 * n, order], times[order] * points.T, [*held])
         return replace(points, nodes=x[:, : nodes.size], inner=x[:, nodes.size :])
 
-    def corrections(
-        self, layout: Layout, x: tuple[Indices, Array], scheme: Coefficients, data: Data
-    ) -> dict[str, object]:
-        """Fields of the `Piece` of the gaps: its block at all intervals, whose states end at x."""
+    def corrected(
+        self, gap: Piece, x: tuple[Indices, Array], layout: Layout, scheme: Coefficients, data: Data
+    ) -> Piece:
+        """The piece of the gaps with the corrections of all intervals, whose states end at x."""
         own = layout.spans[self.local.number]
-        interval, d = np.arange(own.intervals), scheme.degree
-        z = own.z[:, d - 1 :: d]
-        parts = self.local.columns(layout, x, z, own.u, own.intervals)
-        one, zero = np.ones(own.intervals), np.zeros(own.intervals)
-        return {
-            "block": self.correction,
-            "selection": select([*parts, own.extra], own.intervals),
-            "theta": data.theta(interval, one, zero),
-        }
+        z = own.z[:, scheme.degree - 1 :: scheme.degree]
+        parts = [*self.local.columns(layout, x, z, own.u, own.intervals), own.extra]
+        at = gap.interval, gap.offset
+        return self.local.piece(
+            gap.rows, self.correction, parts, data, at, gap.order, linear=gap.linear
+        )
 
     def pieces(
         self, layout: Layout, data: Data, nodes: Mapping[float, int], everywhere: bool
-    ) -> list[Piece]:
+    ) -> Iterator[Piece]:
         """Constraints at the nodes, on both levels; at the first one unless `everywhere`.
 
         The steps of an integrator end on the constraints.
         """
         number = self.local.number
         own = layout.spans[number]
-        found: list[Piece] = []
         for level, what in enumerate(("loop", "rate of loop")):
             dropped = {nodes[at] for at, known in self.known.items() if not known[level].asked}
             every = range(own.intervals + 1 if everywhere else 1)
@@ -131,23 +245,9 @@ class Closing:
             interval, offset = np.maximum(at - 1, 0), np.minimum(at, 1).astype(float)
             z = np.tile(own.z[:, :1], (1, at.size))  # not in the constraints
             parts = self.local.columns(layout, own.nodes[:, at], z, own.u[:, interval], at.size)
-            zeros = np.zeros(self.m)
-            found.append(
-                Piece(
-                    names=tuple(f"the {what} {i + 1}" for i in range(self.m)),
-                    scale=self.scale,
-                    lower=zeros,
-                    upper=zeros,
-                    order=order_of(number, at, 1),
-                    span=number,
-                    interval=interval,
-                    offset=offset,
-                    block=self.levels[level],
-                    selection=select(parts, at.size),
-                    theta=data.theta(interval, offset, np.zeros(at.size)),
-                )
-            )
-        return found
+            rows = Rows.zero([f"the {what} {i + 1}" for i in range(self.m)], self.scale)
+            at, order = (interval, offset), order_of(number, at, 1)
+            yield self.local.piece(rows, self.levels[level], parts, data, at, order)
 
 
 def closing(
@@ -251,7 +351,9 @@ def _known(
                 ranges[i] = meet(ranges[i], (target[i] - around, target[i] + around))
         found.append(Known(released=ranges))
     asked = [i for i in held if i not in default]
-    _check_rates(span, at, names, (A, A_t), asked, target, loops)
+    if off := _rate_error(span, loops, (A, A_t), asked, target):
+        rates = [names[i] for i in asked if i >= n]
+        raise ValueError(_inconsistent(span, at, rates, off))
     return found[0], found[1]
 
 
@@ -269,31 +371,23 @@ def _linked(
     }
 
 
-def _check_rates(
-    span: Span,
-    at: float,
-    names: Sequence[str],
-    rows: tuple[Array, Array],
-    held: Sequence[int],
-    target: Array,
-    loops: Loops,
-) -> None:
-    """Refuse rates that no motion through known coordinates has."""
+def _rate_error(
+    span: Span, loops: Loops, rows: tuple[Array, Array], held: Sequence[int], target: Array
+) -> float:
+    """How far rates are off that no motion through known coordinates has; 0 where there is one."""
     (A, A_t), n = rows, loops.n
     known = [i for i in held if i >= n]
     free_q = [i for i in range(n) if i not in held]
     if loops.open or np.linalg.matrix_rank(A[:, free_q], RANK) < len(free_q):
-        return  # the coordinates are not known
+        return 0.0  # the coordinates are not known
     scaled = A * span.model.nominal("x")[n : 2 * n] / loops.nominal
-    fixed_part = scaled[:, [i - n for i in known]] @ (
-        target[known] / span.model.nominal("x")[known]
-    )
+    values = target[known] / span.model.nominal("x")[known]
+    fixed_part = scaled[:, [i - n for i in known]] @ values
     free_v = [i for i in range(n) if i + n not in known]
     right = -A_t - fixed_part
     change = np.linalg.lstsq(scaled[:, free_v], right, rcond=RANK)[0] if free_v else np.zeros(0)
     off = float(np.abs(scaled[:, free_v] @ change - right).max())
-    if off > CLOSED * max(1.0, float(np.abs(fixed_part).max(initial=0.0))):
-        raise ValueError(_inconsistent(span, at, [names[i] for i in known], off))
+    return off if off > CLOSED * max(1.0, float(np.abs(fixed_part).max(initial=0.0))) else 0.0
 
 
 def _inconsistent(span: Span, at: float, names: Sequence[str], off: float) -> str:

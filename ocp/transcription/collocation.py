@@ -13,20 +13,84 @@ Everything is divided by nominal values; slopes of the polynomials are linear in
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import final
 
 import casadi as ca
 import numpy as np
 
-from ocp.text.span import Row, Span
-from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, block, order_of, select
-from ocp.transcription.compiled import Engine
-from ocp.transcription.local import Data, Local
-from ocp.transcription.points import Layout
+from ocp.formulation.phase import Span
+from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, order_of
 from ocp.transcription.schemes import Coefficients
+from ocp.transcription.unknowns import Data, Layout, Local
+from symfric.foundation.compiler import CompileError
 from symfric.foundation.symbols import stacked
+from symfric.integrator.compiled.background import Prospect
+from symfric.integrator.compiled.compiler import library
 from symfric.model.holonomic import Holonomic
+
+PER_INSTRUCTION = 3e-9
+"""Seconds that the virtual machine needs."""
+ITERATIONS = 30
+"""Of a solver, at least; it asks for every function once in each."""
+FUNCTIONS = ("rows", "share", "slopes", "jacobian", "hessian")
+
+
+@final
+@dataclass(eq=False)
+class Engine:
+    """The fastest Functions of a block that are there; mutable only in what it remembers.
+
+    Attributes:
+        block: as it was made, of SX.
+        expected: time [s] that compiled code would have saved so far, as predicted.
+    """
+
+    block: Block
+    expected: float = 0.0
+
+    @cached_property
+    def _functions(self) -> dict[str, ca.Function]:
+        found = {name: getattr(self.block, name) for name in FUNCTIONS}
+        return {name: function for name, function in found.items() if function is not None}
+
+    @cached_property
+    def _instructions(self) -> int:
+        if not self.block.rows.is_a("SXFunction"):
+            return 0  # calls of other functions, which nobody writes as one C file
+        return sum(function.n_instructions() for function in self._functions.values())
+
+    @cached_property
+    def _prospect(self) -> Prospect:
+        names = tuple(function.name() for function in self._functions.values())
+        return Prospect(self._source, names, self._instructions)
+
+    @cached_property
+    def _compiled(self) -> Block:
+        prospect = self._prospect
+        path = str(library(prospect.written(), *prospect.names))
+        functions = {name: ca.external(f.name(), path) for name, f in self._functions.items()}
+        return replace(self.block, **functions)
+
+    def _source(self) -> str:
+        code = ca.CodeGenerator("block.c")
+        for function in self._functions.values():
+            code.add(function)
+        return code.dump()
+
+    def at(self, places: int) -> Block:
+        """The block, to be evaluated at so many places in every iteration of a solver."""
+        if "_compiled" in self.__dict__:
+            return self._compiled
+        self.expected += ITERATIONS * places * self._instructions * PER_INSTRUCTION
+        if self._prospect.pays(self.expected):
+            try:
+                return self._compiled
+            except CompileError:  # a broken compiler is no reason not to solve
+                self._prospect.hopeless = True
+        return self.block
+
 
 LEAST, MOST = 1e-6, 1e6
 """How far rows that have no nominal value are scaled by their derivatives."""
@@ -40,19 +104,15 @@ class PointEquations:
     Attributes:
         local: its unknowns; behind them v knows the slopes of the velocities of a mechanism.
         engine: rows and share of the cost.
-        names: what the rows are about.
-        scale: SI values of the rows divided by theirs.
+        rows: names, sizes and ranges; path conditions are the last ones.
         sloped: for each state the row from which its slope is subtracted; -1 where the slope is a
             local unknown instead.
-        path: conditions among the rows, which are the last ones.
     """
 
     local: Local
     engine: Engine
-    names: tuple[str, ...]
-    scale: Array
+    rows: Rows
     sloped: Indices
-    path: tuple[Row, ...]
 
     @property
     def block(self) -> Block:
@@ -67,7 +127,7 @@ def point_equations(local: Local) -> PointEquations:
     values, x_nominal = local.values, model.nominal("x")
     mechanics = model.holonomic
     conditions = stacked(row.expression for row in span.path)
-    path_scale = np.array([row.nominal for row in span.path])
+    paths = Rows.of(span.path)
     slopes, sloped = ca.SX(0, 1), np.arange(len(model.x))
     equations = [f"the equation of {v.name}" for v in model.x]
     if mechanics is None:
@@ -94,15 +154,13 @@ def point_equations(local: Local) -> PointEquations:
     (path,) = _evaluated(span, [conditions], values)
     (running,) = _evaluated(span, [span.running], values)
     share = None if span.running.is_zero() else local.weight * running
-    rows = ca.vertcat(rows, algebraic / ca.DM(algebraic_scale), path / ca.DM(path_scale))
-    names = [f"the algebraic equation {i + 1}" for i in range(len(model.z))]
+    rows = ca.vertcat(rows, algebraic / ca.DM(algebraic_scale), path / ca.DM(paths.scale))
+    names = [*equations, *(f"the algebraic equation {i + 1}" for i in range(len(model.z)))]
     return PointEquations(
         local,
         Engine(block("point", ca.vertcat(local.v, slopes), local.theta, rows, share)),
-        (*equations, *names, *(row.name for row in span.path)),
-        np.concatenate([scale, algebraic_scale, path_scale]),
+        Rows.zero(names, np.concatenate([scale, algebraic_scale])) + paths,
         sloped,
-        span.path,
     )
 
 
@@ -181,21 +239,9 @@ def pieces_of_points(
         carrying[known].reshape(-1, N * d),
         -np.tile(slopes, (known.size, 1)),
     )
-    zeros = np.zeros(equations.block.m - len(equations.path))
-    return Piece(
-        names=equations.names,
-        scale=equations.scale,
-        lower=np.concatenate([zeros, [row.lower / row.nominal for row in equations.path]]),
-        upper=np.concatenate([zeros, [row.upper / row.nominal for row in equations.path]]),
-        order=order_of(number, interval, 2 + j),
-        span=number,
-        interval=interval,
-        offset=scheme.nodes[1 + j],
-        block=equations.engine.at(N * d),
-        selection=select(parts, N * d),
-        theta=data.theta(interval, scheme.nodes[1 + j], scheme.weights[j]),
-        linear=linear,
-    )
+    made, at = equations.engine.at(N * d), (interval, scheme.nodes[1 + j])
+    weights, order = scheme.weights[j], order_of(number, interval, 2 + j)
+    return local.piece(equations.rows, made, parts, data, at, order, weights, linear)
 
 
 def _carrying(layout: Layout, number: int, interval: Indices) -> Indices:
@@ -214,12 +260,8 @@ def gaps(number: int, span: Span, layout: Layout, scheme: Coefficients) -> Piece
     carrying, weights = ends_of(number, layout, scheme)
     columns = np.concatenate([own.nodes[:, None, 1:], carrying], axis=1)
     weights = np.concatenate([np.ones((len(names), 1, own.intervals)), -weights], axis=1)
-    zeros = np.zeros(len(names))
     return Piece(
-        names=tuple(f"the continuity of {name}" for name in names),
-        scale=span.model.nominal("x"),
-        lower=zeros,
-        upper=zeros,
+        rows=Rows.zero([f"the continuity of {name}" for name in names], span.model.nominal("x")),
         order=order_of(number, interval, 0),
         span=number,
         interval=interval,

@@ -8,23 +8,23 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Box, Free
-from ocp.text.span import Join, Row, Span
+from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Row, Span
+from ocp.formulation.problem import Problem
 from ocp.transcription.blocks import (
     LAST,
     Array,
     Block,
     Indices,
-    Linear,
     Piece,
+    Rows,
     block,
+    linear_piece,
     order_of,
     select,
 )
-from ocp.transcription.local import Columns, Data, Local, time_scale
-from ocp.transcription.points import Layout
 from ocp.transcription.schemes import Coefficients
+from ocp.transcription.unknowns import Columns, Data, Layout, Local, time_scale
 from symfric.foundation.symbols import stacked
 
 
@@ -43,29 +43,17 @@ class AtNode:
 
     local: Local
     fraction: float
-    rows: tuple[Row, ...]
+    rows: Rows
     block: Block
     inside: bool
 
     def piece(self, layout: Layout, scheme: Coefficients, data: Data, node: int) -> Piece:
         """The piece of it at node number `node` of the mesh."""
-        number = self.local.number
         interval, offset, parts = columns_at(self.local, layout, scheme, node, self.inside)
         stage, inside = (interval, LAST - 1) if self.inside else (node, 1)
-        at = np.array([interval])
-        return Piece(
-            names=tuple(row.name for row in self.rows),
-            scale=np.array([row.nominal for row in self.rows]),
-            lower=np.array([row.lower / row.nominal for row in self.rows]),
-            upper=np.array([row.upper / row.nominal for row in self.rows]),
-            order=order_of(number, np.array([stage]), inside),
-            span=number,
-            interval=at,
-            offset=np.array([offset]),
-            block=self.block,
-            selection=select(parts, 1),
-            theta=data.theta(at, np.array([offset]), np.zeros(1)),
-        )
+        order = order_of(self.local.number, np.array([stage]), inside)
+        at = np.array([interval]), np.array([offset])
+        return self.local.piece(self.rows, self.block, parts, data, at, order)
 
 
 def columns_at(
@@ -101,16 +89,14 @@ def at_nodes(local: Local) -> list[AtNode]:
     found: list[AtNode] = []
     for fraction, rows in span.rows_at.items():
         for inside in (False, True):
-            some = tuple(row for row in rows if _knows_inside(span, row.expression) == inside)
+            some = [row for row in rows if _knows_inside(span, row.expression) == inside]
             if some:
                 sizes = ca.DM([row.nominal for row in some])
-                expressions = stacked(row.expression for row in some) / sizes
-                made = _node_block(local, expressions, None)
-                found.append(AtNode(local, fraction, some, made, inside))
+                made = _node_block(local, stacked(row.expression for row in some) / sizes)
+                found.append(AtNode(local, fraction, Rows.of(some), made, inside))
     if not span.end.is_zero():
-        inside = _knows_inside(span, span.end)
         made = _node_block(local, ca.SX(0, 1), span.end)
-        found.append(AtNode(local, 1.0, (), made, inside))
+        found.append(AtNode(local, 1.0, Rows.of(()), made, _knows_inside(span, span.end)))
     return found
 
 
@@ -129,7 +115,7 @@ class AtStarts:
     """
 
     local: Local
-    rows: tuple[Row, ...]
+    rows: Rows
     block: Block
 
     def piece(self, layout: Layout, scheme: Coefficients, data: Data) -> Piece:
@@ -138,25 +124,14 @@ class AtStarts:
         span, at = layout.spans[number], np.arange(1, layout.spans[number].intervals)
         z = span.z[:, at * scheme.degree]
         parts = self.local.columns(layout, span.nodes[:, at], z, span.u[:, at], at.size)
-        return Piece(
-            names=tuple(row.name for row in self.rows),
-            scale=np.array([row.nominal for row in self.rows]),
-            lower=np.array([row.lower / row.nominal for row in self.rows]),
-            upper=np.array([row.upper / row.nominal for row in self.rows]),
-            order=order_of(number, at, LAST - 1),
-            span=number,
-            interval=at,
-            offset=np.zeros(at.size),
-            block=self.block,
-            selection=select(parts, at.size),
-            theta=data.theta(at, np.zeros(at.size), np.zeros(at.size)),
-        )
+        order = order_of(number, at, LAST - 1)
+        return self.local.piece(self.rows, self.block, parts, data, (at, np.zeros(at.size)), order)
 
 
 def at_starts(local: Local, rows: Sequence[Row]) -> AtStarts:
     """Conditions at the starts of all intervals of a span but the first one."""
     expressions = stacked(row.expression / row.nominal for row in rows)
-    return AtStarts(local, tuple(rows), _node_block(local, expressions, None))
+    return AtStarts(local, Rows.of(rows), _node_block(local, expressions))
 
 
 def _knows_inside(span: Span, expression: ca.SX) -> bool:
@@ -165,7 +140,7 @@ def _knows_inside(span: Span, expression: ca.SX) -> bool:
     return bool(inside.numel()) and bool(ca.depends_on(expression, inside))
 
 
-def _node_block(local: Local, rows: ca.SX, share: ca.SX | None) -> Block:
+def _node_block(local: Local, rows: ca.SX, share: ca.SX | None = None) -> Block:
     outputs = [rows, ca.SX(0) if share is None else share]
     r, q = ca.Function("at_node", local.span.symbols, outputs).call(local.values)
     return block("node", local.v, local.theta, r, None if share is None else q)
@@ -179,16 +154,14 @@ class Between:
     Attributes:
         before, after: unknowns of both.
         block: its rows, in the local unknowns of both.
-        names, scale, box: of the rows.
+        rows: names, sizes and ranges.
         link: whether the rows say where states start; joins do not.
     """
 
     before: Local
     after: Local
     block: Block
-    names: tuple[str, ...]
-    scale: Array
-    boxes: tuple[Box, ...]
+    rows: Rows
     link: bool
 
     def piece(self, layout: Layout, scheme: Coefficients, data: Sequence[Data]) -> Piece:
@@ -198,12 +171,9 @@ class Between:
         zero, one, last = np.zeros(1, np.int64), np.ones(1), np.array([N - 1])
         ends = columns_at(self.before, layout, scheme, N, False)[2]
         starts = columns_at(self.after, layout, scheme, 0, False)[2]
-        theta = data[a].theta(last, one, 0 * one), data[b].theta(zero, 0 * one, 0 * one)
+        theta = data[a].theta(last, one), data[b].theta(zero, 0 * one)
         return Piece(
-            names=self.names,
-            scale=self.scale,
-            lower=np.array([low for low, _ in self.boxes]) / self.scale,
-            upper=np.array([high for _, high in self.boxes]) / self.scale,
+            rows=self.rows,
             order=order_of(a, np.array([N]), 0 if self.link else LAST),
             span=b,
             interval=zero,
@@ -222,45 +192,19 @@ def between(before: Local, after: Local) -> list[Between]:
     states = [v.name for v in span.model.x]
     links = [link for link in span.links if _same_state(before.span, link.expression) < 0]
     if links:
-        sizes = span.model.nominal("x")[[states.index(link.state) for link in links]]
+        at = [states.index(link.state) for link in links]
+        sizes = span.model.nominal("x")[at]
         expressions = stacked(link.expression for link in links)
         (ends,) = ca.Function("link", before.span.symbols, [expressions]).call(before.values)
-        starts = after.values[1][[states.index(link.state) for link in links]]
-        made = block("link", v, theta, (starts - ends) / ca.DM(sizes))
-        names = tuple(f"the start of {link.state}" for link in links)
-        found.append(
-            Between(
-                before=before,
-                after=after,
-                block=made,
-                names=names,
-                scale=sizes,
-                boxes=((0.0, 0.0),) * len(links),
-                link=True,
-            )
-        )
+        made = block("link", v, theta, (after.values[1][at] - ends) / ca.DM(sizes))
+        rows = Rows.zero([f"the start of {link.state}" for link in links], sizes)
+        found.append(Between(before, after, made, rows, link=True))
     if span.joins:
-        sizes = np.array([_nominal(join) for join in span.joins])
-        rows = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
-        made = block("join", v, theta, stacked(rows) / ca.DM(sizes))
-        names = tuple(join.name for join in span.joins)
-        boxes = tuple((join.lower, join.upper) for join in span.joins)
-        found.append(
-            Between(
-                before=before,
-                after=after,
-                block=made,
-                names=names,
-                scale=sizes,
-                boxes=boxes,
-                link=False,
-            )
-        )
+        rows = Rows.of(span.joins)
+        values = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
+        made = block("join", v, theta, stacked(values) / ca.DM(rows.scale))
+        found.append(Between(before, after, made, rows, link=False))
     return found
-
-
-def _nominal(join: Join) -> float:
-    return Row(join.name, ca.SX(0), join.lower, join.upper).nominal
 
 
 def _same_state(before: Span, expression: ca.SX) -> int:
@@ -286,38 +230,10 @@ def plain_links(
         return []
     to, origin = (np.array(part) for part in zip(*sorted(pairs), strict=True))
     sizes, old = span.model.nominal("x")[to], before.model.nominal("x")[origin]
-    rows = LinearRows(
-        tuple(f"the continuity of {states[i]}" for i in to), sizes, ((0.0, 0.0),) * len(pairs)
-    )
+    rows = Rows.zero([f"the continuity of {states[i]}" for i in to], sizes)
     columns = np.column_stack([b.nodes[to, 0], a.nodes[origin, -1]])
     weights = np.column_stack([np.ones(to.size), -old / sizes])
-    return [rows.piece(columns, weights, number, order_of(number - 1, a.intervals, 0))]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class LinearRows:
-    """Linear conditions that stand once: names, sizes and ranges in SI units."""
-
-    names: tuple[str, ...]
-    scale: Array
-    boxes: tuple[Box, ...]
-
-    def piece(self, columns: Indices, weights: Array, span: int, order: Indices) -> Piece:
-        """Row i is the sum of weights[i, j] w[columns[i, j]]."""
-        rows = np.repeat(np.arange(len(self.names)), columns.shape[1])
-        kept = weights.ravel() != 0.0
-        return Piece(
-            names=self.names,
-            scale=self.scale,
-            lower=np.array([low for low, _ in self.boxes]) / self.scale,
-            upper=np.array([high for _, high in self.boxes]) / self.scale,
-            order=np.reshape(order, (1,)),
-            span=span,
-            interval=np.zeros(1, np.int64),
-            offset=np.zeros(1),
-            linear=Linear.of(rows[kept], columns.ravel()[kept, None], weights.ravel()[kept, None]),
-        )
+    return [linear_piece(rows, columns, weights, number, order_of(number - 1, a.intervals, 0))]
 
 
 def whole(
@@ -345,10 +261,10 @@ def whole(
         low, high = (total.lower, total.upper) if isinstance(total, Free) else (total, total)
         size = np.array([high])
         name = "the duration of phases " + ", ".join(str(i + 1) for i in numbers)
-        rows = LinearRows((name,), size, ((low - given, high - given),))
+        rows = Rows((name,), size, np.array([low - given]), np.array([high - given]))
         columns = np.array([[layout.spans[i].T for i, _ in free]])
         weights = np.array([[time_scale(span) for _, span in free]]) / size
-        found.append(rows.piece(columns, weights, numbers[0], end))
+        found.append(linear_piece(rows, columns, weights, numbers[0], end))
     return found
 
 
@@ -371,18 +287,16 @@ def _equal_states(
         columns.append(layout.spans[span].nodes[at, node])
         sizes.append(model.nominal("x")[at])
     what = "the period" if a[1] < 0 else "the start in all scenarios"
-    rows = LinearRows(
-        tuple(f"{what} of {name}" for name in names), sizes[1], ((0.0, 0.0),) * len(names)
-    )
+    rows = Rows.zero([f"{what} of {name}" for name in names], sizes[1])
     weights = np.column_stack([sizes[0] / sizes[1], -np.ones(len(names))])
-    return [rows.piece(np.column_stack(columns), weights, a[0], order)]
+    return [linear_piece(rows, np.column_stack(columns), weights, a[0], order)]
 
 
 def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece]:
     """Rows whose linear part bounds the cost of each scenario: cost - largest <= 0."""
     column = np.array([[layout.largest]])
-    rows = LinearRows((name,), np.ones(1), ((-inf, 0.0),))
+    rows = Rows((name,), np.ones(1), np.array([-inf]), np.zeros(1))
     return [
-        rows.piece(column, np.array([[-1.0]]), 0, order_of(spans + 1, i, 0))
+        linear_piece(rows, column, np.array([[-1.0]]), 0, order_of(spans + 1, i, 0))
         for i in range(scenarios)
     ]

@@ -10,7 +10,6 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.integrator.methods.tableaux import METHODS
 
 Array = NDArray[np.float64]
 MAX_DEGREE = 9
@@ -129,6 +128,8 @@ class Shooting:
     steps: int = 2
 
     def __post_init__(self) -> None:
+        from symfric.integrator.methods.tableaux import METHODS  # noqa: PLC0415  (of shooting only)
+
         checks.choice("Shooting: method", self.method, METHODS)
         object.__setattr__(self, "steps", checks.count("Shooting: steps", self.steps))
 

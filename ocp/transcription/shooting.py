@@ -6,21 +6,20 @@ F is `symfric.flow` of the model with its cost as one more state, so that deriva
 the discrete map. Bounds and path conditions hold at the nodes.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
-from ocp.text.span import Row, Span
-from ocp.transcription.blocks import LAST, Block, Piece, block, order_of, select
-from ocp.transcription.local import Data, Local
-from ocp.transcription.points import Layout
+from ocp.formulation.phase import Span
+from ocp.transcription.blocks import LAST, Block, Piece, Rows, block, order_of, select
 from ocp.transcription.schemes import Shooting
+from ocp.transcription.unknowns import Data, Layout, Local
+from symfric import integrator
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked
-from symfric.integrator import flow
 from symfric.model import Model
 
 LARGEST = 20_000
@@ -42,7 +41,7 @@ class Shot:
 
     local: Local
     block: Block
-    path: tuple[tuple[tuple[Row, ...], Block | None], ...]
+    path: tuple[tuple[Rows, Block | None], ...]
 
 
 def shot(local: Local, scheme: Shooting) -> Shot:
@@ -60,7 +59,7 @@ def shot(local: Local, scheme: Shooting) -> Shot:
     outputs = [*local.values, local.h]
     values = ca.Function("values", [local.x, local.u, local.rest, local.theta], outputs)
     t, x_si, _, u_si, p, h = values(x, u, rest, theta)
-    F = flow(model, steps=scheme.steps, method=scheme.method)
+    F = integrator.flow(model, steps=scheme.steps, method=scheme.method)
     ends = F(ca.vertcat(x_si, *([0.0] * added)), u_si, ca.vertcat(p, t), h)
     nominal = ca.DM(span.model.nominal("x"))
     v, n = ca.vertcat(x, u, rest), len(span.model.x)
@@ -135,17 +134,18 @@ def _check(span: Span) -> None:
         )
 
 
-def _paths(local: Local) -> Iterator[tuple[tuple[Row, ...], Block | None]]:
+def _paths(local: Local) -> Iterator[tuple[Rows, Block | None]]:
     """Path conditions without inputs, then those with inputs."""
     span = local.span
     u = span.model.vector("u")
     knows = [bool(u.numel()) and bool(ca.depends_on(row.expression, u)) for row in span.path]
     for wanted in (False, True):
-        rows = tuple(row for row, found in zip(span.path, knows, strict=True) if found == wanted)
+        rows = [row for row, found in zip(span.path, knows, strict=True) if found == wanted]
         expressions = stacked(row.expression for row in rows)
         (r,) = ca.Function("path", span.symbols, [expressions]).call(local.values)
-        sizes = ca.DM([row.nominal for row in rows])
-        yield rows, block("path", local.v, local.theta, r / sizes) if rows else None
+        made = Rows.of(rows)
+        r = r / ca.DM(made.scale)
+        yield made, block("path", local.v, local.theta, r) if rows else None
 
 
 def pieces_of_intervals(
@@ -154,44 +154,16 @@ def pieces_of_intervals(
     """The flow over all intervals, whose linear part is in `gap`, and the path conditions."""
     own = layout.spans[number]
     N = own.intervals
-    interval, zero, one = np.arange(N), np.zeros(N), np.ones(N)
+    interval, zero = np.arange(N), np.zeros(N)
     parts = made.local.columns(layout, own.nodes[:, :-1], own.z, own.u, N)
-    yield replace(
-        gap,
-        block=made.block,
-        selection=select(parts, N),
-        theta=data.theta(interval, zero, zero),
-    )
+    theta = data.theta(interval, zero)
+    yield replace(gap, block=made.block, selection=select(parts, N), theta=theta)
     (free, without), (bound, with_inputs) = made.path
-    after = (interval, interval + 1, one)  # a start is given more often than chosen
+    after = (interval, interval + 1, zero + 1.0)  # a start is given more often than chosen
     ends = (np.append(interval, N - 1), np.arange(N + 1), np.append(zero, 1.0))
-    for rows, written, at in ((free, without, after), (bound, with_inputs, ends)):
+    for rows, written, (at, node, offset) in ((free, without, after), (bound, with_inputs, ends)):
         if written is not None:
-            yield _path_piece(number, made.local, rows, written, at, layout, data)
-
-
-def _path_piece(
-    number: int,
-    local: Local,
-    rows: Sequence[Row],
-    written: Block,
-    at: tuple[Any, Any, Any],
-    layout: Layout,
-    data: Data,
-) -> Piece:
-    own = layout.spans[number]
-    interval, node, offset = at
-    parts = local.columns(layout, own.nodes[:, node], own.z, own.u[:, interval], node.size)
-    return Piece(
-        names=tuple(row.name for row in rows),
-        scale=np.array([row.nominal for row in rows]),
-        lower=np.array([row.lower / row.nominal for row in rows]),
-        upper=np.array([row.upper / row.nominal for row in rows]),
-        order=order_of(number, node, LAST - 2),
-        span=number,
-        interval=interval,
-        offset=offset,
-        block=written,
-        selection=select(parts, node.size),
-        theta=data.theta(interval, offset, np.zeros(node.size)),
-    )
+            x, u = own.nodes[:, node], own.u[:, at]
+            parts = made.local.columns(layout, x, own.z, u, node.size)
+            order = order_of(number, node, LAST - 2)
+            yield made.local.piece(rows, written, parts, data, (at, offset), order)

@@ -2,20 +2,66 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.transcription.blocks import Array, Indices
+from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
+from ocp.transcription.assembly import Assembled
+from ocp.transcription.blocks import Array, Indices, Piece
+from ocp.transcription.closed_loops import Closing
 from ocp.transcription.grid import check_meshes
-from ocp.transcription.points import Layout, Points, SpanPoints
-from ocp.transcription.program import Places, Program
+from ocp.transcription.program import Places, Program, Stages, stages_of
 from ocp.transcription.schemes import Scheme
-from ocp.transcription.skeleton import LARGEST, Skeleton, fixed_duration, numbers_of
+from ocp.transcription.unknowns import Layout, Points, SpanPoints
 from symfric.foundation.parameters import check_names
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """What programs on all meshes of the same numbers of intervals share."""
+
+    problem: Problem
+    layout: Layout
+    assembled: Assembled
+    w: ca.MX
+    p: ca.MX
+    pieces: tuple[Piece, ...]
+    scale: Array
+    lower: Array
+    upper: Array
+    lower_g: Array
+    upper_g: Array
+    closing: tuple[Closing | None, ...]
+
+    @cached_property
+    def structure(self) -> tuple[Stages | None, str]:
+        """Stages, or why there are none."""
+        equality = self.lower_g == self.upper_g
+        return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
+
+
+LARGEST = "the largest cost"
+
+
+def fixed_duration(span: Span) -> float:
+    """T of a span [s]; 1 where it is chosen."""
+    return 1.0 if isinstance(span.T, Free) else float(span.T)
+
+
+def numbers_of(problem: Problem, meshes: Sequence[Array], p: Mapping[str, float]) -> Array:
+    """Numbers of [p, T, mesh] of each span."""
+    parts: list[Array] = []
+    for span, mesh in zip(problem.spans, meshes, strict=True):
+        own = [p.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
+        parts += [np.array(own, dtype=float), np.array([fixed_duration(span)]), mesh]
+    return np.concatenate(parts)
 
 
 @final
@@ -161,7 +207,7 @@ def _row_places(skeleton: Skeleton, meshes: Sequence[Array]) -> Columns:
         names += piece.names
         span[at] = piece.span
         fraction[at] = mesh[piece.interval] + np.diff(mesh)[piece.interval] * piece.offset
-        scale[at] = piece.scale[:, None]
+        scale[at] = piece.rows.scale[:, None]
     return names, name, span, fraction, scale
 
 

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
 from ocp.solve import solve
 from ocp.solving.perturbed import perturbed
 from ocp.solving.starts import Start, initial_points
-from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise

@@ -17,9 +17,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.text.span import Span
+from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
 
 Array = NDArray[np.float64]
 IPOPT = {

@@ -7,10 +7,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.expressions import at_end, effort, track
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.problems.friction import guide
-from ocp.text.cost import at_end, effort, track
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric.foundation.compiler import find_compiler
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Model

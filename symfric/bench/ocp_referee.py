@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
 from ocp.friction.exact import set_valued
 from ocp.result.solution import Solution
-from ocp.text.problem import Problem
-from ocp.text.span import Span
 from symfric.bench.ocp_contenders import Attempt
 from symfric.integrator import Hold, simulate
 

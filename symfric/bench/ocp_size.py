@@ -10,7 +10,7 @@ from typing import final
 import casadi as ca
 
 from ocp.problems.friction import cart_pendulum
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise

@@ -6,18 +6,18 @@ from symfric.foundation.fronts import hand_out
 
 if TYPE_CHECKING:
     from symfric.choice.friction import Friction as Friction
-    from symfric.choice.needs import NEEDS as NEEDS
+    from symfric.choice.nature import NEEDS as NEEDS
+    from symfric.choice.ranking import Row as Row
     from symfric.choice.result import Choice as Choice
-    from symfric.choice.row import Row as Row
     from symfric.choice.select import select as select
 else:
     hand_out(
         __name__,
         {
             "symfric.choice.friction": "Friction",
-            "symfric.choice.needs": "NEEDS",
+            "symfric.choice.nature": "NEEDS",
             "symfric.choice.result": "Choice",
-            "symfric.choice.row": "Row",
+            "symfric.choice.ranking": "Row",
             "symfric.choice.select": "select",
         },
     )

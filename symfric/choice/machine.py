@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from math import inf
 from typing import Any, final
 
 import numpy as np
@@ -255,16 +254,3 @@ def load_of(model: Model) -> float | None:
         return None
     found = {float(N) for N in loads}  # pyright: ignore[reportArgumentType]
     return found.pop() if len(found) == 1 else None
-
-
-def distance(one: Array, reference: Array, size: Array, mean: bool = False) -> float:
-    """Largest difference of two motions, shape (signals, times), relative to `size`.
-
-    Of data, which hold noise, the largest root mean square; infinite where they do not compare.
-    """
-    if one.shape != reference.shape or not one.size:
-        return inf
-    off = np.abs(one - reference)
-    worst = np.sqrt((off**2).mean(axis=1)) if mean else off.max(axis=1)
-    found = float((worst / size).max())
-    return found if np.isfinite(found) else inf

@@ -10,26 +10,29 @@ from typing import final
 import numpy as np
 
 from symfric.choice import nature
-from symfric.choice.budget import LEAST, RUN, Budget, counted
 from symfric.choice.climb import (
     EFFORT,
     FINEST,
+    LEAST,
+    RUN,
     Asked,
     AtEqualError,
+    Budget,
     at_equal_error,
     climbed,
+    counted,
     nearest,
     short,
 )
 from symfric.choice.fixed_step import Motion, largest
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, Candidate, Machine, candidate
-from symfric.choice.needs import lacking
+from symfric.choice.nature import lacking
+from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
 from symfric.choice.reference import OWN, Reference
-from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
 from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
+from symfric.figures.magnitudes import phenomena
 from symfric.figures.regularisation import positions
-from symfric.figures.requirements import phenomena
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,12 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
 from symfric.choice.nature import GROUPS, shown
-from symfric.choice.row import Row
+from symfric.choice.ranking import Ranking, Row
 from symfric.foundation.panels import blank, dressed, save
 from symfric.foundation.style import MARKERS, colour
-
-if TYPE_CHECKING:
-    from symfric.choice.result import Choice
 
 KINDS = (*GROUPS.values(), "sliding")
 """Groups of laws by the most that they show."""
@@ -37,7 +33,7 @@ MOST = 80
 """Laws that are listed by name: all of the catalogue, so that no marker is without one."""
 
 
-def plot_choice(choice: "Choice", path: str | Path | None = None, wide: bool = True) -> Figure:
+def plot_choice(choice: Ranking, path: str | Path | None = None, wide: bool = True) -> Figure:
     """Error against work, marked by what a law shows, and every law by its work.
 
     Args:
@@ -83,7 +79,7 @@ def _milliseconds(rows: Sequence[Row]) -> float:
     return median(1e9 * row.time_s / row.work for row in rows) if rows else 0.0
 
 
-def _plane(axis: Axes, choice: "Choice") -> list[Row]:
+def _plane(axis: Axes, choice: Ranking) -> list[Row]:
     """All laws where they are at equal error; those that stand in the picture."""
     rows = [row for row in choice.placed if 0.0 < row.error < 1e3]
     for row in rows:
@@ -104,7 +100,7 @@ def _plane(axis: Axes, choice: "Choice") -> list[Row]:
     return rows
 
 
-def _told(choice: "Choice", rows: Sequence[Row]) -> list[Row]:
+def _told(choice: Ranking, rows: Sequence[Row]) -> list[Row]:
     """Which are named there: the first, those that stand apart, and all that are not ranked."""
     apart = (row for row in choice.ranked[1:] if row.error < APART * choice.accuracy)
     others = sorted((row for row in rows if not row.ranked), key=lambda row: row.work)

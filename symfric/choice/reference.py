@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.choice.friction import Friction
-from symfric.choice.machine import FAILURES, Machine, candidate, distance
-from symfric.figures.regularisation import positions
+from symfric.choice.machine import FAILURES, Machine, candidate
+from symfric.figures.regularisation import apart, positions
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
 from symfric.laws import BrownMcPhee, Law, Stribeck
@@ -44,7 +44,7 @@ class Reference:
 
     def off(self, motion: Array) -> float:
         """Error of a motion; infinite where it does not compare."""
-        return distance(motion, self.motion, self.size, self.mean)
+        return apart(motion, self.motion, self.size, self.mean)
 
 
 OWN = Reference("its own fine run", np.zeros((0, 0)), np.zeros(0), 0.0)
@@ -114,7 +114,7 @@ def _of_law(machine: Machine, law: Law) -> Reference:
 def _exact(machine: Machine, frictions: Mapping[str, Friction], load: float | None) -> Reference:
     held = candidate(machine, frictions[""].exact, frictions, load, own=False)
     fine, coarse = (machine.run(held.first, held.law, rtol, ATTEMPTS) for rtol in (FINE, 10 * FINE))
-    uncertain = distance(coarse.motion, fine.motion, fine.size)
+    uncertain = apart(coarse.motion, fine.motion, fine.size)
     return Reference(
         "exact dry friction (ExactCoulomb)", fine.motion, fine.size, max(uncertain, FINE)
     )
@@ -136,7 +136,7 @@ def _sharpest(
                 raise
             break
         if len(runs) > 1:
-            gaps.append(distance(runs[-2].motion, runs[-1].motion, runs[-1].size))
+            gaps.append(apart(runs[-2].motion, runs[-1].motion, runs[-1].size))
             order = log(gaps[-2] / gaps[-1]) / log(RATIO) if len(gaps) > 1 and gaps[-1] else 0.0
             uncertain = gaps[-1] / (RATIO**order - 1) if order > 0.2 else gaps[-1]
         if uncertain < 0.1 * accuracy:

@@ -1,16 +1,14 @@
-"""The choice: rows, best first, what to take, and how to look at it."""
+"""The choice: laws on a machine, best first, what to take, and how to look at it."""
 
 import csv
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-from symfric.choice.row import Row
-from symfric.choice.verdict import verdict
-from symfric.foundation.checks import check_names
+from symfric.choice.ranking import Ranking, Row
+from symfric.choice.text import lines, verdict
 from symfric.foundation.files import write_text, written
 
 if TYPE_CHECKING:
@@ -21,63 +19,9 @@ SCREEN = 16
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """Laws on a machine, the best first.
-
-    Attributes:
-        machine: its name.
-        needs: what the law has to show, words of `NEEDS`.
-        accuracy: largest error relative to the motion.
-        friction: that all laws describe.
-        reference, uncertain: what errors are measured from, and how far that may be off itself.
-        control: largest error of fixed steps.
-        t_end: length of the motion [s].
-        rows: one for each candidate.
-        wall_s: how long it took [s].
-        unmeasured: laws without a row, since somebody interrupted it.
-    """
-
-    machine: str
-    needs: tuple[str, ...]
-    accuracy: float
-    friction: str
-    reference: str
-    uncertain: float
-    control: float
-    t_end: float
-    rows: tuple[Row, ...]
-    wall_s: float
-    unmeasured: tuple[str, ...] = ()
-
-    def __getitem__(self, law: str) -> Row:
-        """The row of a law."""
-        found = {row.law: row for row in self.rows}
-        check_names("choice", [law], found)
-        return found[law]
-
-    def __iter__(self) -> Iterator[Row]:
-        return iter(self.rows)
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether somebody stopped it before all laws were measured."""
-        return bool(self.unmeasured)
-
-    @property
-    def placed(self) -> tuple[Row, ...]:
-        """The rows of all laws that run here, by their rank."""
-        return tuple(row for row in self.rows if row.rank)
-
-    @property
-    def ranked(self) -> tuple[Row, ...]:
-        """The rows of laws that show what is needed and keep the accuracy, least work first."""
-        return tuple(row for row in self.rows if row.ranked)
-
-    @property
-    def best(self) -> Row | None:
-        """The first of them; None where there is none."""
-        return next(iter(self.ranked), None)
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(Ranking):
+    """A ranking of laws that shows, draws and writes itself; see `Ranking` for its attributes."""
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -85,19 +29,11 @@ class Choice:
         return verdict(self.rows, self.needs, self.accuracy, self.control)
 
     @property
-    def title(self) -> str:
-        """What was asked, in a line."""
-        asked = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
-        return f"{self.machine}: {asked}, {self.accuracy:g} off at most"
-
-    @property
     def table(self) -> list[dict[str, Any]]:
         """A row of plain numbers and texts for each law; what CSV and data frames hold."""
         return [flat(row) for row in self.rows]
 
     def __repr__(self) -> str:
-        from symfric.choice.text import lines  # noqa: PLC0415
-
         return "\n".join(lines(self, SCREEN))
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]  (notebooks call it)

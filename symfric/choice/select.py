@@ -9,15 +9,14 @@ from multiprocessing.context import ForkProcess
 from time import perf_counter
 from typing import Any
 
-from symfric.choice.budget import RUN
+from symfric.choice.climb import RUN
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, frictions_of, load_of, machine_of
 from symfric.choice.measured import Task, best_form
-from symfric.choice.nature import forms
-from symfric.choice.needs import needed
+from symfric.choice.nature import forms, needed
+from symfric.choice.ranking import FAILED, Row, ordered
 from symfric.choice.reference import OWN, reference_of
 from symfric.choice.result import Choice
-from symfric.choice.row import FAILED, Row, ordered
 from symfric.figures.regularisation import Measure
 from symfric.foundation import checks
 from symfric.integrator.equations.inputs import Input
@@ -67,7 +66,7 @@ def select(
     says what was not decided: runs fail, cost too much, or creep by less than velocities are
     rounded.
     A law that the machine does not take has its row, too, and the reason in it. What a law may cost
-    is counted as well (`symfric.choice.budget`): it does not depend on how busy the computer is.
+    is counted as well (`symfric.choice.climb`): it does not depend on how busy the computer is.
 
     Args:
         scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,

@@ -11,8 +11,7 @@ from symfric import ALL_LAWS, parameters
 from symfric.cli import completions, output
 from symfric.cli.options import JsonOption, PlotOption, SetOption, all_with, any_with, check_outputs
 from symfric.figures import FIGURES, FigureData, compare
-from symfric.figures.requirements import parts, phenomena
-from symfric.figures.scales import NORMAL_FORCE
+from symfric.figures.magnitudes import NORMAL_FORCE, parts, phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population

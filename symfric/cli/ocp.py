@@ -9,9 +9,7 @@ from ocp import Problem, Solution, load, solve
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
 from ocp.solve import Friction
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
-from ocp.solvers.sqp import Sqp
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import completions, output
@@ -61,6 +59,14 @@ def ocp(
             "--tolerance", metavar="NUMBER", help="Largest relative miss of what is asked for."
         ),
     ] = 1e-3,
+    resting_margin: Annotated[
+        float,
+        typer.Option(
+            "--resting-margin",
+            metavar="NUMBER",
+            help="Share of its static level (dimensionless) that a contact at rest keeps from it.",
+        ),
+    ] = 1e-4,
     max_time: Annotated[
         float | None,
         typer.Option("--max-time", metavar="SECONDS", help="Time after which to stop."),
@@ -94,6 +100,7 @@ def ocp(
     check_names("--friction", [friction], get_args(Friction))
     values = numbers("--set", settings)
     ready, asked = problem_of(problem, values)
+    margin = checks.number("--resting-margin", resting_margin, above=0.0, upper=0.1)
     how: dict[str, Any] = {} if intervals is None else {"intervals": intervals}
     if max_time is not None:
         how["max_time"] = checks.number("--max-time", max_time, unit="s", above=0.0)
@@ -106,6 +113,7 @@ def ocp(
             solver=SOLVERS[solver](),
             friction=cast("Friction", friction),
             tolerance=tolerance,
+            resting_margin=margin,
             progress=lambda now: tell(min(1.0, now.iteration / 1000)),
             throw=False,
             **how,

@@ -16,8 +16,7 @@ import typer
 from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
 from symfric.choice import NEEDS, Choice, Friction
 from symfric.choice import select as select_law
-from symfric.choice.nature import forms
-from symfric.choice.needs import lacking, needed
+from symfric.choice.nature import forms, lacking, needed
 from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
 from symfric.cli.fitting import Reading, reading
@@ -37,7 +36,7 @@ from symfric.cli.options import (
     with_settings,
 )
 from symfric.cli.user_file import function_of_file
-from symfric.figures.requirements import phenomena
+from symfric.figures.magnitudes import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import ALL_LAWS
@@ -337,7 +336,7 @@ def _paper(scene: str, json: str | None, others: bool) -> None:
     Raises:
         ValueError: a scene that is not in the paper, options that change it.
     """
-    from symfric.choice.jing_mi import TABLES, compare_with_paper  # noqa: PLC0415  (only here)
+    from symfric.gallery.selection.tables import TABLES, compare_with_paper  # noqa: PLC0415  (only here)
 
     check_names("--paper of", [scene], TABLES)
     if others:

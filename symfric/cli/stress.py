@@ -1,6 +1,7 @@
 """`symfric stress`: random cases, each judged by a referee or by other methods."""
 
 from pathlib import Path
+from time import monotonic
 from typing import Annotated
 
 import typer
@@ -10,6 +11,9 @@ from symfric.cli.options import JsonOption, WorkersOption, check_folder, check_o
 from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Case
 from symfric.stress.judge import CLASSES, FAILING, Verdict
+
+EVERY = 60.0
+"""Time between two writings of the files [s]."""
 
 
 def stress(
@@ -25,7 +29,10 @@ def stress(
     ] = Path("stress_cases"),
     workers: WorkersOption = None,
     limit: Annotated[
-        float, typer.Option("--limit", metavar="SECONDS", help="When a case counts as hanging.")
+        float,
+        typer.Option(
+            "--limit", metavar="SECONDS", help="Processor time of a case; more counts as hanging."
+        ),
     ] = 120.0,
     json: JsonOption = None,
 ) -> None:
@@ -35,7 +42,8 @@ def stress(
     solved by SciPy at 1e-10; the others are compared with other methods at smaller tolerances.
     Parameters by decades, tolerances, methods, inputs and start values are drawn, too. A case is
     right, refused, loose, undecided, silently wrong, not finite, a crash or a hang; the last four
-    must not happen: their cases are saved, and the exit status is 1.
+    must not happen: their cases are saved, and the exit status is 1. The files are written every
+    minute while the campaign runs.
 
     Example: symfric stress --cases 1000 --seed 7 --json stress.json
 
@@ -51,8 +59,19 @@ def stress(
         passed, saved = verdict.kind not in FAILING, []
     else:
         check_folder(out)
-        with output.progress(f"{cases} cases") as tell:
-            report = campaign(cases, seed, workers=workers, limit=limit, progress=tell)
+        written = monotonic()
+        with output.progress(f"{cases} cases") as show_fraction:
+
+            def progress(report: Report) -> None:
+                nonlocal written
+                show_fraction(len(report.verdicts) / report.asked)
+                if monotonic() - written > EVERY:
+                    report.save(out)
+                    if json != "-":
+                        output.emit_json(report.to_dict(), json)
+                    written = monotonic()
+
+            report = campaign(cases, seed, workers=workers, limit=limit, progress=progress)
         passed, saved = report.passed, report.save(out)
         output.emit_json(report.to_dict(), json)
         if json != "-":

@@ -1,6 +1,7 @@
 """What a behaviour figure holds: curves of named columns with units."""
 
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -9,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.parameters import check_names
+from symfric.foundation.prefixes import readable
 from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.style import DASHES, colour, dash
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -101,10 +105,31 @@ class FigureData(Showing):
         return replace(self, curves=tuple(replace(c, law=law) for c in self.curves))
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Draw it, labelled with units; save it to `path` if given."""
-        from symfric.figures.pictures import plot_figure  # noqa: PLC0415  (matplotlib is slow to import)
+        """Draw it, labelled with units, a panel per pair of columns; save it to `path` if given.
 
-        return plot_figure(self, path)
+        Colours and line styles tell laws or cases apart: of several laws each has its colour, and
+        the cases differ by their line styles.
+        """
+        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
+
+        laws = list(dict.fromkeys(c.law for c in self.curves))
+        abscissae = {x for x, _ in self.panels}
+        height = {1: 4.0, 2: 2.6}.get(len(self.panels), 1.7)
+        figure, axes = panels(len(self.panels), 7.0, height, shared=len(abscissae) == 1)
+        drawn, omitted = clear(self.curves, loops=self.name == "hysteresis")
+        for axis, panel in zip(axes, self.panels, strict=True):
+            draw_curves(axis, self, panel, drawn, laws if len(laws) > 1 else ())
+            if axis is not axes[-1] and len(abscissae) == 1:
+                axis.set_xlabel("")
+        title = self.title if len(laws) > 1 else f"{laws[0]}: {self.title}"
+        figure.suptitle("\n".join(textwrap.wrap(title, 88)), fontsize="medium")
+        if note := "; ".join(text for text in (self.note, omitted) if text):
+            axes[0].set_title("\n".join(textwrap.wrap(note, 100)), loc="left", fontsize="small")
+        if len(drawn) > 1:
+            entries = axes[0].get_legend_handles_labels()
+            figure.legend(*entries, loc="outside lower center", ncols=3, fontsize="small")
+        figure.align_ylabels(axes)
+        return save(figure, path)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data: name, title, units, panels and the columns of each curve."""
@@ -129,3 +154,59 @@ def _range(values: Array) -> str:
     """From where to where a column goes."""
     finite = values[np.isfinite(values)]
     return f"{finite.min():.4g} ... {finite.max():.4g}" if finite.size else ""
+
+
+def clear(curves: Sequence[Curve], *, loops: bool = False) -> tuple[list[Curve], str]:
+    """Those of `curves` that can be told apart in one picture, and a word about the others.
+
+    Where laws are compared these are no references; of three laws and more the first and the last
+    case, and of `loops` within loops, which lie on each other, the first.
+    """
+    laws = {c.law for c in curves}
+    shown = [c for c in curves if not (c.reference and len(laws) > 1)]
+    cases = list(dict.fromkeys(c.case for c in shown))
+    if loops and len(laws) > 1:
+        shown = [c for c in shown if c.case == cases[0]]
+    elif len(laws) > 2 and len(cases) > 2:
+        shown = [c for c in shown if c.case in (cases[0], cases[-1])]
+    left = list(dict.fromkeys(c.case for c in curves if c not in shown))
+    return shown, f"not drawn: {', '.join(left)}" if left else ""
+
+
+def draw_curves(
+    axis: "Axes",
+    data: FigureData,
+    panel: tuple[str, str],
+    curves: Sequence[Curve],
+    laws: Sequence[str],
+) -> None:
+    """The curves of one panel, in units that are easily read.
+
+    Args:
+        laws: those that have a colour each, where several are compared; else the cases have.
+    """
+    x, y = panel
+    cases = list(dict.fromkeys(c.case for c in curves))
+    by_x, unit_x = readable(data.units[x], () if x in data.log else [c[x] for c in curves])
+    by_y, unit_y = readable(data.units[y], () if y in data.log else [c[y] for c in curves])
+    for c in curves:
+        case = cases.index(c.case)
+        if laws:
+            number = laws.index(c.law)
+            style = dash(case) if len(cases) > 1 else dash(number)
+        else:
+            number, style = case, DASHES[1] if c.reference else dash(case)
+        axis.plot(
+            by_x * c[x], by_y * c[y], linestyle=style, color=colour(number), linewidth=1.3,
+            marker="o" if data.dots else None, markersize=4,
+            label=c.label if laws else c.case or "as it is",
+        )  # fmt: skip
+    for on, scale in ((x, axis.set_xscale), (y, axis.set_yscale)):
+        if on in data.log:
+            scale("log")
+    if y not in data.log:
+        axis.ticklabel_format(axis="y", useOffset=False)
+        if data.dots and axis.dataLim.y0 >= 0:
+            axis.set_ylim(0.0, 1.1 * axis.dataLim.y1)
+    axis.set_xlabel(f"{x} [{unit_x}]")
+    axis.set_ylabel(f"{y} [{unit_y}]")

@@ -1,31 +1,108 @@
-"""Pictures of laws and of what they do, with units."""
+"""Pictures of laws: the steady curve, and what the law does beside it."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import chain
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symfric.figures.data import Curve
-from symfric.figures.nature import natures
-from symfric.figures.requirements import phenomena
-from symfric.figures.scales import scales
-from symfric.foundation.panels import blank, dressed, grid, panels, save
+from symfric.figures.data import Curve, FigureData, draw_curves
+from symfric.figures.magnitudes import Scales, phenomena, scales
+from symfric.figures.pushing import stiction
+from symfric.figures.sliding import dwell, hysteresis, lag, transition, velocity_step
+from symfric.foundation.panels import blank, dressed, grid, save
 from symfric.foundation.parameters import parameters
 from symfric.foundation.prefixes import readable
-from symfric.foundation.style import DASHES, colour, dash, line
+from symfric.foundation.status import SolveError
+from symfric.foundation.style import colour, dash, line
 from symfric.foundation.units import turned
-from symfric.laws import Population, steady_force, steady_inputs
+from symfric.laws import AnyLaw, Law, Population, law_name, steady_force, steady_inputs
+from symfric.laws.base.law import FORCE
 
-if TYPE_CHECKING:
-    from symfric.figures.data import FigureData
-    from symfric.laws import AnyLaw
+Make = Callable[[AnyLaw, float, Scales], FigureData]
+
+ACCELERATION = "dv"
+"""The further input of a law that any motion offers."""
+
+
+def natures(laws: Mapping[str, AnyLaw], N: float) -> list[FigureData]:
+    """The behaviours that set `laws` (legend entry -> law) apart, each with all laws that have it.
+
+    All get the amplitudes of the first that has it. A law with pre-sliding shows its hysteresis,
+    and its lag or its reversals; one that needs the applied force how it sticks; one whose static
+    friction grows with time the dwell; one that needs other inputs how they change it; a law of the
+    velocity alone nothing: its steady curve says all. A law that fails in one of them is left out
+    there, and the figure says why.
+    """
+    shown = {label: behaviours(law) for label, law in laws.items()}
+    found: list[FigureData] = []
+    for name in dict.fromkeys(name for own in shown.values() for name in own):
+        able = {label: law for label, law in laws.items() if name in shown[label]}
+        given = scales(next(iter(able.values())), N)
+        parts: list[FigureData] = []
+        failed: list[str] = []
+        for label, law in able.items():
+            try:
+                parts.append(shown[label][name](law, N, given).named(label))
+            except (SolveError, ValueError) as error:
+                failed.append(f"{label} is left out: {error}")
+        if parts:
+            curves = tuple(curve for part in parts for curve in part.curves)
+            found.append(replace(parts[0], curves=curves, note="; ".join(failed)))
+    return found
+
+
+def behaviours(law: AnyLaw) -> dict[str, Make]:
+    """Name -> what makes the figure of a behaviour, for those that `law` is drawn with."""
+    codes, needs = phenomena(law), () if isinstance(law, Population) else law.inputs
+    own = [i for i in needs if i.name not in (FORCE, ACCELERATION)]
+    if own:
+        return {f"input_{i.name}": partial(over_input, name=i.name) for i in own}
+    if FORCE in (i.name for i in needs):
+        return {"stiction": stiction}
+    found: dict[str, Make] = {}
+    if "P" in codes:
+        found["hysteresis"] = partial(hysteresis, speeds=(1.0,))
+    if "L" in codes and "P" not in codes and "T" in codes:
+        found["velocity_step"] = velocity_step
+    elif "L" in codes:
+        found["lag"] = partial(
+            lag, frequencies=(50.0,) if isinstance(law, Population) else (5.0, 50.0)
+        )
+    elif "P" in codes:
+        found["transition"] = partial(transition, frequencies=(2.0,))
+    if "T" in codes and isinstance(law, Law):
+        found["dwell"] = dwell
+    return found
+
+
+def over_input(law: AnyLaw, N: float, given: Scales, name: str) -> FigureData:
+    """Force in steady sliding at the Stribeck velocity over one of the further inputs of a law.
+
+    Over twice its nominal magnitude to both sides, the others as in pictures of steady sliding.
+    """
+    if not isinstance(law, Law):
+        raise ValueError(f"over_input of {law_name(law)}: expected a law, got a population")
+    own = {i.name: i for i in law.inputs}
+    V, u = given.velocity, np.linspace(-2.0, 2.0, 401) * own[name].nominal
+    others = {i.name: i.steady for i in law.inputs if i.name != name}
+    v = np.full(u.shape, V)
+    F = law.force(v, N, law.steady_state(v, N), **others, **{name: u})
+    return FigureData(
+        f"input_{name}",
+        f"sliding at {V:.3g} m/s over {name}, N = {N:g} N",
+        {name: own[name].unit, "F": "N"},
+        ((name, "F"),),
+        (Curve(law_name(law), "", {name: u, "F": np.asarray(F, dtype=float)}),),
+    )
+
 
 Array = NDArray[np.float64]
 LAYERS = 50.0
@@ -34,14 +111,12 @@ ABREAST = 3
 """Behaviours beside each other."""
 
 
-def plot_laws(
-    laws: "Mapping[str, AnyLaw]", N: float = 1.0, path: str | Path | None = None
-) -> Figure:
+def plot_laws(laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | None = None) -> Figure:
     """One law, or several, in one picture: the steady curve, and what the law does beside it.
 
     Above stands the force in steady sliding over the velocity, around rest on a window that fits
     the law, and over decades of the velocity. Below stands what that curve cannot tell: hysteresis
-    in pre-sliding, frictional lag, dwell, stiction (`symfric.figures.nature`); a law of the
+    in pre-sliding, frictional lag, dwell, stiction (`symfric.figures.pictures`); a law of the
     velocity alone has nothing there. Each panel has its own axes. Laws of a turning contact have
     rad/s and N m.
 
@@ -72,7 +147,7 @@ def plot_laws(
     return save(figure, path)
 
 
-def _steady(near: Axes, far: Axes, laws: "Mapping[str, AnyLaw]", N: float) -> None:
+def _steady(near: Axes, far: Axes, laws: Mapping[str, AnyLaw], N: float) -> None:
     """The steady curves around rest, and over decades; both in the units that suit the first.
 
     Thin, over decades: those while v < 0 of laws that are not odd.
@@ -107,7 +182,7 @@ def _steady(near: Axes, far: Axes, laws: "Mapping[str, AnyLaw]", N: float) -> No
         axis.set_ylabel(f"F [{unit_F}]")
 
 
-def window(law: "AnyLaw", N: float) -> float:
+def window(law: AnyLaw, N: float) -> float:
     """Half the window around rest [m/s]: 5 Stribeck velocities, 50 smoothing ones at most.
 
     A law that is viscous and no more has no velocity of its own: 1 m/s.
@@ -119,7 +194,7 @@ def window(law: "AnyLaw", N: float) -> float:
     return min(5 * V, LAYERS * layer) if isfinite(layer) else 5 * V
 
 
-def decades(law: "AnyLaw", N: float) -> tuple[float, float]:
+def decades(law: AnyLaw, N: float) -> tuple[float, float]:
     """The velocities [m/s] between which the steady curve has all it has.
 
     From a hundredth of the least velocity on which the law changes to a hundred times the greatest,
@@ -135,16 +210,16 @@ def decades(law: "AnyLaw", N: float) -> tuple[float, float]:
     return low, float(v[over[0]] if over.size else v[-1])
 
 
-def _turns(law: "AnyLaw") -> bool:
+def _turns(law: AnyLaw) -> bool:
     """Whether the parameters of a law say that its contact turns."""
     return any(p.unit.startswith("rad/s") for p in parameters(law).values())
 
 
-def _behaviour(axis: Axes, data: "FigureData", panel: tuple[str, str], laws: Sequence[str]) -> None:
+def _behaviour(axis: Axes, data: FigureData, panel: tuple[str, str], laws: Sequence[str]) -> None:
     """One behaviour in a panel of its own, and a legend where its cases differ."""
     several = len(laws) > 1
     drawn = [c for c in data.curves if not several or c.case == _first_case(data, c.law)]
-    _curves(axis, data, panel, drawn, laws if several else ())
+    draw_curves(axis, data, panel, drawn, laws if several else ())
     axis.set_title(
         TITLES.get(data.name, f"sliding, over {panel[0]}"), loc="left", fontsize="medium"
     )
@@ -169,12 +244,12 @@ TITLES = {
 """Name of a figure -> title of its panel in the picture of a law."""
 
 
-def _first_case(data: "FigureData", law: str) -> str:
+def _first_case(data: FigureData, law: str) -> str:
     return next(c.case for c in data.curves if c.law == law)
 
 
 def plot_catalogue(
-    laws: "Mapping[str, AnyLaw]", N: float = 1.0, path: str | Path | None = None
+    laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | None = None
 ) -> Figure:
     """Friction force in steady sliding against velocity, a small panel with its own axes per law.
 
@@ -206,88 +281,3 @@ def plot_catalogue(
     figure.supxlabel("sliding velocity v, each panel with its unit", fontsize="small")
     figure.supylabel(f"force in steady sliding F, N = {N:g} N", fontsize="small")
     return save(figure, path)
-
-
-def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
-    """A behaviour figure: a panel per pair of columns, a colour and line style per law or case.
-
-    Of several laws each has its colour, and the cases differ by their line styles.
-
-    Args:
-        data: its curves, panels and units.
-        path: image file.
-    """
-    laws = list(dict.fromkeys(c.law for c in data.curves))
-    abscissae = {x for x, _ in data.panels}
-    height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
-    figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
-    drawn, omitted = clear(data.curves, loops=data.name == "hysteresis")
-    for axis, panel in zip(axes, data.panels, strict=True):
-        _curves(axis, data, panel, drawn, laws if len(laws) > 1 else ())
-        if axis is not axes[-1] and len(abscissae) == 1:
-            axis.set_xlabel("")
-    title = data.title if len(laws) > 1 else f"{laws[0]}: {data.title}"
-    figure.suptitle("\n".join(textwrap.wrap(title, 88)), fontsize="medium")
-    if note := "; ".join(text for text in (data.note, omitted) if text):
-        axes[0].set_title("\n".join(textwrap.wrap(note, 100)), loc="left", fontsize="small")
-    if len(drawn) > 1:
-        entries = axes[0].get_legend_handles_labels()
-        figure.legend(*entries, loc="outside lower center", ncols=3, fontsize="small")
-    figure.align_ylabels(axes)
-    return save(figure, path)
-
-
-def clear(curves: Sequence[Curve], *, loops: bool = False) -> tuple[list[Curve], str]:
-    """Those of `curves` that can be told apart in one picture, and a word about the others.
-
-    Where laws are compared these are no references; of three laws and more the first and the last
-    case, and of `loops` within loops, which lie on each other, the first.
-    """
-    laws = {c.law for c in curves}
-    shown = [c for c in curves if not (c.reference and len(laws) > 1)]
-    cases = list(dict.fromkeys(c.case for c in shown))
-    if loops and len(laws) > 1:
-        shown = [c for c in shown if c.case == cases[0]]
-    elif len(laws) > 2 and len(cases) > 2:
-        shown = [c for c in shown if c.case in (cases[0], cases[-1])]
-    left = list(dict.fromkeys(c.case for c in curves if c not in shown))
-    return shown, f"not drawn: {', '.join(left)}" if left else ""
-
-
-def _curves(
-    axis: Axes,
-    data: "FigureData",
-    panel: tuple[str, str],
-    curves: Sequence[Curve],
-    laws: Sequence[str],
-) -> None:
-    """The curves of one panel, in units that are easily read.
-
-    Args:
-        laws: those that have a colour each, where several are compared; else the cases have.
-    """
-    x, y = panel
-    cases = list(dict.fromkeys(c.case for c in curves))
-    by_x, unit_x = readable(data.units[x], () if x in data.log else [c[x] for c in curves])
-    by_y, unit_y = readable(data.units[y], () if y in data.log else [c[y] for c in curves])
-    for c in curves:
-        case = cases.index(c.case)
-        if laws:
-            number = laws.index(c.law)
-            style = dash(case) if len(cases) > 1 else dash(number)
-        else:
-            number, style = case, DASHES[1] if c.reference else dash(case)
-        axis.plot(
-            by_x * c[x], by_y * c[y], linestyle=style, color=colour(number), linewidth=1.3,
-            marker="o" if data.dots else None, markersize=4,
-            label=c.label if laws else c.case or "as it is",
-        )  # fmt: skip
-    for on, scale in ((x, axis.set_xscale), (y, axis.set_yscale)):
-        if on in data.log:
-            scale("log")
-    if y not in data.log:
-        axis.ticklabel_format(axis="y", useOffset=False)
-        if data.dots and axis.dataLim.y0 >= 0:
-            axis.set_ylim(0.0, 1.1 * axis.dataLim.y1)
-    axis.set_xlabel(f"{x} [{unit_x}]")
-    axis.set_ylabel(f"{y} [{unit_y}]")

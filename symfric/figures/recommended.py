@@ -232,8 +232,7 @@ class _Search:
         """Error of a run and of the reference together; infinite where they are not comparable."""
         if self.reference is None:
             return inf
-        found = distance(run, self.reference) + self.uncertain
-        return found if isfinite(found) else inf
+        return distance(run, self.reference) + self.uncertain
 
     def choose(self) -> Recommendation:
         """The softest width below which all keep the wanted error, verified."""

@@ -23,6 +23,7 @@ Far from the limit there is no order at all: where rest is longer than motion, c
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf, isfinite
 from time import process_time
 from typing import final
 
@@ -301,11 +302,19 @@ def positions(model: Model, law: Law) -> tuple[str, ...]:
 
 
 def distance(one: Sample, reference: Sample) -> float:
-    """Largest difference of two motions at any time, relative to the size of the reference.
+    """Largest difference of two runs at any time, relative to the size of the reference."""
+    return apart(one.motion, reference.motion, reference.size)
 
-    NaN where they are not comparable: another number of cycles, say.
+
+def apart(one: Array, reference: Array, size: Array, mean: bool = False) -> float:
+    """Largest difference of two motions, shape (signals, times), relative to `size`.
+
+    With `mean` the largest root mean square, for data, which hold noise; infinite where motions do
+    not compare: another number of cycles, say.
     """
-    if one.motion.shape != reference.motion.shape or not one.motion.size:
-        return float("nan")
-    off = np.abs(one.motion - reference.motion).max(axis=1)
-    return float((off / reference.size).max())
+    if one.shape != reference.shape or not one.size:
+        return inf
+    off = np.abs(one - reference)
+    worst = np.sqrt((off**2).mean(axis=1)) if mean else off.max(axis=1)
+    found = float((worst / size).max())
+    return found if isfinite(found) else inf

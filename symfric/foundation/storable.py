@@ -16,8 +16,8 @@ MODULES = (
     "symfric.integrator.stored", "symfric.integrator.derivatives.seeds",
     "symfric.integrator.equations.inputs", "symfric.integrator.running.dense",
     "symfric.integrator.running.events",
-    "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.text.",
-    "ocp.transcription.points", "ocp.transcription.schemes",
+    "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.formulation.",
+    "ocp.transcription.unknowns", "ocp.transcription.schemes",
     "identification.data.", "identification.fit", "identification.residuals.closed_loop",
     "identification.residuals.inverse", "identification.residuals.points",
     "identification.residuals.shooting", "identification.result.", "identification.signals.filters",
@@ -53,6 +53,11 @@ MOVED = {
     "symfric.scenes.prescribed": "symfric.scenes.rigs",
     "symfric.scenes.quarter_car": "symfric.scenes.rigs",
     "symfric.scenes.robot": "symfric.scenes.spatial",
+    "ocp.text.choice": "ocp.formulation.statement",
+    "ocp.text.posed": "ocp.formulation.serialise",
+    "ocp.text.ranges": "ocp.formulation.bounds",
+    "ocp.text.span": "ocp.formulation.phase",
+    "ocp.transcription.points": "ocp.transcription.unknowns",
 }
 """Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")

@@ -1,4 +1,4 @@
-"""The figures of the source papers, a script each, with what is compared and how far we are.
+"""The figures of the source papers, a function each, with what is compared and how far we are.
 
 What users do with the packages, from data or equations to a result, is in the folder `examples`.
 
@@ -12,5 +12,6 @@ from symfric.gallery.plate import Plate as Plate
 from symfric.gallery.plate import chosen as chosen
 from symfric.gallery.plate import plate_of as plate_of
 from symfric.gallery.plate import plates as plates
+from symfric.gallery.plate import script as script
 from symfric.gallery.plate import scripts as scripts
 from symfric.gallery.plate import short as short

@@ -5,21 +5,7 @@ from html import escape
 from re import sub
 from typing import Any
 
-STYLE = """
-:root { color-scheme: light; --ink: #1c1c1c; --soft: #5c5c5c; --line: #d8d8d8; }
-body { margin: 0 auto; max-width: 62rem; padding: 1rem; color: var(--ink); background: #fff;
-  font: 16px/1.5 system-ui, sans-serif; }
-h1 { font-size: 1.5rem; } h2 { margin-top: 3rem; border-top: 2px solid var(--ink);
-  padding-top: .6rem; font-size: 1.25rem; } h3 { margin: 2.2rem 0 .4rem; font-size: 1.05rem; }
-img { display: block; max-width: 100%; height: auto; margin: .6rem 0; }
-dl { display: grid; grid-template-columns: 6.5rem 1fr; gap: .25rem .8rem; margin: .4rem 0; }
-dt { color: var(--soft); } dd { margin: 0; overflow-wrap: anywhere; }
-table { border-collapse: collapse; font-size: .9rem; } td, th { padding: .15rem .7rem .15rem 0;
-  border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-nav { overflow-x: auto; } summary { color: var(--soft); cursor: pointer; }
-@media (max-width: 40rem) { dl { grid-template-columns: 1fr; } dd { margin-bottom: .4rem; } }
-"""
+from symfric.page import html
 
 REDUCED = (
     "Some figures are computed at reduced size: beside them stands what was checked there, without "
@@ -39,16 +25,12 @@ def index_page(records: Sequence[Mapping[str, Any]]) -> str:
         f"{''.join(map(figure_block, group))}"
         for paper, group in papers.items()
     )
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<link rel="icon" href="data:,">'
-        f"<title>Gallery</title><style>{STYLE}</style></head><body>"
-        "<h1>Figures of the papers, computed again</h1>"
-        "<p>Beside each: what is compared, how far we are, and which observation is reproduced, "
-        "which explanation refuted, and what the text leaves open."
-        f"</p>{note}{body}</body></html>\n"
+    about = (
+        "Beside each: what is compared, how far we are, and which observation is reproduced, which "
+        "explanation refuted, and what the text leaves open."
     )
+    heading = html.title("Figures of the papers, computed again")
+    return html.page("Gallery", "en", f"{heading}{html.paragraph(about)}{note}{body}")
 
 
 def figure_block(record: Mapping[str, Any]) -> str:
@@ -80,12 +62,9 @@ def anchor(record: Mapping[str, Any]) -> str:
 
 
 def _numbers(record: Mapping[str, Any]) -> str:
-    rows = "".join(
-        f'<tr><td>{escape(name)}</td><td class="number">{value:.6g}</td></tr>'
-        for name, value in record["numbers"].items()
-    )
-    seconds = f"{record['seconds']:.1f} s"
-    return f"<details><summary>numbers, in {seconds}</summary><table>{rows}</table></details>"
+    rows = [(name, f"{value:.6g}") for name, value in record["numbers"].items()]
+    table = html.table("", ("number", "value"), rows, numbers=(1,))
+    return html.details(f"numbers, in {record['seconds']:.1f} s", table)
 
 
 def _overview(records: Sequence[Mapping[str, Any]]) -> str:

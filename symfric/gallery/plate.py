@@ -3,12 +3,11 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, wraps
 from importlib import import_module
 from inspect import cleandoc
 from math import isfinite
 from pathlib import Path
-from sys import modules
 from textwrap import wrap
 from typing import Any, final
 
@@ -22,10 +21,14 @@ VERDICTS = {
     "Refuted": "explanation refuted",
     "Undecided": "not decidable from the text",
 }
-"""Section of a docstring -> kind of verdict on what the paper says; a script has one at least."""
+"""Section of a docstring -> kind of verdict on what the paper says; a figure has one at least."""
 SECTIONS = ("Compared", "Distance", *VERDICTS)
-"""What the docstring of a script says under these words."""
+"""Sections of the docstring of a figure."""
 SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
+"""Name of the function that computes a figure."""
+
+Drawn = tuple[Figure, float, Mapping[str, float], Mapping[str, Any]]
+"""Picture, distance, numbers and claims, see `plate_of`."""
 
 
 @final
@@ -33,7 +36,7 @@ SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
 class Plate(Showing):
     """One figure of a paper, computed again.
 
-    The texts are said once, in the docstrings of the script and of its folder.
+    The texts stand in the docstrings of its function and of its folder.
 
     Attributes:
         paper: authors and title.
@@ -45,7 +48,7 @@ class Plate(Showing):
         measure: what `distance` measures.
         verdicts: kind of `VERDICTS` -> what falls under it, and by what evidence; empty at reduced
             size, since verdicts rest on the full one.
-        distance: how far we are, in `unit`; computed by the script, and `within` at most.
+        distance: how far we are, in `unit`; `within` at most.
         unit: SI, "1" for a ratio.
         within: the largest distance at which the figure counts as computed again.
         picture: made outside pyplot.
@@ -108,27 +111,55 @@ class Plate(Showing):
         }
 
 
+def plate(
+    unit: str, within: float | tuple[float, float], like: object = None
+) -> Callable[[Callable[[bool], Drawn]], Callable[..., Plate]]:
+    """Let a function `fig_07_what_it_shows(quick)` that draws a figure give its `Plate`.
+
+    Args:
+        unit: of the distance; "1" for a ratio.
+        within: see `plate_of`; a pair for reduced and full size.
+        like: whose docstring says what several figures share; each section continues it.
+    """
+    bounds = within if isinstance(within, tuple) else (within, within)
+
+    def decorated(draw: Callable[[bool], Drawn]) -> Callable[..., Plate]:
+        @wraps(draw)
+        def computed(quick: bool = False) -> Plate:
+            return plate_of(computed, *draw(quick), unit, within=bounds[not quick], quick=quick)
+
+        shared = sections(like.__doc__ or "") if like is not None else {}
+        said = sections(draw.__doc__ or "")
+        parts = {name: f"{shared.get(name, '')} {said.get(name, '')}".strip() for name in SECTIONS}
+        text = (said["title"], said["text"], shared.get("text", ""))
+        named = (f"{name}: {part}" for name, part in parts.items() if part)
+        computed.__doc__ = "\n\n".join(filter(None, (*text, *named)))
+        return computed
+
+    return decorated
+
+
 def plate_of(
-    script: str,
+    function: Callable[..., object],
     picture: Figure,
     distance: float,
-    unit: str,
     numbers: Mapping[str, float],
     claims: Mapping[str, Any],
+    unit: str,
     *,
     within: float,
     quick: bool,
 ) -> Plate:
-    """The plate of a script, its texts taken from the docstrings.
+    """The plate of a function, its texts taken from its docstring.
 
     Args:
-        script: `__name__` of the script; its folder names the paper.
+        function: that draws it; its folder names the paper.
         picture: the figure.
         distance: how far we are.
-        unit: of the distance; "1" for a ratio.
         numbers: what the verdicts stand on.
         claims: sentence -> whether the numbers bear it out. At reduced size these sentences are
             all that is said; a plate whose text is untrue is not drawn.
+        unit: of the distance; "1" for a ratio.
         within: the largest distance of a figure that is computed again; for the error of two
             integrations four times what one machine gave, since steps depend on rounding.
         quick: whether it is computed at reduced size.
@@ -137,25 +168,24 @@ def plate_of(
         ValueError: a docstring without one of its sections, numbers that are not finite, a distance
             beyond its bound, a claim that does not hold.
     """
-    said = sections(modules[script].__doc__ or "")
+    folder, name = function.__module__.rpartition(".")[0], function.__name__
+    where = f"gallery '{folder.rpartition('.')[2]}/{name}'"
+    said = sections(function.__doc__ or "")
     missing = [name for name in ("title", "Compared", "Distance") if not said.get(name)]
     missing += [" or ".join(VERDICTS)] * (not said.keys() & VERDICTS.keys())
     if missing:
-        raise ValueError(
-            f"gallery '{script}': expected a docstring with {', '.join(missing)}, got none"
-        )
+        raise ValueError(f"{where}: expected a docstring with {', '.join(missing)}, got none")
     odd = [name for name, v in {"distance": distance, **numbers}.items() if not isfinite(v)]
     if odd:
-        raise ValueError(f"gallery '{script}': expected finite numbers, got {', '.join(odd)}")
+        raise ValueError(f"{where}: expected finite numbers, got {', '.join(odd)}")
     untrue = [f"'{sentence}'" for sentence, holds in claims.items() if not holds]
     if distance > within:
         untrue.append(f"a distance within {within:.2g} {unit}, {distance:.3g}")
     if untrue:
         raise ValueError(
-            f"gallery '{script}': expected numbers that bear out its text, got others for "
+            f"{where}: expected numbers that bear out its text, got others for "
             f"{', '.join(untrue)}; correct the text, or find what has changed"
         )
-    folder, _, name = script.rpartition(".")
     return Plate(
         paper=paper_of(folder),
         note=note_of(folder),
@@ -188,10 +218,10 @@ def sections(doc: str) -> dict[str, str]:
 
 
 def figure_of(name: str) -> str:
-    """The figure that a script is named after: fig_07_... is Figure 7, fig_3_2_... Figure 3.2."""
+    """The figure that a function is named after: fig_07_... is Figure 7, fig_3_2_... Figure 3.2."""
     match = SCRIPT.fullmatch(name)
     if match is None:
-        raise ValueError(f"gallery: expected a script named fig_07_what_it_shows, got {name}")
+        raise ValueError(f"gallery: expected a function fig_07_what_it_shows, got {name}")
     return "Figure " + ".".join(str(int(part)) for part in match.groups() if part)
 
 
@@ -210,20 +240,25 @@ def note_of(folder: str) -> str:
 @cache
 def scripts() -> dict[str, str]:
     """Name of every plate, such as self_tuning/fig_07_shape_factor -> its module."""
-    here = Path(__file__).parent
-    found = [path for path in sorted(here.glob("*/fig_*.py")) if SCRIPT.fullmatch(path.stem)]
-    return {
-        f"{path.parent.name}/{path.stem}": f"symfric.gallery.{path.parent.name}.{path.stem}"
-        for path in found
+    found = {
+        f"{path.parent.name}/{name}": f"symfric.gallery.{path.parent.name}.{path.stem}"
+        for path in Path(__file__).parent.glob("*/*.py")
+        for name in re.findall(r"^def (fig_\w+)\(", path.read_text("utf-8"), re.M)
     }
+    return dict(sorted(found.items()))
+
+
+def script(name: str) -> Callable[..., Plate]:
+    """The function that computes the plate `name`, of which only its module is imported."""
+    return getattr(import_module(scripts()[name]), name.rpartition("/")[2])
 
 
 def plates() -> dict[str, Callable[..., Plate]]:
-    """Every figure of the gallery: name -> function `plate(quick=False)` that computes it.
+    """Every figure of the gallery: name -> function (quick=False) that computes it.
 
     With `quick` it is computed in a second at most: shorter, coarser, or with fewer laws.
     """
-    return {name: import_module(module).plate for name, module in scripts().items()}
+    return {name: script(name) for name in scripts()}
 
 
 def short(name: str) -> str:
@@ -262,7 +297,6 @@ def begins(name: str, start: str) -> bool:
 
 def about(name: str) -> dict[str, str]:
     """What the docstrings say of a plate, without computing it: paper, figure, title, sections."""
-    module = scripts()[name]
-    folder, _, stem = module.rpartition(".")
-    said = sections(import_module(module).__doc__ or "")
-    return {"paper": paper_of(folder), "note": note_of(folder), "figure": figure_of(stem)} | said
+    folder, said = scripts()[name].rpartition(".")[0], sections(script(name).__doc__ or "")
+    figure = figure_of(name.rpartition("/")[2])
+    return {"paper": paper_of(folder), "note": note_of(folder), "figure": figure} | said

@@ -1,12 +1,10 @@
 """Plates on disk: pictures and numbers, computed in parallel, one that fails beside the others."""
 
-import ast
 import json
 import os
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter, time
@@ -16,8 +14,8 @@ from symfric import __version__
 from symfric.foundation.files import write_text
 from symfric.foundation.panels import save
 from symfric.gallery.pages import index_page
-from symfric.gallery.plate import Plate, chosen, scripts
-from symfric.stress.crew import Crew, Died, Hung
+from symfric.gallery.plate import chosen, script, scripts
+from symfric.stress.workers import Crashed, TimedOut, WorkerPool
 
 LIMIT = 600.0
 """Seconds that the figures of one process may take before they count as hanging."""
@@ -61,7 +59,7 @@ def render(
 ) -> Gallery:
     """Compute plates and write a picture and a JSON file of each, and `index.html` of all there.
 
-    Plates that stand on the same runs share a process and its cache. An interrupt (Ctrl-C) ends
+    Plates of a module share a process and the runs in its cache. An interrupt (Ctrl-C) ends
     with what there is.
 
     Args:
@@ -82,7 +80,7 @@ def render(
                 place(folder, name, ending).unlink()
     tasks = ((i, (group, str(folder), quick)) for i, group in enumerate(groups))
     size = min(workers or os.cpu_count() or 1, len(groups))
-    crew = Crew(_rendered, tasks, size, LIMIT)
+    pool = WorkerPool(_rendered, tasks, size, LIMIT)
     failures = dict[str, str]()
 
     def tell() -> None:
@@ -92,12 +90,12 @@ def render(
 
     try:
         with _repeated(tell):
-            for number, outcome in crew.outcomes():
+            for number, outcome in pool.outcomes():
                 failures |= _failures(groups[number], folder, outcome)
     except KeyboardInterrupt:
         pass
     finally:
-        crew.dismiss()
+        pool.stop()
     tell()
     there = read(folder)
     write_text(folder / "index.html", index_page([*there.values()]))
@@ -145,7 +143,7 @@ def draw(name: str, folder: Path, quick: bool = False) -> Record:
         What its JSON file holds.
     """
     began = perf_counter()
-    plate: Plate = import_module(scripts()[name]).plate(quick=quick)
+    plate = script(name)(quick=quick)
     save(plate.picture, place(folder, name, ".png"))
     about = {"name": name, "picture": f"{name}.png", "quick": quick, "symfric": __version__}
     record = about | {"seconds": round(perf_counter() - began, 2)} | plate.to_dict()
@@ -154,19 +152,11 @@ def draw(name: str, folder: Path, quick: bool = False) -> Record:
 
 
 def together(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Plates by process: those of a paper that import the same helper _runs... share its cache."""
+    """Plates by process: those of a module share the runs in its cache."""
     groups: dict[str, list[str]] = {}
     for name in names:
-        groups.setdefault(_runs(name) or name, []).append(name)
+        groups.setdefault(scripts()[name], []).append(name)
     return [tuple(group) for group in sorted(groups.values(), key=len, reverse=True)]
-
-
-def _runs(name: str) -> str:
-    """The first helper _runs... of its folder that a script imports, "" if there is none."""
-    module = import_module(scripts()[name])
-    tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
-    imported = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    return next((m for m in imported if m.startswith(f"{module.__package__}._runs")), "")
 
 
 def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
@@ -182,10 +172,14 @@ def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
 
 
 def _failures(
-    group: tuple[str, ...], folder: Path, outcome: dict[str, str] | Died | Hung
+    group: tuple[str, ...], folder: Path, outcome: dict[str, str] | Crashed | TimedOut
 ) -> dict[str, str]:
     if isinstance(outcome, dict):
         return outcome
-    died = isinstance(outcome, Died)
-    why = f"its process died, {outcome.how}: {outcome.words}" if died else "no end within its time"
+    died = isinstance(outcome, Crashed)
+    why = (
+        f"its process died, {outcome.how}: {outcome.last_line}"
+        if died
+        else "no end within its time"
+    )
     return {name: why for name in group if not place(folder, name, ".json").exists()}

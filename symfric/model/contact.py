@@ -29,7 +29,7 @@ from symfric.model.parts import Event, Monitor
 
 Variables = tuple[Variable, ...]
 APPLIED = "F_e"
-"""The input of laws that is what rest must carry: an unknown where friction is one."""
+"""The applied force among the inputs of a law."""
 
 
 class FrictionLaw(Protocol):
@@ -66,15 +66,17 @@ class Contact:
         N: normal force [N], an expression or an algebraic variable of the model; NaN where a
             mechanism's law does not depend on it.
         law: any friction law of a scalar slip.
-        given: further inputs of the law by name, such as the applied force F_e.
+        given: further inputs of the law by name. The applied force F_e, if omitted, follows from
+            the equations of the model.
         rest: state of the model -> its value at which `slip` is exactly zero, which a law by modes
-            gives it when sliding ends.
+            gives it when sliding ends; if omitted, the first state in which `slip` is linear.
         states: variables for the states of the law; made, starting in steady sliding.
         force: SX symbol of the friction force [N] that opposes the slip; made.
         turning: the law is one of a rate [rad/s], and its force a moment [N m].
         widths: what is smoothed beside the law: name -> parameter of `Model.open`, whose start
             value is the number in the closed model. `JointFriction.eps` is one.
-        bare: states and events are called as in the law; for a model with one contact.
+        bare: states and events have the names of the law, without "<name>_"; None: if the model
+            has one contact.
     """
 
     name: str
@@ -87,7 +89,7 @@ class Contact:
     force: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
     turning: bool = False
     widths: Mapping[str, Variable] = field(default_factory=dict[str, Variable])
-    bare: bool = False
+    bare: bool | None = False
 
     def __post_init__(self) -> None:
         where = f"contact '{checks.line('contact: name', self.name)}'"
@@ -101,20 +103,15 @@ class Contact:
             if value.numel() != 1:
                 raise checks.refused(f"{where}: {part}", "one expression", value)
             object.__setattr__(self, part, value if part == "slip" else getattr(self, part))
-        missing = [f"{i.name} ({i.doc})" for i in self.law.inputs if i.name not in self.given]
+        known = {i.name: i.doc for i in self.law.inputs}
+        missing = [f"{n} ({doc})" for n, doc in known.items() if n not in (*self.given, APPLIED)]
         if missing:
-            hint = "give it by name, as given={...}"
-            if any(i.name == APPLIED and i.name not in self.given for i in self.law.inputs):
-                hint += (
-                    "; F_e is the sum of all other forces along the slip, m dv/dt = F_e - F, which "
-                    "drive(...) and mechanisms find themselves"
-                )
             raise ValueError(
                 f"{where}: expected what {type(self.law).__name__} needs besides v and N, got no "
-                f"{', '.join(missing)}; {hint}"
+                f"{', '.join(missing)}; give it by name, as given={{...}}"
             )
-        names = [i.name for i in self.law.inputs]
-        object.__setattr__(self, "given", {name: self.given[name] for name in names})
+        given = {name: self.given[name] for name in known if name in self.given}
+        object.__setattr__(self, "given", given)
         if self.force.is_empty():
             object.__setattr__(self, "force", ca.SX.sym(f"{self.name}_F"))
         if self.law.states and not self.states:
@@ -128,14 +125,15 @@ class Contact:
         """A unit of the law: that of sliding, or of turning."""
         return turned(of_sliding) if self.turning else of_sliding
 
-    def _called(self, name: str) -> str:
-        return name if self.bare else f"{self.name}_{name}"
+    def called(self, name: str) -> str:
+        """Return the name of a state or an event of the law in the model."""
+        return f"{self.name}_{name}" if self.bare is False else name
 
     def _made(self) -> Variables:
         start = ca.SX(self.law.steady_state(self.slip, self.N))
         return tuple(
             Variable(
-                self._called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
+                self.called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
                 doc=s.doc or "internal friction state", kind=MODE if s.whole else "",
             )
             for i, s in enumerate(self.law.states)
@@ -163,6 +161,12 @@ class Contact:
 
     def _of_law(self, what: str, rows: int) -> ca.SX:
         """The force or the rates that the law returns, (rows, 1)."""
+        if any(i.name == APPLIED for i in self.law.inputs) and APPLIED not in self.given:
+            raise checks.refused(
+                f"contact '{self.name}': {APPLIED}", "an applied force", None,
+                "it follows from the equations: pass the contact to Model(contacts=...) and read "
+                "the contact of that model",
+            )  # fmt: skip
         value = getattr(self.law, what)(self.slip, self.N, symbols_of(self.states), **self.given)
         where = f"contact '{self.name}': {type(self.law).__name__}.{what}"
         try:
@@ -193,7 +197,7 @@ class Contact:
         names = {s.name: v.name for s, v in zip(self.law.states, self.states, strict=True)}
         return tuple(
             Event(
-                self._called(s.name),
+                self.called(s.name),
                 s.expression,
                 s.direction,
                 reset={names[name]: value for name, value in s.reset.items()}

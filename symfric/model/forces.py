@@ -12,6 +12,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, starts_of, symbols_of
 from symfric.model.contact import Contact, Variables
+from symfric.model.holding import completed
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.start import System
 
@@ -35,11 +36,15 @@ def closed(model: System) -> dict[str, Any]:
         ValueError: `holonomic`, which a mechanism closes itself; friction forces that need each
             other.
     """
-    where, contacts = f"model '{model.name}': contacts", model.contacts
+    where = f"model '{model.name}': contacts"
     if model.holonomic is not None:
-        raise checks.refused(where, "none beside `holonomic`; a Mechanism makes them", contacts)
+        raise checks.refused(
+            where, "none beside `holonomic`; a Mechanism makes them", model.contacts
+        )
+    contacts = completed(model)
     put = _Put(where, contacts, {c.name: c.friction for c in contacts})
     changes = put.explicit(model)
+    changes["contacts"] = contacts
     changes["x"] = (*model.x, *(v for c in contacts for v in c.states))
     rates = [row for c in contacts for row in ca.vertsplit(put(c.rate))]
     changes["ode"] = ca.vertcat(changes["ode"], *rates)

@@ -65,9 +65,10 @@ def figure(drawing: str, caption: str = "") -> str:
 
 
 def verdict(kind: str, word: str, sentences: Iterable[str]) -> str:
-    """The verdict in a box: kind "good", "doubtful" or "bad"."""
+    """The verdict in a box, a word and sentences: kind "good", "doubtful" or "bad"."""
     text = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
-    return f'<div class="verdict {kind}" role="status"><strong>{escape(word)}</strong>{text}</div>'
+    first = f"<strong>{escape(word)}</strong>" if word else ""
+    return f'<div class="verdict {kind}" role="status">{first}{text}</div>'
 
 
 def contents(links: Sequence[tuple[str, str]]) -> str:
@@ -90,7 +91,7 @@ def table(
         header: names of the columns.
         rows: texts.
         numbers: columns that stand at the right.
-        kinds: class of the last column by row: "good", "bad", "note" or "".
+        kinds: class of the last column by row: "good", "bad", "note", "why" or "".
     """
     lines = [list(row) for row in rows]
     if not lines:
@@ -104,7 +105,7 @@ def table(
         for j, name in enumerate(header)
     )
     return (
-        f'<div class="wide"><table><caption>{escape(caption)}</caption>'
+        f'<div class="wide"><table>{f"<caption>{escape(caption)}</caption>" if caption else ""}'
         f"<thead><tr>{top}</tr></thead><tbody>{''.join(body)}</tbody></table></div>"
     )
 

@@ -20,6 +20,7 @@ from symfric.foundation.variable import check_si
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables
+from symfric.model.holding import APPLIED
 from symfric.scenes.presets import Preset
 
 if TYPE_CHECKING:
@@ -179,7 +180,8 @@ def _is_scalar(value: Scalar) -> bool:
 
 def contact(
     name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar] | None = None,
-    *, least: Scalar | None = None, bare: bool = True, turning: bool = False, **inputs: Scalar,
+    *, least: Scalar | None = None, bare: bool | None = None, turning: bool = False,
+    **inputs: Scalar,
 ) -> Contact:  # fmt: skip
     """`law` between bodies that slide at `v` under `N`: puts any law into equations of your own.
 
@@ -187,7 +189,7 @@ def contact(
     the law behind its own, its changes of mode as events, and error control that sees the slip:
 
         x, v, pull = Variable("x", "m"), Variable("v", "m/s"), Variable("pull", "N")
-        slip = contact("floor", LuGre(), v, 10.0, rest={"v": 0.0}, F_e=pull)
+        slip = contact("floor", LuGre(), v, 10.0)
         rate = (pull - slip.force) / 2.0
         sled = Model("sled", x=(x, v), u=(pull,), ode=casadi.vertcat(v, rate),
                      contacts=(slip,), outputs={"friction": Output(slip.force, "N")})
@@ -197,13 +199,15 @@ def contact(
         law: any law of a scalar slip; another one is another word here.
         v: sliding velocity [m/s], a variable or an expression; `force` opposes it.
         N: normal force [N], a number, a variable or an expression.
-        rest: state of the model -> its value at which `v` is exactly zero, for laws that rest.
+        rest: state of the model -> its value at which `v` is exactly zero, for laws that stick; if
+            omitted, the first state of the model in which `v` is linear is set.
         least: smallest value of an `N` that changes, which the law must bear.
-        bare: states and events are called as in the law; with several contacts give False, and
-            they are called "<name>_<state>".
+        bare: states and events have the names of the law (True) or "<name>_<state>" (False);
+            None: names of the law if the model has one contact.
         turning: `v` is a rate [rad/s] and `force` a moment [N m]: units of the states of the law.
-        inputs: what the machine offers to laws besides v and N, such as F_e, the force that the
-            contact must carry for no acceleration.
+        inputs: further inputs of the law. The applied force F_e, all forces but friction along
+            the slip, follows from the equations if omitted; it must be given where these are
+            implicit or have algebraic variables that depend on friction.
 
     Raises:
         ValueError: no law, one that needs an input that is not offered, a load where N is 0, or a
@@ -216,12 +220,14 @@ def contact(
         raise checks.refused(f"{where}: N", "a normal force", N, "v comes before N")
     if (load := checks.as_number(N)) is not None and load < 0:
         raise checks.refused(f"{where}: N", "a normal force >= 0 N", N)
-    missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
+    missing = [
+        f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs and i.name != APPLIED
+    ]
     if missing:
         raise ValueError(
             f"{type(law).__name__}: expected a law that needs no more than v, N"
             f"{''.join(f', {offered}' for offered in inputs)} here, got one that needs "
-            f"{', '.join(missing)}; offer it by name, as in contact(..., F_e=pull)"
+            f"{', '.join(missing)}; offer it by name, as in contact(..., dv=acceleration)"
         )
     bottom = N if least is None else least
     if is_number(bottom) and bottom == 0 and divides_by_load(law):

@@ -1,4 +1,4 @@
-"""A campaign: cases by number, judged in worker processes, counted and kept."""
+"""Campaigns: cases judged in worker processes, counted, and saved while they run."""
 
 import os
 from collections import Counter
@@ -11,24 +11,24 @@ from typing import Any, final
 import numpy as np
 
 from symfric.stress.cases import Case, draw
-from symfric.stress.crew import Crew, Died, Hung
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 from symfric.stress.problem import WORK
+from symfric.stress.workers import Crashed, TimedOut, WorkerPool
 
 LIMIT = 120.0
-"""Seconds that a case may take before it counts as hanging; the slowest need ten."""
-KEPT = ("loose", "undecided", *FAILING)
-"""Classes whose cases are kept as files."""
+"""Processor time [s] after which a case counts as hanging; the slowest need ten."""
+NOTABLE = ("loose", "undecided", *FAILING)
+"""Classes whose cases a report lists."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What came of a campaign.
+    """Result of a campaign, or of its part so far.
 
     Attributes:
-        seed: of the campaign.
-        asked: how many cases were to be run; more than `verdicts` after an interrupt.
+        seed: seed of the campaign.
+        asked: number of cases requested; larger than `len(verdicts)` before the end.
         verdicts: number of a case -> verdict.
         seconds: wall time.
     """
@@ -40,7 +40,7 @@ class Report:
 
     @property
     def classes(self) -> dict[str, int]:
-        """How many cases are of each class."""
+        """Number of cases of each class."""
         count = Counter(v.kind for v in self.verdicts.values())
         return {name: count[name] for name in CLASSES}
 
@@ -60,7 +60,7 @@ class Report:
 
     @property
     def passed(self) -> bool:
-        """Whether no case is silently wrong, not finite, crashing or hanging."""
+        """True if no case is silently wrong, not finite, crashing or hanging."""
         return not any(self.classes[name] for name in FAILING)
 
     def errors(self) -> dict[str, float]:
@@ -87,7 +87,7 @@ class Report:
             "notable": [
                 {"case": draw(self.seed, n).to_dict(), "verdict": v.to_dict()}
                 for n, v in sorted(self.verdicts.items())
-                if v.kind in KEPT
+                if v.kind in NOTABLE
             ],
         }
 
@@ -108,58 +108,59 @@ def campaign(
     work: int = WORK,
     workers: int | None = None,
     limit: float = LIMIT,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[Report], None] | None = None,
 ) -> Report:
-    """Run the cases 0 ... `cases` - 1 of `seed`, or those of the numbers given.
+    """Run the cases 0 ... `cases` - 1 of `seed`, or those whose numbers are given.
 
-    The same seed and number are the same case on any machine.
+    The same seed and number give the same case on any machine. An interrupt (Ctrl-C) returns the
+    report so far.
 
     Args:
-        work: as in `judge`.
-        workers: processes; default one a core.
-        limit: seconds that a case may take.
-        progress: called with the fraction done.
-
-    An interrupt (Ctrl-C) ends the campaign with what there is.
+        cases: number of cases, or their numbers.
+        seed: seed of the campaign.
+        work: attempts of a run, see `judge`.
+        workers: number of processes; default one per core.
+        limit: processor time of a case [s].
+        progress: called with the report so far after each case.
 
     Raises:
-        ValueError: a number that is not positive.
+        ValueError: an argument is not positive.
     """
     numbers = range(cases) if isinstance(cases, int) else cases
-    for name, value in (
-        ("cases", len(numbers)),
-        ("work", work),
-        ("workers", workers),
-        ("limit", limit),
-    ):
+    positive = {"cases": len(numbers), "work": work, "workers": workers, "limit": limit}
+    for name, value in positive.items():
         if value is not None and not value > 0:
             raise ValueError(f"stress: expected {name} > 0, got {value}")
     began, verdicts = monotonic(), dict[int, Verdict]()
+
+    def report() -> Report:
+        return Report(seed, len(numbers), verdicts, monotonic() - began)
+
     tasks = ((number, (seed, number, work)) for number in numbers)
-    crew = Crew(_judged, tasks, min(workers or os.cpu_count() or 1, len(numbers)), limit)
+    pool = WorkerPool(_judged, tasks, min(workers or os.cpu_count() or 1, len(numbers)), limit)
     try:
-        for number, outcome in crew.outcomes():
+        for number, outcome in pool.outcomes():
             verdicts[number] = _verdict(outcome)
             if progress is not None:
-                progress(len(verdicts) / len(numbers))
+                progress(report())
     except KeyboardInterrupt:
         pass
     finally:
-        crew.dismiss()
-    return Report(seed, len(numbers), verdicts, monotonic() - began)
+        pool.stop()
+    return report()
 
 
 def rerun(case: Case, limit: float = LIMIT) -> Verdict:
-    """Judge one case in a process of its own, so that a crash is a verdict, too."""
-    crew = Crew(_judged, iter([(0, case.to_dict())]), 1, limit)
+    """Judge one case in its own process, where a crash is a verdict, too."""
+    pool = WorkerPool(_judged, iter([(0, case.to_dict())]), 1, limit)
     try:
-        return next(_verdict(outcome) for _, outcome in crew.outcomes())
+        return next(_verdict(outcome) for _, outcome in pool.outcomes())
     finally:
-        crew.dismiss()
+        pool.stop()
 
 
 def _judged(task: Any) -> Any:
-    """What a worker does with (seed, number, work) or the data of a case."""
+    """Judge a case, given as (seed, number, work) or as its data."""
     if isinstance(task, tuple):
         seed, number, work = task
         return judge(draw(seed, number), work).to_dict()
@@ -167,8 +168,8 @@ def _judged(task: Any) -> Any:
 
 
 def _verdict(outcome: Any) -> Verdict:
-    if isinstance(outcome, Died):
-        return Verdict("crash", f"{outcome.how}: {outcome.words}", outcome.how)
-    if isinstance(outcome, Hung):
-        return Verdict("hang", f"no end in {outcome.seconds:g} s")
+    if isinstance(outcome, Crashed):
+        return Verdict("crash", f"{outcome.how}: {outcome.last_line}", outcome.how)
+    if isinstance(outcome, TimedOut):
+        return Verdict("hang", f"not finished after {outcome.limit:g} s of processor time")
     return Verdict.from_dict(outcome)

@@ -1,24 +1,26 @@
-"""What a campaign draws: laws x scenes x parameters x tolerances x methods x inputs x starts.
+"""Random cases: laws x scenes x parameters x tolerances x methods x inputs x start values.
 
-A case is plain data, so that a file of a few lines reproduces it on another machine.
+A case is plain data: a file of a few lines reproduces it on another machine.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from pathlib import Path
-from typing import Any, final
+from random import Random
+from typing import Any, TypeVar, final
 
 from symfric.foundation import typed
 from symfric.foundation.files import read_json, write_text
 from symfric.foundation.parameters import Parameter, options, parameters, with_values
 from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
 from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
-from symfric.stress.dice import Dice, rounded
 from symfric.stress.referee import scenes as referee_scenes
 from symfric.stress.referee.laws import LAWS
 from symfric.stress.referee.solve import knows
+
+T = TypeVar("T")
 
 SCENES = ("rabinowicz",) * 6 + ("drive",) * 6 + ("quarter_car",) * 2 + tuple(MECHANISMS)
 """Scenes as often as they are drawn: those of one contact find most for their cost."""
@@ -128,29 +130,78 @@ class Case:
 
     @classmethod
     def read(cls, path: str | Path) -> "Case":
-        """The case in a file; a file of a campaign may hold its verdict beside it."""
+        """Read a case, alone or with the verdict of a campaign.
+
+        Raises:
+            ValueError: no such file, or its content is not a case.
+        """
         data = read_json("case", path, "JSON of a case")
-        return cls.from_dict(data.get("case", data))
+        content = data.get("case", data)
+        if not isinstance(content, dict):
+            raise ValueError(f"case '{path}': expected JSON of a case, got something else")
+        try:
+            return cls.from_dict(content)
+        except ValueError as error:
+            text = str(error).removeprefix("case: ")
+            raise ValueError(f"case '{path}': {text}") from None
+
+
+@final
+class Draws:
+    """Random numbers of one case, equal on every machine and in every version of Python.
+
+    All come from `Random.random`, whose sequence Python guarantees.
+    """
+
+    def __init__(self, seed: int, number: int) -> None:
+        self._random = Random(f"{seed}/{number}")
+
+    def unit(self) -> float:
+        """Return a number in [0, 1)."""
+        return self._random.random()
+
+    def chance(self, probability: float) -> bool:
+        """Return True with this probability."""
+        return self.unit() < probability
+
+    def pick(self, items: Sequence[T]) -> T:
+        """Return one of `items`; repeat an item to draw it more often."""
+        return items[int(self.unit() * len(items))]
+
+    def between(self, low: float, high: float) -> float:
+        """Return a number in [low, high), to three digits."""
+        return rounded(low + (high - low) * self.unit())
+
+    def decade(self, low: float, high: float) -> float:
+        """Return 10^e with e in [low, high), to three digits."""
+        return rounded(10.0 ** (low + (high - low) * self.unit()))
+
+    def signed(self, low: float, high: float) -> float:
+        """Return a decade of either sign."""
+        return self.decade(low, high) * self.pick((1.0, -1.0))
+
+
+def rounded(value: float) -> float:
+    """Round to three significant digits, which absorbs differences in the last bit of powers."""
+    return float(f"{value:.3g}")
 
 
 def draw(seed: int, number: int) -> Case:
     """Case `number` of the campaign `seed`; each case has a sequence of its own."""
-    dice = Dice(seed, number)
-    refereed = dice.chance(REFEREED)
-    scene = dice.pick(tuple(referee_scenes.SCENES) if refereed else SCENES)
-    text, law = _of_the_referee(dice, scene) if refereed else _law(dice, scene)
+    rng = Draws(seed, number)
+    refereed = rng.chance(REFEREED)
+    scene = rng.pick(tuple(referee_scenes.SCENES) if refereed else SCENES)
+    text, law = _of_the_referee(rng, scene) if refereed else _law(rng, scene)
     machine = ALL_SCENES[scene](law)
-    forms = {
-        name: dice.pick(form.choices) for name, form in options(law).items() if dice.chance(0.3)
-    }
-    values = _values(dice, machine)
-    span = rounded(machine.t_end * dice.decade(-1.3, 0.2))
-    t_start = dice.decade(0, 5) if dice.chance(0.03) else 0.0
-    rtol = dice.pick((1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-9)) if dice.chance(0.6) else 1e-6
+    forms = {name: rng.pick(form.choices) for name, form in options(law).items() if rng.chance(0.3)}
+    values = _values(rng, machine)
+    span = rounded(machine.t_end * rng.decade(-1.3, 0.2))
+    t_start = rng.decade(0, 5) if rng.chance(0.03) else 0.0
+    rtol = rng.pick((1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-9)) if rng.chance(0.6) else 1e-6
     inputs = {
-        name: _signal(dice, span, t_start)
+        name: _signal(rng, span, t_start)
         for name in _inputs(scene)
-        if scene == "drive" or dice.chance(0.3)
+        if scene == "drive" or rng.chance(0.3)
     }
     return Case(
         seed=seed,
@@ -159,96 +210,96 @@ def draw(seed: int, number: int) -> Case:
         law=text,
         values=values,
         forms=forms,
-        free=tuple(name for name in values if dice.chance(0.5)) if dice.chance(0.15) else (),
-        x0=_starts(dice, scene, law, values),
+        free=tuple(name for name in values if rng.chance(0.5)) if rng.chance(0.15) else (),
+        x0=_starts(rng, scene, law, values),
         inputs=inputs,
         t_start=t_start,
         t_end=t_start + span,
         rtol=rtol,
-        method=dice.pick(ADAPTED if scene in MECHANISMS and not dice.chance(0.1) else METHODS),
-        backend="compiled" if scene in ("rabinowicz", "drive") and dice.chance(0.01) else "vm",
+        method=rng.pick(ADAPTED if scene in MECHANISMS and not rng.chance(0.1) else METHODS),
+        backend="compiled" if scene in ("rabinowicz", "drive") and rng.chance(0.01) else "vm",
     )
 
 
-def _of_the_referee(dice: Dice, scene: str) -> tuple[str, Law]:
-    name = dice.pick([name for name in LAWS if knows(name, scene)])
+def _of_the_referee(rng: Draws, scene: str) -> tuple[str, Law]:
+    name = rng.pick([name for name in LAWS if knows(name, scene)])
     return name, law_from_text(name)
 
 
-def _law(dice: Dice, scene: str) -> tuple[str, Law]:
+def _law(rng: Draws, scene: str) -> tuple[str, Law]:
     """A law, one in six of them in a wrapper or a sum; few that the scene has no inputs for."""
-    name = dice.pick(list(ALL_LAWS))
+    name = rng.pick(list(ALL_LAWS))
     while not {i.name for i in ALL_LAWS[name]().inputs} <= OFFERED.get(scene, set()):
-        if dice.chance(0.1):
+        if rng.chance(0.1):
             break
-        name = dice.pick(list(ALL_LAWS))
-    text = dice.pick(WRAPPED).format(name) if dice.chance(1 / 6) else name
+        name = rng.pick(list(ALL_LAWS))
+    text = rng.pick(WRAPPED).format(name) if rng.chance(1 / 6) else name
     try:
         return text, law_from_text(text)
     except ValueError:  # some wrap laws without states only
         return name, law_from_text(name)
 
 
-def _values(dice: Dice, machine: Scene) -> dict[str, float]:
+def _values(rng: Draws, machine: Scene) -> dict[str, float]:
     """Numbers of law and scene; few that they refuse, such as mu_d > mu_s."""
     while True:
-        found = _numbers(dice, parameters(machine))
+        found = _numbers(rng, parameters(machine))
         try:
             with_values(machine, found)
         except ValueError:
-            if not dice.chance(0.1):
+            if not rng.chance(0.1):
                 continue
         return found
 
 
-def _numbers(dice: Dice, known: Mapping[str, Parameter]) -> dict[str, float]:
+def _numbers(rng: Draws, known: Mapping[str, Parameter]) -> dict[str, float]:
     """One in three parameters off its default by decades; now and then zero or of other sign."""
-    spread = dice.pick(SPREADS)
+    spread = rng.pick(SPREADS)
     found: dict[str, float] = {}
     for name, parameter in known.items():
-        if not dice.chance(1 / 3):
+        if not rng.chance(1 / 3):
             continue
-        value = float(parameter.default) * dice.decade(-spread, spread)
+        value = float(parameter.default) * rng.decade(-spread, spread)
         if parameter.lower < 0:
-            value *= dice.pick((1.0, 1.0, 1.0, -1.0))
-        if dice.chance(0.04) or value == 0.0:
+            value *= rng.pick((1.0, 1.0, 1.0, -1.0))
+        if rng.chance(0.04) or value == 0.0:
             value = 0.0
         found[name] = rounded(min(max(value, parameter.lower), parameter.upper))
     return found
 
 
-def _starts(dice: Dice, scene: str, law: Law, values: Mapping[str, float]) -> dict[str, float]:
+def _starts(rng: Draws, scene: str, law: Law, values: Mapping[str, float]) -> dict[str, float]:
     """Start values of some states: rest, almost rest, fast; a block may sit right on its belt."""
     found: dict[str, float] = {}
     share = 0.05 if scene in LOOPS else 0.4
     for name, unit, start in _states(scene):
-        if not dice.chance(share):
+        if not rng.chance(share):
             continue
         if unit.endswith("/s"):
-            value = dice.pick((0.0, dice.signed(-9, 1), dice.signed(-2, 0.5)))
-            on_belt = scene == "rabinowicz" and dice.chance(0.5)
+            value = rng.pick((0.0, rng.signed(-9, 1), rng.signed(-2, 0.5)))
+            on_belt = scene == "rabinowicz" and rng.chance(0.5)
             found[name] = value + (values.get("v_belt", 0.1) if on_belt else 0.0)
         else:
-            found[name] = start + dice.signed(-6, 0)
-    if scene not in MECHANISMS and dice.chance(0.1):
-        found |= {state.name: state.nominal * dice.signed(-2, 0.5) for state in law.states}
+            found[name] = start + rng.signed(-6, 0)
+    if scene not in MECHANISMS and rng.chance(0.1):
+        found |= {state.name: state.nominal * rng.signed(-2, 0.5) for state in law.states}
     return found
 
 
-def _signal(dice: Dice, span: float, t_start: float) -> Signal:
+def _signal(rng: Draws, span: float, t_start: float) -> Signal:
     """An input of decades in size: constant, samples, a sine or a short pulse."""
-    kind = dice.pick(("constant", "hold", "linear", "sine", "sine", "pulse"))
-    size = dice.signed(-1.5, 1.5)
+    kind = rng.pick(("constant", "hold", "linear", "sine", "sine", "pulse"))
+    size = rng.signed(-1.5, 1.5)
     if kind == "constant":
         return Signal(kind, (size,))
     if kind == "sine":
-        return Signal(kind, (size, dice.decade(-1, 2), dice.pick((0.0, 0.5 * size))))
+        return Signal(kind, (size, rng.decade(-1, 2), rng.pick((0.0, 0.5 * size))))
     if kind == "pulse":
-        width = span * dice.decade(-3, -0.5)
-        return Signal(kind, (size, t_start + rounded(span * dice.unit()), width))
-    count = int(dice.between(2, 20))
+        width = span * rng.decade(-3, -0.5)
+        return Signal(kind, (size, t_start + rounded(span * rng.unit()), width))
+    count = int(rng.between(2, 20))
     times = tuple(t_start + span * k / count for k in range(count))
-    return Signal(kind, tuple(size * dice.between(-1, 1) for _ in times), times)
+    return Signal(kind, tuple(size * rng.between(-1, 1) for _ in times), times)
 
 
 @cache

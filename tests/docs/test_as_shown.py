@@ -31,9 +31,10 @@ def test_arrays_in_signatures_read_as_they_are_written() -> None:
     assert short(None, "", "", None, None, None, None) == (None, None)
 
 
-def test_scripts_stand_without_the_words_above_them() -> None:
-    assert without_docstring('"""Title.\n\nMore.\n"""\n\nimport math\n') == "import math\n"
-    assert without_docstring("import math\n") == "import math\n"
+def test_functions_stand_without_the_words_above_them() -> None:
+    bare = "def f(x):\n    return x\n"
+    said = '"""M."""\n\ndef f(x):\n    """Title.\n\n    More.\n    """\n    return x\n\ny = 1\n'
+    assert without_docstring(said, "f") == without_docstring(f"{bare}\ny = 1\n", "f") == bare
 
 
 def test_an_initial_begins_no_list() -> None:

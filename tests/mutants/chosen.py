@@ -15,7 +15,7 @@ CHOSEN = (
         "if row.error <= task.accuracy:", "if row.error <= 1e6 * task.accuracy:", TESTS,
     ),
     Mutant(
-        "nobody asks what a law shows", f"{FOLDER}/needs.py",
+        "nobody asks what a law shows", f"{FOLDER}/nature.py",
         "if NEEDS[word][0] not in shown]", "if NEEDS[word][0] in ()]", TESTS,
     ),
     Mutant(
@@ -27,7 +27,7 @@ CHOSEN = (
         "if not (off <= share).all():", "if (off > 1e9).all():", TESTS,
     ),
     Mutant(
-        "J+S takes laws that show pre-sliding, too", f"{FOLDER}/jing_mi.py",
-        'needs == "JS",', '"JS" in needs,', ("tests/symfric/choice/test_jing_mi.py",),
+        "J+S takes laws that show pre-sliding, too", "symfric/gallery/selection/tables.py",
+        'needs == "JS",', '"JS" in needs,', ("tests/symfric/gallery/test_jing_mi.py",),
     ),
 )  # fmt: skip

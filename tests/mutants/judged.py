@@ -39,15 +39,15 @@ JUDGED = (
         "misfit > AS_GOOD * best", "misfit > 100 * best", T_JUDGED,
     ),
     Mutant(
-        "what is ranked is ordered by its error", CHOICE + "row.py",
+        "what is ranked is ordered by its error", CHOICE + "ranking.py",
         "0.0 if row.ranked else error", "error", T_JUDGED,
     ),
     Mutant(
-        "the clock decides the order", CHOICE + "row.py",
+        "the clock decides the order", CHOICE + "ranking.py",
         "error, row.work or inf, row.law", "error, row.time_s, row.law", T_JUDGED,
     ),
     Mutant(
-        "laws that are alike have ranks of their own", CHOICE + "row.py",
+        "laws that are alike have ranks of their own", CHOICE + "ranking.py",
         "row.work <= ALIKE * head.work", "row.work <= head.work", T_JUDGED,
     ),
     Mutant(
@@ -64,21 +64,21 @@ JUDGED = (
         (T_SELECT + "a_law_that_moves_otherwise_is_counted_at_its_own_error",),
     ),
     Mutant(
-        "what the clock says against the order is not told", CHOICE + "verdict.py",
+        "what the clock says against the order is not told", CHOICE + "text.py",
         "FASTER * fastest.time_s < best.time_s", "FASTER * fastest.time_s < 0", T_JUDGED,
     ),
     Mutant(
-        "an optimiser is given the steepest law", CHOICE + "verdict.py",
+        "an optimiser is given the steepest law", CHOICE + "text.py",
         "take = min(flat, key=lambda row: row.steepness)",
         "take = max(flat, key=lambda row: row.steepness)", T_JUDGED,
     ),
     Mutant(
-        "a controller is given the law of the shortest steps", CHOICE + "verdict.py",
+        "a controller is given the law of the shortest steps", CHOICE + "text.py",
         "_in_c(row, counted) / (row.fixed_step or 1.0)",
         "_in_c(row, counted) * (row.fixed_step or 1.0)", T_JUDGED,
     ),
     Mutant(
-        "words of papers for what is needed are not known", CHOICE + "needs.py",
+        "words of papers for what is needed are not known", CHOICE + "nature.py",
         "ALIASES.get(plain, plain)", "plain", T_JUDGED,
     ),
     Mutant(
@@ -172,23 +172,23 @@ JUDGED = (
         T_PRESETS,
     ),
     Mutant(
-        "a pushed block is shown with the force for its friction", FIGURES + "push.py",
+        "a pushed block is shown with the force for its friction", FIGURES + "pushing.py",
         '"F": "friction"}', '"F": "force"}', figure("push"),
     ),
     Mutant(
-        "every rest lasts as long as the first", FIGURES + "dwell.py",
+        "every rest lasts as long as the first", FIGURES + "sliding.py",
         "t < slide_for + hold)", "t < slide_for + 0.01)", figure("dwell"),
     ),
     Mutant(
-        "the faster leg is as long in time as the slow one", FIGURES + "velocity_step.py",
+        "the faster leg is as long in time as the slow one", FIGURES + "sliding.py",
         "[0.5 * slow, slow / factor, slow]", "[0.5 * slow, slow, slow]", figure("velocity_step"),
     ),
     Mutant(
-        "the velocity does not jump back", FIGURES + "velocity_step.py",
+        "the velocity does not jump back", FIGURES + "sliding.py",
         "ca.logic_and(t >= ends[0], t < ends[1])", "t >= ends[0]", figure("velocity_step"),
     ),
     Mutant(
-        "the block that is pulled to and fro stops half way", FIGURES + "stiction.py",
+        "the block that is pulled to and fro stops half way", FIGURES + "pushing.py",
         "force, 1.5 * period)", "force, 0.5 * period)", figure("stiction"),
     ),
     Mutant(

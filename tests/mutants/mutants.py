@@ -176,11 +176,11 @@ CONSISTENT = (
 TRANSCRIPTION = (
     Mutant(
         "the integral cost has the weights of another point", COLLOCATION,
-        "scheme.nodes[1 + j], scheme.weights[j])", "scheme.nodes[1 + j], scheme.weights[j - 1])",
+        "scheme.weights[j],", "scheme.weights[j - 1],",
         T_SOLVE,
     ),
     Mutant(
-        "what is asked for on the way is asked for at the start", "ocp/transcription/bounds.py",
+        "what is asked for on the way is asked for at the start", "ocp/transcription/grid.py",
         "bound[own.nodes[:, node]] = of(states, span.nodes[fraction])",
         "bound[own.nodes[:, node]] = of(states, span.nodes[0.0])", T_SOLVE,
     ),

@@ -2,7 +2,7 @@
 
 from mutants.mutant import Mutant
 
-RANDOM = "symfric/figures/random_motion.py"
+RANDOM = "symfric/figures/motion.py"
 CAR = "symfric/scenes/rigs.py"
 
 PICTURED = (

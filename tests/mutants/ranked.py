@@ -2,13 +2,13 @@
 
 from mutants.mutant import Mutant
 
-BUDGET = "symfric/choice/budget.py"
+BUDGET = "symfric/choice/climb.py"
 T_BUDGET = ("tests/symfric/choice/test_budget.py",)
 CLIMB = "symfric/choice/climb.py"
-ROW = "symfric/choice/row.py"
+ROW = "symfric/choice/ranking.py"
 T_JUDGED_BY_HAND = ("tests/symfric/choice/test_judged_by_hand.py",)
 SOFTNESS = "symfric/choice/softness.py"
-VERDICT = "symfric/choice/verdict.py"
+VERDICT = "symfric/choice/text.py"
 FRICTION = "symfric/choice/friction.py"
 NATURE = "symfric/choice/nature.py"
 TEXT = "symfric/choice/text.py"
@@ -19,8 +19,8 @@ PLATE = "symfric/gallery/plate.py"
 T_RENDERING = ("tests/symfric/gallery/test_rendering.py",)
 APP = "symfric/cli/app.py"
 T_OUTPUT = ("tests/symfric/cli/test_output.py",)
-DOUBTS = "ocp/text/doubts.py"
-T_DOUBTS = ("tests/ocp/text/test_doubts.py",)
+DOUBTS = "ocp/formulation/validate.py"
+T_DOUBTS = ("tests/ocp/formulation/test_doubts.py",)
 
 RANKED = (
     Mutant(

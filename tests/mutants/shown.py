@@ -3,10 +3,10 @@
 from mutants.mutant import Mutant
 
 BELT = "symfric/gallery/belt.py"
-MACHINES = "symfric/gallery/self_tuning/_machines.py"
-ORACLE = "symfric/gallery/self_tuning/_oracle.py"
+MACHINES = "symfric/gallery/self_tuning/machines.py"
+ORACLE = "symfric/gallery/self_tuning/machines.py"
 PLATE = "symfric/gallery/plate.py"
-SLED = "symfric/gallery/laminator_nips/_sled.py"
+SLED = "symfric/gallery/laminator_nips/sled.py"
 RENDERING = "symfric/gallery/rendering.py"
 T_HAND = ("tests/symfric/gallery/test_answers_by_hand.py",)
 T_FIGURES = ("tests/symfric/gallery/test_plates.py",)
@@ -100,7 +100,7 @@ SHOWN = (
     ),
     Mutant(
         "a block that still stretches its bristles has broken away",
-        "symfric/figures/break_away.py",
+        "symfric/figures/pushing.py",
         "way = 2 * (own.velocity + rate * stretch / own.static), SLID * stretch",
         "way = 2 * (own.velocity + rate * stretch / own.static), 0.0",
         ("tests/symfric/figures/test_break_away.py",),

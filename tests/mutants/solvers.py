@@ -3,9 +3,9 @@
 from mutants.mutant import Mutant
 
 WATCH, PREPARED = "ocp/solvers/watch.py", "ocp/solvers/prepared.py"
-OUTCOME, ANSWERS = "ocp/solvers/outcome.py", "ocp/solvers/answers.py"
-CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/stages.py"
-MOTION, STORED = "ocp/result/motion.py", "ocp/result/stored.py"
+OUTCOME, ANSWERS = "ocp/solvers/outcome.py", WATCH
+CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/program.py"
+MOTION = STORED = "ocp/result/motion.py"
 STARTS, ONE = "ocp/solving/starts.py", "ocp/solving/one_solve.py"
 
 T_FALLBACK = ("tests/ocp/friction/test_fallback.py",)
@@ -79,7 +79,7 @@ SOLVERS = (
         T_ONE,
     ),
     Mutant(
-        "a start with multipliers is taken for a cold one", "ocp/solvers/ipopt.py",
+        "a start with multipliers is taken for a cold one", "ocp/solvers/methods.py",
         "(WARM if warm else {})", "{}", T_ONE,
     ),
     Mutant(
@@ -121,7 +121,7 @@ RESULTS = (
         "a phase starts at zero", MOTION, "begin += points[k].T", "begin += 0.0", T_SOLVED,
     ),
     Mutant(
-        "a stored problem forgets its phases", "ocp/text/posed.py",
+        "a stored problem forgets its phases", "ocp/formulation/serialise.py",
         "        problem.spans,\n", "        problem.spans[:1],\n",
         T_STORED,
     ),
@@ -189,10 +189,11 @@ RESULTS = (
     ),
     Mutant(
         "costs are as large as they are", "ocp/solve.py",
-        "1.0 / cost_size(posed)", "1.0", ("tests/ocp/text/test_sizes.py",),
+        "1.0 / cost_size(posed)", "1.0", ("tests/ocp/formulation/test_sizes.py",),
     ),
     Mutant(
-        "a nominal value that was given gives way", "ocp/text/sizes.py",
-        "(v.nominal == UNSAID and times >= FAR)", "times >= FAR", ("tests/ocp/text/test_sizes.py",),
+        "a nominal value that was given gives way", "ocp/formulation/problem.py",
+        "(v.nominal == UNSAID and times >= FAR)", "times >= FAR",
+        ("tests/ocp/formulation/test_sizes.py",),
     ),
 )  # fmt: skip

@@ -106,7 +106,7 @@ TOLD = (
     ),
     Mutant(
         "figures of the same runs are computed one by one", GALLERY + "rendering.py",
-        "groups.setdefault(_runs(name) or name, [])", "groups.setdefault(name, [])", T_RENDERING,
+        "groups.setdefault(scripts()[name], [])", "groups.setdefault(name, [])", T_RENDERING,
     ),
     Mutant(
         "an interrupted gallery ends as one with failures", CLI + "gallery.py",

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
 from ocp.checking.refine import MeshErrors, refined
+from ocp.formulation.bounds import Free, Range
+from ocp.formulation.expressions import TIME, Cost, at_end, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.problems.others import brachistochrone, bryson_denham
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_on
-from ocp.text.cost import TIME, Cost, at_end, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free, Range
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise

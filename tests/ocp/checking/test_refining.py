@@ -9,6 +9,10 @@ import pytest
 
 from ocp.checking.refining import Goals, refined_solve
 from ocp.checking.verify import verify
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import TIME, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.problems.others import (
     OTHERS,
     alp_rider,
@@ -18,12 +22,8 @@ from ocp.problems.others import (
     hang_glider,
 )
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Progress
-from ocp.text.cost import TIME, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
 from ocp.transcription.grid import make_meshes
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status

@@ -10,12 +10,11 @@ from ocp.checking.arcs import Arc, arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.resimulate import resimulated
 from ocp.checking.verify import verified, verified_arcs, verify
+from ocp.formulation.bounds import FREE
+from ocp.formulation.expressions import Signals, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import solve_once
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE
-from ocp.text.signals import Signals
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
 from symfric.model import Model

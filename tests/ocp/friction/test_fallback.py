@@ -7,14 +7,14 @@ import casadi as ca
 import pytest
 
 import ocp.job as job
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.friction.mode_models import mode_model
 from ocp.friction.release import holding
 from ocp.friction.sharpen import FINE
 from ocp.problems.friction import out_and_back
 from ocp.solve import solve
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric import BrownMcPhee, ExactCoulomb, SolveError, Status
 from symfric.laws import Law
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, Revolute

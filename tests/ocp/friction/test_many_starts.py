@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from ocp.formulation.problem import Problem
 from ocp.friction.many_starts import starts_around
 from ocp.problems.friction import cart_pendulum, load_through_spring
 from ocp.solving.starts import initial_points
-from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise

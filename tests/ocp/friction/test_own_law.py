@@ -7,7 +7,7 @@ import pytest
 from phases import unit_move
 
 from ocp import Phase, Problem, Shooting, integral, solve
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solving.nearest import nearest
 from ocp.solving.starts import start_of
 from ocp.transcription.grid import make_meshes

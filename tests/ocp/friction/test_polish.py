@@ -5,13 +5,13 @@ from functools import cache
 
 import pytest
 
+from ocp.formulation.phase import Chain
+from ocp.formulation.problem import Problem
 from ocp.friction.mode_models import smooth_model, widths
 from ocp.friction.polish import polish
 from ocp.problems.friction import out_and_back
 from ocp.result.solution import Solution
 from ocp.solving.one_solve import solve_once
-from ocp.text.phase import Chain
-from ocp.text.problem import Problem
 from symfric.integrator import Hold, simulate
 
 

@@ -3,12 +3,12 @@
 import casadi as ca
 import pytest
 
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.friction.referee import verify_exactly
 from ocp.problems.friction import cart_pendulum, load_through_spring
 from ocp.solve import solve
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric.foundation.parameters import Variable
 from symfric.laws import BrownMcPhee
 from symfric.model import Contact, Model

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ocp.formulation.phase import Chain
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import smooth_model, widths
 from ocp.friction.polish import KICK, SHORTEST, Polisher, better, parameters_of, settled
@@ -14,9 +15,8 @@ from ocp.friction.repair import neighbours
 from ocp.friction.sequence import Leg, Run, Track, cut, shown, with_rests
 from ocp.friction.solved import Solved
 from ocp.problems.friction import out_and_back
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_once
-from ocp.text.phase import Chain
 from ocp.transcription.schemes import Radau
 
 

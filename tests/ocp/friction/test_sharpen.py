@@ -8,14 +8,14 @@ from math import tanh
 import pytest
 from phases import unit_move
 
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.friction import sharpen
 from ocp.friction.scales import Scale, has_jumps, own_level, same_size, speeds_at, widths_at
 from ocp.friction.sharpen import FIRST, LAST, Sharp, sharpened, smoothed
 from ocp.problems.friction import out_and_back, parcel_on_tray
-from ocp.solvers.ipopt import Ipopt
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.solvers.methods import Ipopt
 from ocp.transcription.schemes import Radau
 from symfric import BrownMcPhee, ExactCoulomb, LuGre, drive
 

@@ -7,10 +7,10 @@ import pytest
 from backends import needs_compiler
 from receding import controller, linear_model
 
+from ocp.formulation.expressions import effort, track
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of
-from ocp.text.cost import effort, track
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric.foundation.compiler import find_compiler
 
 pytestmark = needs_compiler

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from receding import controller, linear_model, positioning, rubbing
 
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import at_end, effort, integral, track
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of
 from ocp.mpc.gauss_newton import CycleStatus
-from ocp.text.cost import at_end, effort, integral, track
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
 from symfric import ExactCoulomb, drive
 
 Q, R = np.diag([3.0, 1.0, 2.0]), np.diag([0.1, 0.2])

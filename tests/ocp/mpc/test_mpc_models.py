@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from receding import linear_model, positioning
 
+from ocp.formulation.expressions import at_end, effort, track
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of
 from ocp.problems.friction import cart_pendulum
-from ocp.text.cost import at_end, effort, track
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric import LuGre, drive
 from symfric.model import Model
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from phases import UNIT, fastest_move, there_and_back, unit_move
 
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.result.motion import Stretch
 from ocp.result.solution import Mode, Solution
 from ocp.solving.one_solve import solve_once
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from ocp.transcription.schemes import Legendre, Radau
 from symfric import Hold, Model, Variable, simulate
 

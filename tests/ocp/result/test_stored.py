@@ -7,13 +7,14 @@ import pytest
 from phases import there_and_back, unit_move
 
 from ocp import Phase, Problem, integral, solve, verify
+from ocp.result.motion import along
 from ocp.result.solution import SOLUTION, Solution, load
-from ocp.result.stored import along
 from ocp.solving.one_solve import solve_once
 from ocp.solving.starts import start_of
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre
 from ocp.transcription.transcribe import discretise
+from symfric.foundation import storable
 from symfric.laws import BrownMcPhee
 from symfric.scenes import drive
 
@@ -138,3 +139,16 @@ def test_a_file_that_ends_too_early_is_refused(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=r"ocp\.load '"):
             load(tmp_path / "part.npz")
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_file_that_names_modules_of_an_older_version_loads(back: Solution, tmp_path: Path) -> None:
+    back.save(tmp_path / "back.npz")
+    with np.load(tmp_path / "back.npz") as held:
+        arrays = dict(held)
+    text = arrays["about"].tobytes().decode()
+    for old, new in storable.MOVED.items():
+        text = text.replace(f'"{new}:', f'"{old}:')
+    assert "ocp.text.posed:" in text
+    arrays["about"] = np.frombuffer(text.encode(), np.uint8)
+    np.savez(tmp_path / "old.npz", **arrays)
+    assert load(tmp_path / "old.npz").to_dict() == back.to_dict()

@@ -3,10 +3,9 @@ import numpy as np
 import pytest
 from phases import unit_move
 
-from ocp.solvers.answers import not_finite, plainly, worst
+from ocp.formulation.expressions import at_end, integral
 from ocp.solvers.outcome import outside, worst_of
-from ocp.solvers.watch import Seen
-from ocp.text.cost import at_end, integral
+from ocp.solvers.watch import Seen, not_finite, plainly, worst
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Program
 from ocp.transcription.schemes import Radau

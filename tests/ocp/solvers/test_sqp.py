@@ -4,13 +4,12 @@ import pytest
 from motions import stage
 from phases import fastest_move, unit_move
 
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import integral
 from ocp.solvers.convexify import Convexified
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt, Sqp
 from ocp.solvers.outcome import Progress
-from ocp.solvers.sqp import Sqp
 from ocp.solving.one_solve import solve_once
-from ocp.text.cost import integral
-from ocp.text.ranges import Free
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place, Program
 from ocp.transcription.schemes import Radau

@@ -2,11 +2,11 @@ import pytest
 from motions import stage
 from phases import fastest_move
 
-from ocp.solvers.ipopt import Ipopt
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_once
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 
 
 @pytest.mark.parametrize(("v_t", "named"), [(1e-4, True), (0.5, False)])

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from phases import fastest_move, there_and_back, unit_move
 
-from ocp.solvers.ipopt import Ipopt
+from ocp.formulation.bounds import FREE, Free
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_on, solve_once, when
-from ocp.text.ranges import FREE, Free
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place
 from ocp.transcription.schemes import Legendre, Radau

@@ -3,14 +3,14 @@ import numpy as np
 import pytest
 from discretised import angles, double_pendulum, four_bar
 
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Legendre, Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric import BrownMcPhee
 from symfric.multibody import JointSpringDamper, PrescribedMotion
 from symfric.scenes import SliderCrank

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from discretised import mechanism, one_phase
 
-from ocp.transcription.collocation import PointEquations
-from ocp.transcription.compiled import FUNCTIONS, Engine
+from ocp.transcription.collocation import FUNCTIONS, Engine, PointEquations
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from discretised import CASES
 
-from ocp.text.problem import Problem
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Program
 from ocp.transcription.schemes import Legendre, Radau, Scheme

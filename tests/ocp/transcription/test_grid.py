@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from discretised import EFFORT, mean_of_scenarios, stage
 
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import check_meshes, join, make_mesh, make_meshes, nodes_of, split
 
 ONE = Problem(Phase(stage(), 1.0, via={0.5: {"x": 0.5}, 0.3: {"x": 0.2}}), EFFORT)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from ocp.text.cost import at_end
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.formulation.expressions import at_end
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from ocp.transcription.transcribe import discretise

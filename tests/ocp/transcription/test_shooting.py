@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from discretised import EFFORT, all_at_once, free_time, mean_of_scenarios, stage, three_phases
 
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric import Model, Variable
 
 

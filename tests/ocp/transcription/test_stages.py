@@ -4,10 +4,10 @@ import pytest
 from discretised import stage
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE, Free
+from ocp.formulation.bounds import FREE, Free
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Program
 from ocp.transcription.schemes import Legendre, Radau, Scheme

@@ -17,16 +17,15 @@ from discretised import (
 )
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.text.cost import at_end, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.text.span import Row
+from ocp.formulation.bounds import Free
+from ocp.formulation.expressions import at_end, integral
+from ocp.formulation.phase import Phase, Row
+from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Legendre, Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric import Model, Variable
 
 SCHEMES = [Radau(2), Radau(3), Legendre(2), Legendre(3)]

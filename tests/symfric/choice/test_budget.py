@@ -9,8 +9,18 @@ import numpy as np
 import pytest
 
 from symfric import Model, SolveError, Status, Variable, rabinowicz, simulate
-from symfric.choice.budget import EVENTS, LEAST, LEAST_WHOLE, Budget, counted
-from symfric.choice.climb import ON_THE_WAY, Asked, at_equal_error, climbed, nearest
+from symfric.choice.climb import (
+    EVENTS,
+    LEAST,
+    LEAST_WHOLE,
+    ON_THE_WAY,
+    Asked,
+    Budget,
+    at_equal_error,
+    climbed,
+    counted,
+    nearest,
+)
 from symfric.choice.machine import Candidate
 from symfric.choice.measured import _holds  # pyright: ignore[reportPrivateUsage]
 from symfric.choice.reference import Reference

@@ -10,12 +10,10 @@ import pytest
 from symfric.choice import Friction
 from symfric.choice.friction import alike
 from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsage]
-from symfric.choice.nature import otherwise
-from symfric.choice.needs import needed
-from symfric.choice.row import INACCURATE, RANKED, REFUSED, Row, ordered
+from symfric.choice.nature import needed, otherwise
+from symfric.choice.ranking import INACCURATE, RANKED, REFUSED, Row, ordered
 from symfric.choice.softness import MOST, NARROW, Ladder, Rung, ladder, limit_order, softness
-from symfric.choice.text import number, short
-from symfric.choice.verdict import verdict
+from symfric.choice.text import number, short, verdict
 from symfric.foundation.parameters import parameters
 from symfric.laws import (
     ALL_LAWS,

@@ -2,12 +2,15 @@
 
 import csv
 import json
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from ocp import Legendre, Radau, Shooting, load
+from ocp import Legendre, Problem, Radau, Shooting, Solution, load, solve
 from ocp.problems.catalogue import READY
+from symfric.cli import ocp as command
 from symfric.cli.app import main
 from symfric.cli.ocp import scheme_of
 
@@ -54,6 +57,23 @@ def test_problem_of_a_file(file: Path, capsys: pytest.CaptureFixture[str]) -> No
     again = ["--guess", outputs[1], "--json", "-", "--scheme", "legendre2"]
     assert main(["ocp", f"{file}:problem", "--set", "T=2", *again]) == 0
     assert json.loads(capsys.readouterr().out)["cost"] == pytest.approx(12 / 8, rel=1e-3)
+
+
+def test_resting_margin_is_that_of_solve(
+    file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[float] = []
+
+    def watched(problem: Problem, **arguments: Any) -> Solution:
+        seen.append(arguments["resting_margin"])
+        return solve(problem, **arguments)
+
+    monkeypatch.setattr(command, "solve", watched)
+    assert main(["ocp", f"{file}:short"]) == 0
+    assert main(["ocp", f"{file}:short", "--resting-margin", "0.002"]) == 0
+    assert seen == [signature(solve).parameters["resting_margin"].default, 0.002]
+    assert main(["ocp", f"{file}:short", "--resting-margin", "0.5"]) == 2
+    assert "--resting-margin: expected" in capsys.readouterr().err
 
 
 def test_table_tells_what_was_checked(file: Path, capsys: pytest.CaptureFixture[str]) -> None:

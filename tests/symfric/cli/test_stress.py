@@ -1,6 +1,7 @@
 """`symfric stress` on the command line."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,24 @@ def test_a_failing_campaign_saves_its_cases_and_says_so(
     printed = capsys.readouterr()
     assert "Interrupted: 1 of 3 cases were not run." in printed.out
     assert "silent_1_0.json" in printed.err
+
+
+def test_the_files_are_written_while_a_campaign_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A machine that is switched off loses one minute of a long campaign."""
+
+    def killed(*_: object, progress: Callable[[Report], None], **__: object) -> Report:
+        progress(Report(1, 3, {0: Verdict("silent", "far off")}, 1.0))
+        raise RuntimeError
+
+    monkeypatch.setattr("symfric.cli.stress.campaign", killed)
+    monkeypatch.setattr("symfric.cli.stress.EVERY", -1.0)
+    target = tmp_path / "stress.json"
+    with pytest.raises(RuntimeError):
+        main(["stress", "--json", str(target), "--out", str(tmp_path)])
+    assert json.loads(target.read_text())["classes"]["silent"] == 1
+    assert (tmp_path / "silent_1_0.json").exists()
 
 
 def test_a_saved_case_runs_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from symfric import LuGre, law_from_text
 from symfric.figures import compare, drift
-from symfric.figures.drift import over_period
+from symfric.figures.pushing import over_period
 from symfric.laws import ElastoPlastic
 
 

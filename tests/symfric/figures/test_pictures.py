@@ -9,9 +9,14 @@ from matplotlib.figure import Figure
 
 from symfric import BrownMcPhee, Karnopp, LuGre, law_from_text, with_values
 from symfric.figures import compare, figure, hysteresis
-from symfric.figures.data import Curve, FigureData
-from symfric.figures.nature import behaviours
-from symfric.figures.pictures import clear, decades, plot_catalogue, plot_figure, plot_laws, window
+from symfric.figures.data import Curve, FigureData, clear
+from symfric.figures.pictures import (
+    behaviours,
+    decades,
+    plot_catalogue,
+    plot_laws,
+    window,
+)
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import steady_force
 
@@ -82,7 +87,7 @@ def test_a_behaviour_that_fails_is_left_out_with_a_word(monkeypatch: pytest.Monk
     def fails(*_: object, **__: object) -> None:
         raise SolveError("it stopped at 1 s", Status.SUCCESS)
 
-    monkeypatch.setattr("symfric.figures.nature.hysteresis", fails)
+    monkeypatch.setattr("symfric.figures.pictures.hysteresis", fails)
     laws = {"lugre": LuGre()}
     assert titles(plot_laws(laws))[2:] == ["lag, v up and down"]
 
@@ -135,7 +140,7 @@ def test_catalogue_has_a_panel_of_its_own_scale_for_every_law() -> None:
 
 
 def test_a_figure_says_its_note_and_reads_in_its_units() -> None:
-    drawn = plot_figure(compare(["lugre", "coulomb"], "hysteresis"))
+    drawn = compare(["lugre", "coulomb"], "hysteresis").plot()
     (axis,) = drawn.axes
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [µm]", "F [N]")
     assert axis.get_title(loc="left").startswith("without coulomb: expected")
@@ -149,7 +154,7 @@ def test_a_sweep_says_what_is_swept_and_what_for() -> None:
 
 
 def test_one_colour_a_law_one_line_style_a_case() -> None:
-    drawn = plot_figure(compare(["lugre", "gms"], "lag"))
+    drawn = compare(["lugre", "gms"], "lag").plot()
     lines = drawn.axes[0].lines
     assert [line.get_label() for line in lines[:3]] == [
         "lugre, 2 Hz",
@@ -174,7 +179,7 @@ def test_measured_levels_stand_above_zero() -> None:
                       (Curve("a", "", {"rate": np.array([1.0, 10.0]),
                                        "F": np.array([1.0, 1.00001])}),),
                       log=("rate",), dots=True)  # fmt: skip
-    axis = plot_figure(data).axes[0]
+    axis = data.plot().axes[0]
     assert axis.get_ylim() == pytest.approx((0.0, 1.1), rel=1e-3)
 
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.figures.random_motion import shoved, slid
+from symfric.figures.motion import shoved, slid
 from symfric.integrator import Linear
 from symfric.laws import GenericAsperity, RandomBristles
 

@@ -1,7 +1,7 @@
 """Scenes as figures."""
 
 from symfric import GMS, LuGre
-from symfric.figures.scene import in_scene, scene_figure
+from symfric.figures.catalogue import in_scene, scene_figure
 from symfric.scenes import Pendulum
 
 

@@ -9,9 +9,9 @@ from scipy.integrate import solve_ivp
 
 from symfric import SteadyStateLuGre
 from symfric.gallery.belt import Belt
-from symfric.gallery.laminator_nips import _sled
-from symfric.gallery.self_tuning import _machines as machines
-from symfric.gallery.self_tuning._oracle import fixed_steps, solve
+from symfric.gallery.laminator_nips import sled
+from symfric.gallery.self_tuning import machines
+from symfric.gallery.self_tuning.machines import fixed_steps, solve
 
 
 def test_the_belt_has_the_period_and_the_extremes_of_the_closed_form() -> None:
@@ -65,9 +65,9 @@ def test_the_sled_under_coulomb_friction_is_the_block_on_the_belt(
 ) -> None:
     """A curve that falls at once from 4 N to 3 N: amplitude and mean are those of `Belt`."""
     jump = SteadyStateLuGre(F_S=4.0, F_C=3.0, v_s=1e-11, sigma_2=0.0)
-    monkeypatch.setitem(_sled.PRINTED, "jump", jump)
+    monkeypatch.setitem(sled.PRINTED, "jump", jump)
     Z, speed = 50.0, 600.0
-    (amplitude,), (mean,) = _sled.swept("jump", (Z, 0.0), np.array([speed]))
+    (amplitude,), (mean,) = sled.swept("jump", (Z, 0.0), np.array([speed]))
     belt = Belt(m=1.0, k=Z**2, v_belt=speed / 60e3, F_S=4.0, F_C=3.0)
     times = np.linspace(0.0, 1.0, 100001)
     force = Z**2 * belt.motion(times)["x"]
@@ -80,6 +80,6 @@ def test_the_sled_under_coulomb_friction_is_the_block_on_the_belt(
 
 def test_a_slack_wire_does_not_push() -> None:
     """A heavy sled under the main study's curve overtakes the wire."""
-    _, force = _sled.cycle("main", (300.0, 0.0), 500 / 60e3)
+    _, force = sled.cycle("main", (300.0, 0.0), 500 / 60e3)
     assert force.min() == 0.0
     assert np.mean(force == 0.0) > 0.1

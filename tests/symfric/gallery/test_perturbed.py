@@ -21,27 +21,27 @@ CAR, NIPS = ("quarter_car_friction",), ("laminator_nips",)
 SELECTION, TUNING = "symfric/gallery/selection/", "symfric/gallery/self_tuning/"
 
 TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("symfric/choice/jing_mi.py", "PRINTED", ("selection/fig_02", "selection/fig_07")),
+    ("symfric/gallery/selection/tables.py", "PRINTED", ("selection/fig_02", "selection/fig_07")),
     ("symfric/scenes/jing_mi.py", "BELT", BELT),
     ("symfric/scenes/jing_mi.py", "BOX", BOX),
     ("symfric/scenes/jing_mi.py", "HINGE", BOX),
-    (SELECTION + "_machine.py", "M_BOX", ("selection/fig_06", "selection/fig_08")),
-    (SELECTION + "_machine.py", "FLOOR", ("selection/fig_06", "selection/fig_08")),
-    (SELECTION + "_runs_belt.py", "M", BELT),
+    (SELECTION + "box.py", "M_BOX", ("selection/fig_06", "selection/fig_08")),
+    (SELECTION + "box.py", "FLOOR", ("selection/fig_06", "selection/fig_08")),
+    (SELECTION + "belt.py", "M", BELT),
     *(
-        ("symfric/gallery/generalized_maxwell_slip/_laws.py", name, GMS)
+        ("symfric/gallery/generalized_maxwell_slip/laws.py", name, GMS)
         for name in ("F_S", "SIGMA_0", "DELTA_L", "ELEMENTS", "LIFE", "PERIOD")
     ),
     *(("symfric/scenes/rigs.py", name, GMS) for name in ("_CURVE", "_BRISTLE", "_LEVELS")),
-    ("symfric/gallery/quarter_car_friction/_by_hand.py", "M_B", CAR),
-    ("symfric/gallery/quarter_car_friction/_by_hand.py", "THETA", CAR),
-    ("symfric/gallery/quarter_car_friction/_printed.py", "RESIDUAL", CAR),
-    ("symfric/gallery/quarter_car_friction/_printed.py", "RANGE", CAR),
-    ("symfric/gallery/quarter_car_friction/_rig.py", "STAGES", CAR),
-    ("symfric/gallery/quarter_car_friction/_rig.py", "FRICTION", CAR),
-    *((TUNING + "_runs_four_mass.py", name, FOUR) for name in ("MU", "V_T")),
-    *((TUNING + "_runs_crank.py", name, CRANK) for name in ("MU", "V_T")),
-    *((TUNING + "_runs_belt.py", name, STICK) for name in ("MU", "V_T", "BLOCK")),
+    ("symfric/gallery/quarter_car_friction/rig.py", "M_B", CAR),
+    ("symfric/gallery/quarter_car_friction/rig.py", "THETA", CAR),
+    ("symfric/gallery/quarter_car_friction/readings.py", "RESIDUAL", CAR),
+    ("symfric/gallery/quarter_car_friction/readings.py", "RANGE", CAR),
+    ("symfric/gallery/quarter_car_friction/rig.py", "STAGES", CAR),
+    ("symfric/gallery/quarter_car_friction/rig.py", "FRICTION", CAR),
+    *((TUNING + "four_mass.py", name, FOUR) for name in ("MU", "V_T")),
+    *((TUNING + "crank.py", name, CRANK) for name in ("MU", "V_T")),
+    *((TUNING + "belt.py", name, STICK) for name in ("MU", "V_T", "BLOCK")),
 )
 """File, what is assigned there, and which figures depend on it."""
 MACHINES = {
@@ -75,12 +75,12 @@ LAWS = {
 OURS = "invented, and the same on both sides: what is said holds over its range, see the figure"
 STEADY = "the figures show the bristle in steady sliding alone; the tests of the law see its rate"
 EXCEPTIONS: dict[str, str] = {
-    SELECTION + "_machine.py: M_BOX[4]": OURS,
-    "symfric/gallery/generalized_maxwell_slip/_laws.py: ELEMENTS[0]": OURS,
-    "symfric/gallery/generalized_maxwell_slip/_laws.py: ELEMENTS[6]": OURS,
-    "symfric/gallery/generalized_maxwell_slip/_laws.py: PERIOD[1]": OURS,
-    "symfric/gallery/quarter_car_friction/_rig.py: FRICTION[1]": OURS,
-    "symfric/gallery/quarter_car_friction/_rig.py: FRICTION[2]": OURS,
+    SELECTION + "box.py: M_BOX[4]": OURS,
+    "symfric/gallery/generalized_maxwell_slip/laws.py: ELEMENTS[0]": OURS,
+    "symfric/gallery/generalized_maxwell_slip/laws.py: ELEMENTS[6]": OURS,
+    "symfric/gallery/generalized_maxwell_slip/laws.py: PERIOD[1]": OURS,
+    "symfric/gallery/quarter_car_friction/rig.py: FRICTION[1]": OURS,
+    "symfric/gallery/quarter_car_friction/rig.py: FRICTION[2]": OURS,
     "symfric/laws/dynamic/stick_slip.py: StickSlip.rate": STEADY,
     "symfric/laws/dynamic/dwell.py: Gonthier.rate": STEADY,
 }
@@ -122,8 +122,8 @@ def unseen(told: dict[str, str]) -> set[str]:
 
 def test_a_changed_number_and_a_changed_law_change_a_verdict() -> None:
     """One of each kind, in the figure that shows it."""
-    table = Job("symfric/choice/jing_mi.py", "PRINTED", 1, "", ("selection/fig_02",))
-    machine = Job(SELECTION + "_machine.py", "M_BOX", 0, "", ("selection/fig_06",))
+    table = Job("symfric/gallery/selection/tables.py", "PRINTED", 1, "", ("selection/fig_02",))
+    machine = Job(SELECTION + "box.py", "M_BOX", 0, "", ("selection/fig_06",))
     law = Job("symfric/laws/static/quarter_car.py", "QuarterCarSimple", -1, "force",
               ("quarter_car_friction/fig_13",))  # fmt: skip
     told = verdicts([table, machine, law])

@@ -9,9 +9,9 @@ import pytest
 
 from symfric.gallery import rendering
 from symfric.gallery.pages import index_page
-from symfric.gallery.plate import chosen, figure_of, plate_of, plates, sections, short
+from symfric.gallery.plate import chosen, figure_of, plate_of, plates, script, sections, short
 from symfric.gallery.rendering import draw, read, render, together
-from symfric.stress.crew import Died, Hung
+from symfric.stress.workers import Crashed, TimedOut
 
 NAME = "self_tuning/fig_07_shape_factor"
 
@@ -39,12 +39,12 @@ def test_a_docstring_falls_into_its_parts() -> None:
     }
 
 
-def test_a_script_is_named_after_its_figure() -> None:
+def test_a_function_is_named_after_its_figure() -> None:
     assert figure_of("fig_07_shape_factor") == "Figure 7"
     assert figure_of("fig_3_2_forces") == "Figure 3.2"
     assert short("thesis/fig_3_2_forces") == "thesis/fig_3_2"
     assert short(NAME) == "self_tuning/fig_07"
-    with pytest.raises(ValueError, match="expected a script named fig_07_what_it_shows"):
+    with pytest.raises(ValueError, match="expected a function fig_07_what_it_shows"):
         figure_of("figure_seven")
 
 
@@ -59,22 +59,18 @@ def test_a_name_may_be_a_figure_or_a_paper() -> None:
 
 
 def test_a_plate_refuses_numbers_that_are_not_finite() -> None:
-    import symfric.gallery.self_tuning.fig_07_shape_factor as script  # noqa: PLC0415
-
     with pytest.raises(ValueError, match="expected finite numbers, got distance, period"):
         numbers = {"period [s]": float("inf")}
-        plate_of(script.__name__, None, float("nan"), "m", numbers, {}, within=1.0, quick=True)  # type: ignore[arg-type]
+        plate_of(script(NAME), None, float("nan"), numbers, {}, "m", within=1.0, quick=True)  # type: ignore[arg-type]
 
 
 def test_a_plate_whose_text_is_untrue_is_not_drawn() -> None:
-    import symfric.gallery.self_tuning.fig_07_shape_factor as script  # noqa: PLC0415
-
     claims = {"it is round": True, "it is flat": False}
     with pytest.raises(
         ValueError, match=r"bear out its text, got others for 'it is flat'; correct"
     ):
-        plate_of(script.__name__, None, 0.1, "m", {}, claims, within=0.1, quick=True)  # type: ignore[arg-type]
-    held = plate_of(script.__name__, None, 0.1, "m", {}, {"it is round": 1}, within=0.1, quick=True)  # type: ignore[arg-type]
+        plate_of(script(NAME), None, 0.1, {}, claims, "m", within=0.1, quick=True)  # type: ignore[arg-type]
+    held = plate_of(script(NAME), None, 0.1, {}, {"it is round": 1}, "m", within=0.1, quick=True)  # type: ignore[arg-type]
     assert held.checked == ("it is round",)
 
 
@@ -103,9 +99,9 @@ def test_a_plate_shows_itself_in_one_screen() -> None:
 
 def test_plates_that_died_are_told_apart_from_those_that_were_done(tmp_path: Path) -> None:
     draw(NAME, tmp_path, quick=True)
-    found = rendering._failures((NAME, "other"), tmp_path, Died("SIGKILL", "out of memory"))  # pyright: ignore[reportPrivateUsage]
+    found = rendering._failures((NAME, "other"), tmp_path, Crashed("SIGKILL", "out of memory"))  # pyright: ignore[reportPrivateUsage]
     assert found == {"other": "its process died, SIGKILL: out of memory"}
-    hung = rendering._failures(("other",), tmp_path, Hung(600.0))  # pyright: ignore[reportPrivateUsage]
+    hung = rendering._failures(("other",), tmp_path, TimedOut(600.0))  # pyright: ignore[reportPrivateUsage]
     assert hung == {"other": "no end within its time"}
 
 
@@ -164,10 +160,10 @@ def test_what_was_there_before_is_not_what_was_done_now(
             yield 1, {second: "ValueError: no"}
             raise KeyboardInterrupt
 
-        def dismiss(self) -> None:
+        def stop(self) -> None:
             pass
 
-    monkeypatch.setattr(rendering, "Crew", OneByOne)
+    monkeypatch.setattr(rendering, "WorkerPool", OneByOne)
     monkeypatch.setattr(rendering, "together", lambda names: [(n,) for n in names])  # pyright: ignore
     done = render(tmp_path, names, quick=True)
     assert {name: kept["title"] for name, kept in done.records.items()} == {first: "now"}

@@ -22,7 +22,7 @@ from symfric import (
     drive,
     simulate,
 )
-from symfric.laws import PlanarSlip, QuarterCarGeneral
+from symfric.laws import PlanarSlip, QuarterCarGeneral, Wojewoda
 from symfric.model import Contact, Monitor
 from symfric.scenes import ALL_SCENES, Drive, QuarterCar
 
@@ -176,7 +176,7 @@ def test_contacts_and_forces_that_cannot_be_are_refused() -> None:
         (lambda: Contact("g", v, 1.0, "lugre"), "contact 'g': law: expected a law of a scalar"),
         (lambda: Contact("g", v, 1.0, PlanarSlip(LuGre())), "contact 'g': law: expected a law"),
         (lambda: Contact("g", ca.vertcat(v, v), 1.0, LuGre()), "contact 'g': slip: expected one"),
-        (lambda: Contact("g", v, 1.0, Karnopp()), "Karnopp needs besides v and N, got no F_e"),
+        (lambda: Contact("g", v, 1.0, Wojewoda()), "Wojewoda needs besides v and N, got no dv"),
         (lambda: model.with_forces({"belt": 1.0}), "with_forces: expected .*guide.*got belt"),
         (lambda: model.with_forces({}), "expected a force for each contact, got none for guide"),
         (lambda: replace(model, contacts=(1,)), "contacts: expected contacts made by Contact"),

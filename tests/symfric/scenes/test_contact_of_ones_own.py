@@ -8,12 +8,12 @@ import symfric
 from symfric import (
     ALL_LAWS,
     Coulomb,
-    Karnopp,
     Law,
     LuGre,
     Model,
     Output,
     Variable,
+    Wojewoda,
     contact,
     rabinowicz,
     simulate,
@@ -82,8 +82,8 @@ def test_mistakes_are_told_with_what_to_write() -> None:
         ValueError, match=r"contact 'a': v: .* got variable 'w' \[mm/s\]; write 0.0"
     ):
         contact("a", LuGre(), slow, 1.0)
-    with pytest.raises(ValueError, match=r"needs F_e .*as in contact\(\.\.\., F_e=pull\)"):
-        contact("a", Karnopp(), v.symbol, 1.0)
+    with pytest.raises(ValueError, match=r"needs dv .*as in contact\(\.\.\., dv=acc"):
+        contact("a", Wojewoda(), v.symbol, 1.0)
 
 
 def test_the_front_door_names_all_that_it_hands_out() -> None:

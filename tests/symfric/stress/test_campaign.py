@@ -42,7 +42,7 @@ def test_workers_do_not_change_what_is_found() -> None:
 
 
 def test_an_interrupt_keeps_what_there_is() -> None:
-    def interrupt(_: float) -> None:
+    def interrupt(_: Report) -> None:
         raise KeyboardInterrupt
 
     report = campaign(50, workers=1, progress=interrupt)

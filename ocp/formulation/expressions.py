@@ -1,0 +1,363 @@
+"""Functions of the signals of a model: their expressions, comparisons, and costs made of them."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import inf, isfinite, isnan
+from typing import Any, final
+
+import casadi as ca
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.symbols import stacked
+from symfric.model import Model
+
+EXPRESSION = "one expression of the signals, such as lambda s: s.x**2"
+MATH = "write casadi functions for those of math: ca.sin, ca.sqrt, ca.fmax"
+BRANCH = "expressions have no truth value: no if, and, max or a <= x <= b in here"
+COMPARISON = "a comparison such as lambda s: s.tip_z <= 0.9"
+
+Comparison = tuple[ca.SX, float, float]
+"""(expression, lower, upper)."""
+
+
+@final
+class MissingError(ValueError):
+    """A name that a model does not have."""
+
+
+@final
+class Signals:
+    """The signals of a model by name: `s.force`, or `s["force"]`.
+
+    Time `t` since the start of the problem [s], states, algebraic variables, inputs, parameters,
+    outputs, and the details of a mechanism, which are written out when one is asked for.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        symbols: Mapping[str, ca.SX] | None = None,
+        put: Callable[[ca.SX], ca.SX] | None = None,
+    ) -> None:
+        """`symbols` are others than those of the model; `put` brings expressions into them."""
+        self._model = model
+        self._symbols = known_symbols(model) if symbols is None else symbols
+        self._put = put
+        self._details: dict[str, ca.SX] = {}
+
+    def __getitem__(self, name: str) -> ca.SX:
+        known = self._symbols
+        if name not in known and name in self._model.further:
+            expression = ca.SX(self._model.further[name].expression)
+            self._details[name] = expression if self._put is None else self._put(expression)
+            return self._details[name]
+        try:
+            checks.check_names(f"signals of '{self._model.name}'", [name], known)
+        except ValueError as error:
+            raise MissingError(str(error)) from None
+        return known[name]
+
+    def __getattr__(self, name: str) -> ca.SX:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __call__(self) -> tuple[str, ...]:
+        """Names of the details that were asked for."""
+        return tuple(self._details)
+
+
+def arguments(model: Model) -> list[ca.SX]:
+    """[t, x, z, u, p] of a model."""
+    return [model.t, *(model.vector(letter) for letter in "xzup")]
+
+
+def known_symbols(model: Model) -> dict[str, ca.SX]:
+    """Name -> expression of everything but the details."""
+    groups = (model.x, model.z, model.u, model.p)
+    known = {"t": model.t} | {v.name: v.symbol for group in groups for v in group}
+    return known | {name: ca.SX(o.expression) for name, o in model.outputs.items()}
+
+
+def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
+    """Signals in symbols of their own, [t, x, z, u, p], so that two spans of one model differ."""
+    own = arguments(model)
+    new = [ca.SX.sym(f"{mark}_{letter}", s.numel()) for letter, s in zip("txzup", own, strict=True)]
+    known = known_symbols(model)
+    values = ca.Function("signals", own, [stacked(known.values())])(*new)
+    rows = ca.vertsplit(ca.SX(values))
+
+    def put(expression: ca.SX) -> ca.SX:
+        return ca.substitute(expression, ca.vertcat(*own), ca.vertcat(*new))
+
+    return new, Signals(model, dict(zip(known, rows, strict=True)), put)
+
+
+def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
+    """What `function` returns; what CasADi and Python refuse becomes a `ValueError`.
+
+    Raises:
+        ValueError: the function asks for what does not exist or cannot be done.
+    """
+    try:
+        return function(*signals)
+    except (TypeError, ArithmeticError, AttributeError, RuntimeError) as error:
+        text = str(error)
+        plain = "argument" in text or isinstance(error, AttributeError)
+        hint = BRANCH if "truth value" in text else "" if plain else MATH
+        raise ValueError(
+            f"expected {what}, got {type(error).__name__}: {_short(text)}"
+            + f"; {hint}" * bool(hint)
+        ) from error
+
+
+def value_of(function: Callable[..., Any], *signals: Any) -> ca.SX:
+    """The one expression that `function` makes of the signals, SX (1, 1).
+
+    Raises:
+        ValueError: no expression, several, or one that is not a number from the start (NaN).
+    """
+    found = called(function, *signals, what=EXPRESSION)
+    if isinstance(found, float) and isnan(found):
+        raise _refused(found, MATH)
+    if isinstance(found, ca.MX) or (
+        checks.as_number(found) is None and not isinstance(found, ca.SX | ca.DM)
+    ):
+        raise _refused(found, "write it with casadi.SX" if isinstance(found, ca.MX) else "")
+    value = ca.SX(found)
+    if value.numel() != 1:
+        raise _refused(found)
+    odd = [number for number in constants(value) if not isfinite(number)]
+    if odd:
+        raise _refused(found, f"it holds {odd[0]}" + f"; {MATH}" * isnan(odd[0]))
+    return value
+
+
+def constants(expression: ca.SX) -> Iterator[float]:
+    """Numbers that stand in `expression`."""
+    f = ca.Function("f", ca.symvar(expression), [expression])
+    for k in range(f.n_instructions()):
+        if f.instruction_id(k) == ca.OP_CONST:
+            yield float(f.instruction_constant(k))
+
+
+def _refused(found: object, hint: str = "") -> ValueError:
+    text = f"expected {EXPRESSION}, got {checks.shown(found)}"
+    return ValueError(text + f"; {hint}" * bool(hint))
+
+
+def _short(text: str) -> str:
+    """The last line of what CasADi or Python says, without the place in its source."""
+    last = text.strip().splitlines()[-1].rstrip(".")
+    return last.split(": ", 1)[-1] if ".cpp:" in last else last
+
+
+def comparisons(function: Callable[..., Any], *signals: Any) -> list[Comparison]:
+    """Rows of what `function` returns: `a <= b`, `a >= b` or `a == b` of SX.
+
+    Columns are compared row by row, `ca.logic_and(a, b)` of comparisons is both of them, and
+    `abs(a) <= number` is a range without a kink.
+
+    Raises:
+        ValueError: no comparison, or one that is always true or false.
+    """
+    found = called(function, *signals, what=COMPARISON)
+    if isinstance(found, bool):
+        raise ValueError(
+            f"expected {COMPARISON}, got {found}: Python compared numbers; {MATH}; {BRANCH}"
+        )
+    if not isinstance(found, ca.SX) or found.is_empty():
+        raise ValueError(f"expected {COMPARISON}, got {checks.shown(found)}")
+    return [row for each in ca.vertsplit(ca.vec(found)) for row in _rows(each)]
+
+
+def _rows(condition: ca.SX) -> Iterator[Comparison]:
+    if condition.is_constant():
+        always = "true" if float(ca.DM(condition)) else "false"
+        raise ValueError(
+            f"expected a comparison that depends on the motion, got one that is always {always}"
+        )
+    kind = condition.op()
+    if kind == ca.OP_AND:
+        for part in (condition.dep(0), condition.dep(1)):
+            yield from _rows(part)
+    elif kind in (ca.OP_LE, ca.OP_LT, ca.OP_EQ):
+        yield _sorted(condition.dep(0), condition.dep(1), equal=kind == ca.OP_EQ)
+    else:
+        raise ValueError(
+            f"expected {COMPARISON}, got {checks.shown(condition)}; write <=, >= or == between two "
+            "expressions"
+        )
+
+
+def _sorted(left: ca.SX, right: ca.SX, *, equal: bool) -> Comparison:
+    """Left <= right, or ==, with numbers moved to the bounds."""
+    for number in constants(ca.vertcat(left, right)):
+        if not isfinite(number):
+            raise ValueError(f"expected finite numbers, got {number}; {MATH}")
+    if right.is_constant():
+        high = float(ca.DM(right))
+        if left.op() == ca.OP_FABS and not equal:
+            return left.dep(0), -high, high
+        return left, (high if equal else -inf), high
+    if left.is_constant():
+        low = float(ca.DM(left))
+        return right, low, (low if equal else inf)
+    return left - right, (0.0 if equal else -inf), 0.0
+
+
+Expression = Callable[[Signals], Scalar]
+"""What to evaluate, such as `lambda s: s.force**2`."""
+
+Terms = tuple[tuple[float, Expression], ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cost:
+    """Bolza cost J = integral of (L + sum_i w_i r_i^2) dt + E at the end.
+
+    Costs add up and take weights: `integral(lambda s: s.force**2) + 0.1 * TIME`; what is to be
+    large gets a negative one: `-at_end(lambda s: s.height)`. They know signals
+    by name only, so one cost serves every model that has them.
+
+    Attributes:
+        running: the terms of L as (weight, expression).
+        end: the terms of E as (weight, expression).
+        squares: (w_i, r_i) of `track` and `effort`, kept apart for Gauss-Newton methods.
+        references: names that `track` follows.
+        largest: whether the largest of all scenarios counts, and not their mean; see `worst`.
+    """
+
+    running: Terms = ()
+    end: Terms = ()
+    squares: Terms = ()
+    references: tuple[str, ...] = ()
+    largest: bool = False
+
+    def __add__(self, other: object) -> "Cost":
+        if not isinstance(other, Cost):
+            return NotImplemented
+        if self.largest or other.largest:
+            raise ValueError(
+                "cost: expected worst(...) round the whole cost, got it added to another; write "
+                "worst(a + b)"
+            )
+        return Cost(
+            self.running + other.running,
+            self.end + other.end,
+            self.squares + other.squares,
+            tuple(dict.fromkeys(self.references + other.references)),
+        )
+
+    def __mul__(self, weight: float) -> "Cost":
+        weight = checks.number("cost: weight", weight)
+        if self.largest and weight < 0:
+            raise ValueError(f"cost: expected a weight >= 0 of worst(...), got {weight:g}")
+
+        def scaled(terms: Terms) -> Terms:
+            return tuple((weight * w, term) for w, term in terms)
+
+        return replace(
+            self,
+            running=scaled(self.running),
+            end=scaled(self.end),
+            squares=scaled(self.squares),
+        )
+
+    __rmul__ = __mul__
+
+    def __radd__(self, other: object) -> "Cost":
+        return self if other == 0 else NotImplemented  # where `sum` begins
+
+    def __neg__(self) -> "Cost":
+        return -1.0 * self
+
+    def __sub__(self, other: object) -> "Cost":
+        return self + (-other) if isinstance(other, Cost) else NotImplemented
+
+    def __truediv__(self, weight: float) -> "Cost":
+        weight = checks.number("cost: divisor", weight)
+        if weight == 0:
+            raise ValueError("cost: expected a divisor that is not zero, got 0")
+        return self * (1.0 / weight)
+
+    def expressions(self, model: Model, signals: Signals | None = None) -> tuple[ca.SX, ca.SX]:
+        """Integrand, squares included, and end value in the symbols of `model`, (1, 1) each.
+
+        `signals` are those of the model, where somebody wants to know what was asked of them.
+
+        Raises:
+            ValueError: a name the model does not have, or an expression that is not scalar.
+        """
+        signals = Signals(model) if signals is None else signals
+        running = _total(self.running, signals)
+        for weight, residual in self.residuals(model, signals):
+            running += weight * residual**2
+        return running, _total(self.end, signals)
+
+    def residuals(
+        self, model: Model, signals: Signals | None = None
+    ) -> tuple[tuple[float, ca.SX], ...]:
+        """(weight, residual) of the squares in the symbols of `model`."""
+        signals = Signals(model) if signals is None else signals
+        return tuple((weight, value_of(term, signals)) for weight, term in self.squares)
+
+
+def _checked(where: str, expression: Expression) -> Expression:
+    return checks.function(where, expression, "a function of the signals such as lambda s: s.x**2")
+
+
+def integral(expression: Expression) -> Cost:
+    """Cost: the integral over the motion, such as `integral(lambda s: s.force**2)`."""
+    return Cost(running=((1.0, _checked("integral", expression)),))
+
+
+def at_end(expression: Expression) -> Cost:
+    """Cost: the value at the end, where `s.t` is the time since the start of the problem."""
+    return Cost(end=((1.0, _checked("at_end", expression)),))
+
+
+TIME = at_end(lambda s: s.t)
+"""The duration [s] as a cost: the sum over all phases."""
+
+
+def track(name: str, reference: float | str | Expression, weight: float) -> Cost:
+    """Cost: the integral of weight (signal - reference)^2.
+
+    Args:
+        name: the signal that follows.
+        reference: a number; a function of the signals, such as `lambda s: 0.1 * ca.sin(s.t)`; or
+            the name of a parameter or signal. A name that no model has becomes a parameter of the
+            problem, whose value stands in `p`: the goal of a controller.
+        weight: above zero.
+    """
+    name = checks.text("track", name, "the name of a signal")
+    weight = checks.number("track: weight", weight, above=0.0)
+    if isinstance(reference, str):
+        goal = checks.text("track: reference", reference, "a name, a number or a function")
+        return Cost(squares=((weight, lambda s: s[name] - s[goal]),), references=(goal,))
+    if callable(reference):
+        follow = _checked("track: reference", reference)
+        return Cost(squares=((weight, lambda s: s[name] - follow(s)),))
+    number = checks.number("track: reference", reference, hint="or a function, or a name")
+    return Cost(squares=((weight, lambda s: s[name] - number),))
+
+
+def effort(name: str, weight: float = 1.0) -> Cost:
+    """Cost: the integral of weight signal^2."""
+    return track(name, 0.0, weight)
+
+
+def worst(cost: Cost) -> Cost:
+    """The largest `cost` of all scenarios, in place of their mean."""
+    such = "a cost made of integral(...), at_end(...) and TIME"
+    return replace(checks.kind("worst", cost, Cost, such), largest=True)
+
+
+def _total(terms: Terms, signals: Signals) -> ca.SX:
+    total = ca.SX(0)
+    for weight, term in terms:
+        total += weight * value_of(term, signals)
+    return total

@@ -1,0 +1,390 @@
+"""Checks of a problem: types, then names, ranges and durations; doubtful units.
+
+`kind_problems` comes first: without what it reports, the other checks have something to read.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from math import inf, isfinite
+from typing import Any
+
+from ocp.formulation.bounds import RANGE, Free, as_box, is_range
+from ocp.formulation.expressions import Cost
+from ocp.formulation.phase import Chain, Phase
+from ocp.formulation.statement import (
+    Statement,
+    costs_of,
+    labelled_phases,
+    names_of,
+    rate_name,
+    references_of,
+    settings_of,
+)
+from symfric.foundation import checks
+from symfric.foundation.numeric import is_number
+from symfric.foundation.variable import Variable
+from symfric.model import Model
+
+DURATION = "a duration T > 0 [s] or Free(lower, upper)"
+FAR = 300.0
+"""Factor between a number and the usual size of its variable from which on it is doubted."""
+COST = "a cost made of integral(...), at_end(...) and TIME"
+CONDITION = "functions of the signals such as lambda s: s.tip_z <= 0.9"
+
+
+def message(check: Callable[..., Any], *arguments: Any, **named: Any) -> str:
+    """The message of a check that fails, else nothing."""
+    try:
+        check(*arguments, **named)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _unknown(where: str, names: Iterable[str], known: Iterable[str], hint: str = "") -> str:
+    return message(checks.check_names, where, names, known, hint)
+
+
+def kind_problems(problem: Statement) -> Iterator[str]:
+    """Values of the wrong type; the other checks need the right ones."""
+    if not isinstance(problem.phases, Phase | Chain):  # pyright: ignore[reportUnnecessaryIsInstance]
+        yield _no_phases(problem.phases)
+        return
+    yield message(_cost, "cost", problem.cost)
+    for name in ("bounds", "rates", "choose", "p"):
+        yield message(_named, name, getattr(problem, name))
+    yield message(_conditions, "path", problem.path)
+    text = message(_named, "scenarios", problem.scenarios)
+    yield text
+    for name, values in ({} if text else problem.scenarios).items():
+        yield message(_named, f"scenario {checks.shown(name)}", values)
+    yield message(checks.names, "periodic", problem.periodic)
+    if problem.shared is not None:
+        yield message(checks.names, "shared", problem.shared)
+    yield message(_sums, problem.durations)
+    for where, phase in labelled_phases(problem):
+        for text in _kinds_of_phase(phase):
+            yield f"{where}{text}" if text else ""
+
+
+def _no_phases(given: object) -> str:
+    hint = ""
+    if isinstance(given, Model):
+        hint = "give the model a duration: Phase(model, T=1.0)"
+    elif isinstance(given, list | tuple):
+        hint = "join phases with >>: out >> back"
+    return str(checks.refused("phases", "a phase, such as Phase(model, T=1.0)", given, hint))
+
+
+def _kinds_of_phase(phase: Phase) -> Iterator[str]:
+    for name in ("start", "end", "bounds", "rates", "link", "p"):
+        yield message(_named, name, getattr(phase, name))
+    if not isinstance(phase.name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        yield str(checks.refused("name", "a text", phase.name))
+    yield message(_cost, "cost", phase.cost)
+    for name in ("path", "joins"):
+        yield message(_conditions, name, getattr(phase, name))
+    if not isinstance(phase.via, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        what = "states by fractions of T, such as {0.5: {'x': 1.0}}"
+        yield str(checks.refused("via", what, phase.via))
+        return
+    for fraction, values in phase.via.items():
+        if not is_number(fraction):
+            yield f"via: expected fractions of T, got {checks.shown(fraction)}"
+        yield message(_named, f"via {checks.shown(fraction)}", values)
+
+
+def _named(where: str, given: object) -> None:
+    if given is None:
+        raise checks.refused(where, "values by name, such as {'v': 0.1}", None, "leave it out")
+    checks.named(where, given)
+
+
+def _cost(where: str, cost: object) -> None:
+    if cost is not None and not isinstance(cost, Cost):
+        hint = "wrap it in integral(...) or at_end(...)" if callable(cost) else ""
+        raise checks.refused(where, COST, cost, hint)
+
+
+def _conditions(where: str, conditions: object) -> None:
+    if callable(conditions):
+        raise checks.refused(where, f"a sequence of {CONDITION}", conditions, "write [lambda ...]")
+    for condition in checks.many(where, conditions, CONDITION):
+        checks.function(where, condition, CONDITION)
+
+
+def _sums(durations: object) -> None:
+    what = "sums of durations, such as ((0, 1), 2.0): the first two phases take 2 s"
+    for pair in checks.many("durations", durations, what):
+        if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], list | tuple)):
+            raise checks.refused("durations", what, pair)
+
+
+def input_problems(problem: Statement) -> Iterator[str]:
+    """Unknown names, invalid ranges, impossible durations."""
+    for number, (where, phase) in enumerate(labelled_phases(problem)):
+        for text in _phase(problem, number, phase):
+            yield f"{where}{text}" if text else ""
+    names = Counter(phase.name for phase in problem.chain if phase.name)
+    for name, count in names.items():
+        if count > 1:
+            yield f"phases: expected every name once, got '{name}' {count} times"
+    yield from _for_all_phases(problem)
+    yield from _choices(problem)
+    yield from _scenarios(problem)
+    yield from _durations(problem)
+    yield from _cost_problems(problem)
+
+
+def _phase(problem: Statement, number: int, phase: Phase) -> Iterator[str]:
+    model, first = phase.model, number == 0
+    if model.ode is None:
+        yield "expected an explicit model (ode), got an implicit one (residual)"
+    yield _event_problem(model)
+    yield duration_problem(phase.T)
+    inputs = [v.name for v in model.u]
+    rated = [n for n in inputs if n in phase.rates or n in problem.rates]
+    yield _unknown("rates", phase.rates, inputs, _not_rated(model, phase.rates))
+    taken = {*model.signals, *(v.name for v in model.p)} & set(map(rate_name, rated))
+    if taken:
+        yield f"rates: expected new names for the rates, got {', '.join(sorted(taken))}"
+    places: list[tuple[str, Mapping[str, Any], list[str]]] = [
+        ("start", phase.start, []),
+        *((f"via {fraction:g}", values, inputs) for fraction, values in phase.via.items()),
+        ("end", phase.end, []),
+        ("bounds", phase.bounds, []),
+    ]
+    for where, given, fleeting in places:
+        known = [n for n in names_of(model, given) if n not in fleeting or n in rated]
+        yield _unknown(where, given, known, _no_signal(model, given, fleeting))
+        yield from range_problems(where, given)
+    yield from _rate_problems(phase.rates)
+    for fraction in phase.via:
+        if not 0 < fraction < 1:
+            yield f"via: expected fractions of T between 0 and 1, got {fraction:g}"
+    known = [*(v.name for v in model.p), *references_of(model, costs_of(problem, phase))]
+    yield from _parameter_problems("p", phase.p, known)
+    if first and (phase.link or phase.joins):
+        what = "link" if phase.link else "joins"
+        yield f"{what}: expected none in the first phase, which has none before it"
+    yield from _links(phase, [*(v.name for v in model.x), *rated])
+
+
+def _event_problem(model: Model) -> str:
+    """Events that no optimiser sees, but for those of laws that know slip and stick apart."""
+    if not model.events:
+        return ""
+    for contact in model.contacts:
+        if text := message(contact.sliding, 1) or message(contact.static_level):
+            return f"expected contacts with known modes, got events of '{contact.name}': {text}"
+    try:
+        own = model.open.events if model.contacts else model.events
+    except ValueError:  # changed since it was closed: nobody knows whose they are
+        own = model.events
+    names = [event.name for event in own]
+    if not names:
+        return ""
+    hint = "derivatives do not see them; write phases that join at the event"
+    return f"expected a model without events, got {checks.listed(names)}; {hint}"
+
+
+def _links(phase: Phase, states: Collection[str]) -> Iterator[str]:
+    yield _unknown("link", phase.link, states, "only states are continued")
+    for name, given in phase.link.items():
+        if given is not None and not isinstance(given, str) and not callable(given):
+            what = f"{name} as a function such as lambda before: -0.5 * before.v, a name, or None"
+            yield str(checks.refused("link", what, given, "numbers stand in start"))
+
+
+def duration_problem(T: object) -> str:
+    """What is wrong with a duration, or nothing."""
+    number = checks.as_number(T)
+    if isinstance(T, Free) or (number is not None and 0 < number < inf):
+        return ""
+    hint = f"write Free({T[0]!r}, {T[1]!r})" if isinstance(T, tuple) and len(T) == 2 else ""
+    return f"expected {DURATION}, got {checks.shown(T)}" + f"; {hint}" * bool(hint)
+
+
+def range_problems(where: str, given: Mapping[str, Any]) -> Iterator[str]:
+    """Values that are neither numbers nor ranges."""
+    for name, value in given.items():
+        if not is_range(value):
+            listed = isinstance(value, list) or getattr(value, "shape", None) == (2,)
+            hint = "write a tuple: (lower, upper)" if listed else ""
+            yield str(checks.refused(where, f"{name} as {RANGE}", value, hint))
+
+
+def _rate_problems(rates: Mapping[str, Any]) -> Iterator[str]:
+    """Rates are ranges: a number would be a rate to keep."""
+    for name, value in rates.items():
+        if not is_range(value) or not isinstance(value, tuple):
+            size = checks.as_number(value)
+            hint = "" if size is None else f"write ({-abs(size):g}, {abs(size):g})"
+            yield str(checks.refused("rates", f"{name} as (lower, upper)", value, hint))
+
+
+def freed(names: Iterable[str]) -> str:
+    """How a number of a law or a scene becomes a parameter."""
+    return f"free it where the model is made: drive(law, free={list(names)!r})"
+
+
+def _no_signal(model: Model, given: Iterable[str], fleeting: Collection[str]) -> str:
+    """What to do about names that are no signals."""
+    if {"t", "T"} & set(given):
+        return "durations are T of the phases, and durations=... of the problem"
+    if set(fleeting) & set(given):
+        return "an input holds on intervals; with rates=... it has a value at a time"
+    parameters = {v.name for v in model.p} & set(given)
+    return "parameters stand in p or choose" if parameters else ""
+
+
+def _not_rated(model: Model, given: Iterable[str]) -> str:
+    signals = {*model.signals} & set(given)
+    return "only inputs have rates that are chosen" if signals else ""
+
+
+def _parameter_problems(where: str, given: Mapping[str, Any], known: list[str]) -> Iterator[str]:
+    yield _unknown(where, given, known, freed(given))
+    for name, value in given.items():
+        yield message(checks.number, f"{where}: {name}", value)
+
+
+def _parameters(problem: Statement) -> list[str]:
+    """Parameters of all models, and references of costs."""
+    found: list[str] = []
+    for phase in problem.chain:
+        found += [v.name for v in phase.model.p]
+        found += references_of(phase.model, costs_of(problem, phase))
+    return list(dict.fromkeys(found))
+
+
+def _for_all_phases(problem: Statement) -> Iterator[str]:
+    """Fields of the problem about all phases: some phase must have the names."""
+    models = [phase.model for phase in problem.chain]
+    inputs = list(dict.fromkeys(v.name for model in models for v in model.u))
+    signals = list(dict.fromkeys(n for m in models for n in names_of(m, problem.bounds)))
+    hint = next((h for m in models if (h := _no_signal(m, problem.bounds, ()))), "")
+    yield _unknown("bounds", problem.bounds, signals, hint)
+    yield from range_problems("bounds", problem.bounds)
+    hint = next((h for m in models if (h := _not_rated(m, problem.rates))), "")
+    yield _unknown("rates", problem.rates, inputs, hint)
+    yield from _rate_problems(problem.rates)
+    yield from _parameter_problems("p", problem.p, _parameters(problem))
+    yield _unknown("shared", problem.shared or (), inputs, "only inputs are shared")
+    first, last = (problem.chain[k] for k in (0, -1))
+    ends = [
+        {*(v.name for v in phase.model.x), *phase.rates, *(set(problem.rates) & set(inputs))}
+        for phase in (first, last)
+    ]
+    both = [
+        name for name in (*(v.name for v in first.model.x), *inputs) if name in ends[0] & ends[1]
+    ]
+    yield _unknown("periodic", problem.periodic, both, "only states are periodic")
+
+
+def _choices(problem: Statement) -> Iterator[str]:
+    parameters = {v.name: v for phase in problem.chain for v in phase.model.p}
+    yield _unknown("choose", problem.choose, parameters, freed(problem.choose))
+    for name, given in problem.choose.items():
+        where = f"choose: expected {name} as (lower, upper) or (lower, upper, guess)"
+        pair: Any = given
+        if not isinstance(pair, tuple) or len(pair) not in (2, 3) or not is_range(pair[:2]):
+            yield f"{where} with lower < upper and None for no bound, got {checks.shown(given)}"
+            continue
+        low, high = as_box(pair[:2])
+        if low == high:
+            yield f"{where}, got the one number {low:g}; a value that is given stands in p"
+        if len(pair) == 3 and not (is_number(pair[2]) and low <= pair[2] <= high):
+            yield f"{where} with a guess between, got {checks.shown(given)}"
+        v = parameters.get(name)
+        if v is not None and max(low, v.lower) >= min(high, v.upper):
+            yield f"{where} within [{v.lower:g}, {v.upper:g}] {v.unit}, got {checks.shown(given)}"
+        fixed = [s for s, values in problem.scenarios.items() if name in values]
+        if fixed:
+            yield (
+                f"choose: expected {name} to be chosen once for all, got a value of its own in "
+                f"scenario {', '.join(fixed)}"
+            )
+
+
+def _scenarios(problem: Statement) -> Iterator[str]:
+    known = _parameters(problem)
+    for name, values in problem.scenarios.items():
+        yield from _parameter_problems(f"scenario '{name}'", values, known)
+
+
+def _durations(problem: Statement) -> Iterator[str]:
+    phases = problem.chain
+    for numbers, total in problem.durations:
+        where = f"durations of {checks.shown(numbers)}"
+        text = duration_problem(total)
+        yield f"{where}: {text}" if text else ""
+        try:
+            which = [checks.count(where, n, least=0, most=len(phases) - 1) for n in numbers]
+        except ValueError as error:
+            yield f"{error}; phases are counted from 0"
+            continue
+        if len(set(which)) < len(which) or not which:
+            yield f"{where}: expected numbers of phases, each once"
+            continue
+        parts = [phases[n].T for n in which]
+        if text or any(map(duration_problem, parts)):
+            continue
+        low, high = (sum(_side(T, side) for T in parts) for side in ("lower", "upper"))
+        if max(low, _side(total, "lower")) > min(high, _side(total, "upper")) * (1 + 1e-12):
+            yield (
+                f"{where}: expected a sum that the phases can have, {low:g} to {high:g} s, got "
+                f"{_side(total, 'lower'):g} to {_side(total, 'upper'):g} s"
+            )
+
+
+def _side(T: float | Free, side: str) -> float:
+    return getattr(T, side) if isinstance(T, Free) else float(T)
+
+
+def _cost_problems(problem: Statement) -> Iterator[str]:
+    if problem.cost is None and all(phase.cost is None for phase in problem.chain):
+        yield f"expected {COST}, got None"
+    for where, phase in labelled_phases(problem):
+        if phase.cost is not None and phase.cost.largest:
+            yield f"{where}cost: expected worst(...) in the cost of the problem, got it in a phase"
+    given = {*problem.p, *(name for values in problem.scenarios.values() for name in values)}
+    for where, phase in labelled_phases(problem):
+        for name in references_of(phase.model, costs_of(problem, phase)):
+            if name not in given and name not in phase.p:
+                known = [*phase.model.signals, *(v.name for v in phase.model.p)]
+                text = _unknown(f"{where}track", [name], known)
+                yield f"{text}; or give its value: p={{{name!r}: ...}}"
+
+
+def doubts(problem: Statement) -> str:
+    """Sentences about values far from the nominal ones, which are likely mistakes of units.
+
+    A value to meet that is `FAR` times the `nominal` of its variable, and an input that may have no
+    more than a `FAR`th of it.
+    """
+    return " ".join(dict.fromkeys(_doubtful(problem)))
+
+
+def _doubtful(problem: Statement) -> Iterator[str]:
+    for one in settings_of(problem):
+        inputs = {v.name: v for v in one.model.u}
+        known = {v.name: v for v in (*one.model.x, *one.model.z)} | inputs
+        for place, ranges in (("start", one.phase.start), ("end", one.phase.end)):
+            for name, wanted in ranges.items():
+                least = min(map(abs, as_box(wanted)))
+                if name in known and isfinite(least) and least >= FAR * known[name].nominal:
+                    yield _sentence(f"{one.where}{place}", known[name], least)
+        for name, wanted in one.bounds.items():
+            most = max(map(abs, as_box(wanted)))
+            if name in inputs and 0 < most <= inputs[name].nominal / FAR:
+                yield _sentence(f"{one.where}bounds", inputs[name], most)
+
+
+def _sentence(where: str, of: Variable, size: float) -> str:
+    times = size / of.nominal
+    factor = f"{times:.0f} times" if times > 1 else f"{1 / times:.0f} times less than"
+    return (
+        f"{where}: {of.name} = {size:g} {of.unit} is {factor} its nominal {of.nominal:g} "
+        f"{of.unit}: check the unit."
+    )

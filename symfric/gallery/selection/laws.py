@@ -1,0 +1,163 @@
+"""The eleven laws, in the paper's order and with its names, and what its tables print of them.
+
+A number that is mistyped here or in a scene makes a figure refuse.
+"""
+
+from collections.abc import Mapping
+from math import inf
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy import float64
+from numpy.typing import NDArray
+
+from symfric import Awrejcewicz, BengisuAkay, Karnopp, Law, Threlfall, VelocityBased
+from symfric.foundation.panels import grid
+from symfric.foundation.style import colour
+from symfric.gallery.drawing import REFERENCE
+from symfric.gallery.selection.tables import PRINTED
+from symfric.gallery.signals import rms
+from symfric.scenes import jing_mi
+
+Array = NDArray[float64]
+
+LAWS: dict[str, Law] = {name: row.law() for name, row in PRINTED.items()}
+LAWS["Karnopp"] = Karnopp(form="event")
+"""With the numbers of the library; a preset gives each those of the paper."""
+ORIGINAL: dict[str, Law] = {
+    "Threlfall": Threlfall(form="original"),
+    "Bengisu": BengisuAkay(form="original"),
+    "Velocity-based": VelocityBased(form="original"),
+    "Awrejcewicz": Awrejcewicz(form="original"),
+}
+"""The laws that `LAWS` has in a smooth form, in pieces as they were published."""
+BEHIND: dict[str, Any] = {**REFERENCE, "linewidth": 2.4}
+DOTTED: dict[str, Any] = {"color": "k", "linestyle": ":", "linewidth": 0.9}
+QUICK = ("Smooth", "Karnopp", "LuGre")
+"""Who stands for all at reduced size."""
+SLIDING = ("Smooth", "Threlfall", "Dahl")
+"""Laws without a static level."""
+BRISTLES = ("LuGre", "Elasto-plastic", "Stick-slip", "Gonthier")
+"""Laws with a static level and states."""
+
+TABLE_4 = {name: 100 * row.S4 for name, row in PRINTED.items()}
+"""Printed S x 100 [m] of the block on the belt."""
+TABLE_8 = {name: 100 * row.S8 for name, row in PRINTED.items()}
+"""Printed S x 100 [m] of the box."""
+
+
+FORMS = LAWS | {f"{name}, original": law for name, law in ORIGINAL.items()}
+"""Every law in every form that is drawn."""
+
+
+def law_of(name: str) -> str:
+    """The law whose form `name` is."""
+    return name.partition(",")[0]
+
+
+def forms(names: tuple[str, ...]) -> tuple[str, ...]:
+    """These laws, and the original forms of those that have one."""
+    return (*names, *(name for name in FORMS if name not in LAWS and law_of(name) in names))
+
+
+def chosen(quick: bool) -> tuple[str, ...]:
+    """The laws of a figure."""
+    return QUICK if quick else tuple(LAWS)
+
+
+def small_multiples(
+    curves: Mapping[str, tuple[Array, Array]],
+    reference: tuple[Array, Array],
+    label: str,
+    limits: tuple[float, float] = (-inf, inf),
+) -> Figure:
+    """A panel per law, exact dry friction behind each; the kinds of laws by colour.
+
+    Beside its name is the root mean square distance from exact dry friction; the original form of a
+    law that is smooth here is dotted.
+    """
+    unit = label[label.index("[") + 1 : -1]
+    dotted = {law_of(name): curve for name, curve in curves.items() if name not in LAWS}
+    curves = {name: curve for name, curve in curves.items() if name in LAWS}
+    columns = 3 if len(curves) > 3 else 2
+    rows = -(-(len(curves) + 1) // columns)
+    figure, axes = grid(rows, columns, height=0.9 + 1.45 * rows, sharex=True, sharey=True)
+    places = [axis for row in axes for axis in row]
+    for axis, (name, (t, y)) in zip(places, curves.items(), strict=False):
+        axis.plot(*reference, **BEHIND)
+        axis.plot(t, y, color=colour(kind(name)), linewidth=1.1)
+        if name in dotted:
+            axis.plot(*dotted[name], **DOTTED)
+        axis.set_title(name, fontsize="medium", loc="left", pad=3)
+        off = rms(y - reference[1])
+        axis.set_title(
+            f"rms {off:.2g} {unit}", fontsize="x-small", loc="right", pad=3, color="0.35"
+        )
+    if limits[0] > -inf:
+        places[0].set_ylim(*limits)
+    for axis in places[len(curves) :]:
+        axis.axis("off")
+    for axis in places[len(curves) - columns : len(curves)]:  # nothing stands below these
+        axis.tick_params(labelbottom=True)
+    _legend(places[len(curves)], bool(dotted))
+    figure.supxlabel("time [s]", fontsize="medium")
+    figure.supylabel(label, fontsize="medium")
+    return figure
+
+
+def kind(name: str) -> int:
+    """0: no static level; 1: static level, no states; 2: static level and states."""
+    return 0 if name in SLIDING else 2 if name in BRISTLES else 1
+
+
+def _legend(axis: Axes, originals: bool) -> None:
+    axis.plot([], [], label="exact dry friction", **BEHIND)
+    if originals:
+        axis.plot([], [], label="original form", **DOTTED)
+    for k, text in enumerate(("no static level", "static level", "static level, states")):
+        axis.plot([], [], color=colour(k), label=text)
+    axis.legend(loc="center", frameon=False, fontsize="small")
+
+
+PRINTED_S = {
+    "4": "12.7889 11.6026 13.8757 13.9528 13.8141 12.5478 13.4439 15.0088 14.5011 13.3829 14.6707",
+    "8": "5.8842 6.4755 6.7982 7.0905 3.7149 7.1542 6.8376 6.2963 3.3126 1.4088 5.3765",
+}
+"""S(x 10^2) [m] of tables 4 and 8."""
+PRINTED_NUMBERS = {
+    "3": (jing_mi.BELT, "0.1 0.15 1e-3 1e-3 1e5 190 1e-7 1e-6 0.1 | 1e-3 1.5e-3 1e-3 1e-4"),
+    "7": (jing_mi.BOX, "0.02 0.03 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 5e-4 0.06 1e-5 1e-6"),
+    "7, pendulum": (
+        jing_mi.HINGE, "0.002 0.003 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 1e-3 1e-2 1e-5 1e-6"
+    ),
+}  # fmt: skip
+"""Table -> the numbers of the scene, and its rows as printed, in the order of `ROWS`; behind the
+bar those of `OURS`, as `scenes.jing_mi` says that it reads them."""
+ROWS = (
+    "Smooth.mu_d", "Stick-slip.mu_s", "Smooth.v_eps", "LuGre.v_s", "LuGre.sigma_0",
+    "LuGre.sigma_1", "Elasto-plastic.z_ba", "Stick-slip.D_max", "Gonthier.tau_dw",
+)  # fmt: skip
+OURS = ("Velocity-based.v_s", "Velocity-based.v_d", "Gonthier.v_s", "Gonthier.v_d")
+
+
+def agree(*tables: str) -> dict[str, bool]:
+    """Whether the figures are computed with the numbers of these tables."""
+    found: dict[str, bool] = {}
+    for table in tables:
+        if table in PRINTED_S:
+            mine = [100 * float(getattr(row, f"S{table}")) for row in PRINTED.values()]
+            found[f"S is that of table {table}"] = _same(PRINTED_S[table], mine)
+            continue
+        numbers, text = PRINTED_NUMBERS[table]
+        laws = {name: numbers.given(law) for name, law in LAWS.items()}
+        mine = [
+            float(getattr(laws[name], field))
+            for name, _, field in (where.rpartition(".") for where in (*ROWS, *OURS))
+        ]
+        found[f"the numbers are those of table {table}"] = _same(text.replace("|", ""), mine)
+    return found
+
+
+def _same(text: str, values: list[float]) -> bool:
+    return [float(word) for word in text.split()] == [float(f"{v:.9g}") for v in values]
