@@ -45,8 +45,16 @@ class Job:
 
 
 def numbers(source: str, name: str) -> Iterator[ast.Constant]:
-    """The numbers in the assignments to `name`, also in a class, in the order of the text."""
-    for node in ast.walk(ast.parse(source)):
+    """The numbers in the assignments to `name`, also in a class, in the order of the text.
+
+    "Class.name" is that of one class.
+    """
+    owner, _, name = name.rpartition(".")
+    tree: ast.AST = ast.parse(source)
+    if owner:
+        classes = (n for n in ast.walk(tree) if isinstance(n, ast.ClassDef))
+        tree = next(n for n in classes if n.name == owner)
+    for node in ast.walk(tree):
         targets = (
             node.targets
             if isinstance(node, ast.Assign)

@@ -15,24 +15,19 @@ Source: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, c
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.symbols import stacked, symbols_of
+from symfric.model.contact import APPLIED, Contact
+from symfric.model.start import System
 
-if TYPE_CHECKING:
-    from symfric.model.contact import Contact
-    from symfric.model.model import Model
-
-APPLIED = "F_e"
-"""The applied force among the inputs of a law."""
 STICKS = 0.5
 """A mode, which is -1, 0 or 1 but for what error control adds, below which a contact sticks."""
 
 
-def completed(model: "Model") -> "tuple[Contact, ...]":
+def completed(model: System) -> tuple[Contact, ...]:
     """Return the contacts of an open model with `F_e`, `rest` and `bare` where none was given.
 
     Raises:
@@ -48,7 +43,7 @@ def completed(model: "Model") -> "tuple[Contact, ...]":
     )
 
 
-def _named(c: "Contact", count: int) -> "Contact":
+def _named(c: Contact, count: int) -> Contact:
     if c.bare is not None:
         return c
     named = replace(c, bare=count == 1)
@@ -58,18 +53,18 @@ def _named(c: "Contact", count: int) -> "Contact":
     return replace(named, states=states)
 
 
-def _complete(c: "Contact") -> bool:
+def _complete(c: Contact) -> bool:
     return APPLIED in c.given or all(i.name != APPLIED for i in c.law.inputs)
 
 
-def _mode(c: "Contact") -> ca.SX | None:
+def _mode(c: Contact) -> ca.SX | None:
     """Return the mode of a law that sticks, 0 at rest; None for a law without one."""
     modes = [v.symbol for s, v in zip(c.law.states, c.states, strict=True) if s.whole]
     needs = any(i.name == APPLIED for i in c.law.inputs)
     return modes[0] if needs and modes else None
 
 
-def _resting(c: "Contact", model: "Model") -> "Contact":
+def _resting(c: Contact, model: System) -> Contact:
     """Set a state in which the slip is linear to the value where the slip vanishes.
 
     Of several it is the one in the fewest sliding velocities, since a reset moves those, too.
@@ -84,7 +79,7 @@ def _resting(c: "Contact", model: "Model") -> "Contact":
     return replace(c, rest={v.name: -ca.substitute(slip, v.symbol, ca.SX(0)) / slopes[v]})
 
 
-def _applied(i: int, contacts: "tuple[Contact, ...]", model: "Model") -> ca.SX:
+def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
     """Solve for the force of contact `i` that keeps its sliding velocity."""
     if model.ode is None:
         raise _refused(contacts[i], "explicit equations, ode")
@@ -113,13 +108,13 @@ def _applied(i: int, contacts: "tuple[Contact, ...]", model: "Model") -> ca.SX:
     return found
 
 
-def _change(c: "Contact", model: "Model") -> ca.SX:
+def _change(c: Contact, model: System) -> ca.SX:
     """Return the rate of the sliding velocity."""
     slip, ode = ca.SX(c.slip), ca.SX(0, 1) if model.ode is None else model.ode
     return ca.jtimes(slip, symbols_of(model.x), ode) + ca.jacobian(slip, model.t)
 
 
-def _row(c: "Contact", model: "Model") -> ca.SX:
+def _row(c: Contact, model: System) -> ca.SX:
     """Return the equation of a contact that does what it does, = 0."""
     mode = _mode(c)
     if mode is None:
@@ -158,7 +153,7 @@ def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
     return rows[n - 1, n] / pivot if pivot.nnz() else None
 
 
-def _refused(c: "Contact", expected: str) -> ValueError:
+def _refused(c: Contact, expected: str) -> ValueError:
     return checks.refused(
         f"contact '{c.name}': {APPLIED}", expected, None,
         f"give it by name, as in contact(..., {APPLIED}=pull): the sum of all other forces along "

@@ -6,34 +6,30 @@ variables z, inputs u, parameters p.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import checks, packed
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown
-from symfric.foundation.symbols import stacked, symbols_of
-from symfric.model.accelerations import accelerations
-from symfric.model.contact import Contact, closed, opened, reopened, with_forces
+from symfric.foundation.symbols import stacked
+from symfric.model.forces import closed, opened, reopened, with_forces
 from symfric.model.holonomic import Holonomic
-from symfric.model.parts import Event, Monitor, Output
+from symfric.model.parts import Monitor, Output
 from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
 from symfric.model.shown import shown
-from symfric.model.sketch import Sketch
-from symfric.model.start import Starting
+from symfric.model.start import System, accelerations
 
 Variables = tuple[Variable, ...]
 """Variables in their order; () for none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(Showing, Starting):
+class Model(Showing, System):
     """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
 
     Explicit form (semi-explicit DAE of index 1; an ODE where there is no z):
@@ -73,23 +69,6 @@ class Model(Showing, Starting):
             `ode` or `alg` beside `holonomic` that is not made of it.
     """
 
-    name: str
-    x: Variables = ()
-    z: Variables = ()
-    u: Variables = ()
-    p: Variables = ()
-    ode: ca.SX | None = None
-    alg: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    residual: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
-    monitors: tuple[Monitor, ...] = ()
-    events: tuple[Event, ...] = ()
-    t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
-    holonomic: Holonomic | None = None
-    details: Callable[[], Mapping[str, Output]] = dict[str, Output]
-    sketch: Callable[[], Sketch] | None = None
-    contacts: tuple[Contact, ...] = ()
     opening: "Callable[[], Model] | None" = None
 
     def __post_init__(self) -> None:
@@ -146,7 +125,8 @@ class Model(Showing, Starting):
         alg: Scalar | None = None, monitors: tuple[Monitor, ...] = (),
     ) -> "Model":  # fmt: skip
         """The same model with other friction forces than those of its laws: see `with_forces`."""
-        return with_forces(self, forces, p, z, alg, monitors)
+        bare = self.open
+        return replace(bare, **with_forces(self, bare, forces, p, z, alg, monitors))
 
     def _take(self, mechanics: Holonomic) -> None:
         """Make `ode` and `alg` of the equations of a mechanism."""
@@ -190,18 +170,6 @@ class Model(Showing, Starting):
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all that the model says, in symbols that stay themselves."""
         return packed.loads, (packed.dumps(self),)
-
-    def vector(self, letter: str) -> ca.SX:
-        """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
-        return self._vectors[letter]
-
-    @cached_property
-    def _vectors(self) -> dict[str, ca.SX]:
-        return {letter: symbols_of(getattr(self, letter)) for letter in "xzup"}
-
-    def nominal(self, letter: str) -> NDArray[np.float64]:
-        """Typical magnitudes of a group, shape (n,)."""
-        return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
 
     @cached_property
     def signals(self) -> dict[str, str]:
@@ -272,42 +240,6 @@ class Model(Showing, Starting):
             known |= {name: ca.SX(output.expression) for name, output in self.further.items()}
         check_names(f"model '{self.name}'", [what], [*known, "residual"])
         return ca.Function(what, [t, x, z, u, p], [known[what]], ["t", "x", "z", "u", "p"], [what])
-
-    def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
-        """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
-        group: Variables = getattr(self, letter)
-        if not group and given is None:
-            return np.zeros(0)
-        values = self.named(letter, given)
-        for v in self.p if letter == "p" else ():
-            if v.name in values:
-                v.within(f"{self.name}.{v.name}", values[v.name])
-        numbers = {v.name: v.start for v in group} | values
-        return np.array(
-            [checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()], float
-        )
-
-    def named(self, what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
-        """What a user `given` by name for "x0", "u" or "p"; nothing for None.
-
-        Raises:
-            ValueError: no mapping, or a name that is not in the group.
-        """
-        if given is None:
-            return {}
-        known = [v.name for v in getattr(self, what[0])]
-        values = checks.named(f"model '{self.name}' {what}", given)
-        fixed = ", ".join(f'"{name}"' for name in values if name not in known)
-        ways = {
-            "p": f"free it when the model is made, rabinowicz(law, free=[{fixed}]), or with "
-            f"symbolise(law, {fixed}) and Model(p=...)",
-            "u": "the model has no inputs" * (not known),
-        }
-        hint = ways.get(what, "")
-        if what == "x0" and not {v.name for v in self.z}.isdisjoint(values):
-            hint = "algebraic variables follow from their equations"
-        checks.check_names(f"model '{self.name}' {what}", values, known, hint)
-        return values
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:

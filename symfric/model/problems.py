@@ -1,7 +1,7 @@
 """What may be wrong with a model: kinds of its parts, names, rows, undeclared symbols."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
@@ -10,9 +10,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import starts_of, strays
 from symfric.model.contact import Contact
 from symfric.model.parts import Event, Monitor, Output
-
-if TYPE_CHECKING:
-    from symfric.model.model import Model
+from symfric.model.start import System
 
 RESERVED = {"t", "ode", "alg", "residual", "signals"}
 """Names that `Model.function` uses itself."""
@@ -26,12 +24,12 @@ GROUPS: dict[str, tuple[type, str]] = {
 """Groups of a model: what they consist of."""
 
 
-def kind_problems(model: "Model") -> list[str]:
+def kind_problems(model: System) -> list[str]:
     """Parts that are not of the kind they should be; without these nothing else can be asked."""
     return [text for text in _wrong_kinds(model) if text]
 
 
-def _wrong_kinds(model: "Model") -> Iterator[str]:
+def _wrong_kinds(model: System) -> Iterator[str]:
     yield _said(checks.line, "name", model.name)
     for name, (kind, what) in GROUPS.items():
         yield _said(_group, name, getattr(model, name), kind, what)
@@ -81,7 +79,7 @@ def _column(where: str, value: Any) -> None:
         raise ValueError(f"{where}: expected a column, got a row; write casadi.vertcat(...)")
 
 
-def naming_problems(model: "Model") -> list[str]:
+def naming_problems(model: System) -> list[str]:
     """Names that are repeated, reserved or no identifiers, or stand for nothing."""
     problems: list[str] = []
     names = [v.name for group in (model.x, model.z, model.u, model.p) for v in group]
@@ -112,7 +110,7 @@ def naming_problems(model: "Model") -> list[str]:
     return problems
 
 
-def equation_problems(model: "Model", known: ca.SX) -> list[str]:
+def equation_problems(model: System, known: ca.SX) -> list[str]:
     """Row counts that do not fit, and symbols that are not among the `known`."""
     nx, nz = len(model.x), len(model.z)
     problems: list[str] = []
@@ -166,7 +164,7 @@ def _declare(stray: list[str], known: ca.SX) -> str:
     return "declare them as x, z, u or p"
 
 
-def _start_problems(model: "Model", known: ca.SX) -> Iterator[str]:
+def _start_problems(model: System, known: ca.SX) -> Iterator[str]:
     """Start values that need each other, or what nobody declared."""
     starts = ca.SX(starts_of(model.x))
     if starts.is_constant():

@@ -1,12 +1,8 @@
 """How a model shows itself: what it consists of, without its expressions."""
 
-from typing import TYPE_CHECKING
-
+from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import Shown, Table, among, counted, figure_of
-
-if TYPE_CHECKING:
-    from symfric.foundation.parameters import Variable
-    from symfric.model.model import Model
+from symfric.model.start import System
 
 GROUPS = {
     "x": ("state", "states"),
@@ -16,7 +12,7 @@ GROUPS = {
 }
 
 
-def shown(model: "Model") -> Shown:
+def shown(model: System) -> Shown:
     """Names, units and start values of everything, and where there is friction by which law."""
     counts = [counted(len(getattr(model, g)), *words) for g, words in GROUPS.items()]
     counts += [counted(len(model.outputs), "output")]
@@ -27,27 +23,27 @@ def shown(model: "Model") -> Shown:
     )
 
 
-def _rows(model: "Model") -> list[tuple[str, ...]]:
+def _rows(model: System) -> list[tuple[str, ...]]:
     rows = [_row(v, one) for g, (one, _) in GROUPS.items() for v in getattr(model, g)]
     return rows + [(name, "output", o.unit, "", o.doc) for name, o in model.outputs.items()]
 
 
-def _row(v: "Variable", what: str) -> tuple[str, ...]:
+def _row(v: Variable, what: str) -> tuple[str, ...]:
     return v.name, what, v.unit, figure_of(v.start), v.doc
 
 
-def _after(model: "Model") -> list[str]:
+def _after(model: System) -> list[str]:
     found = list[str]()
     if model.contacts:
         found.append(f"friction: {friction(model)}")
     if model.events:
         found.append(f"events: {among(e.name for e in model.events)}")
     if "further" in model.__dict__:
-        found.append(f"further results: {among(model.further)}")
+        found.append(f"further results: {among(model.__dict__['further'])}")
     return found
 
 
-def friction(model: "Model") -> str:
+def friction(model: System) -> str:
     """Where there is friction by which law: "belt by LuGre"; all contacts of a law together."""
     laws: dict[str, list[str]] = {}
     for contact in model.contacts:

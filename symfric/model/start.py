@@ -1,7 +1,7 @@
-"""Where the states of a model start: numbers, and expressions in other states and parameters."""
+"""The parts of a model, and where its states start: numbers, or expressions in other values."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,29 +13,83 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, starts_of, symbols_of
+from symfric.model.contact import Contact, Variables
+from symfric.model.holonomic import Holonomic
+from symfric.model.parts import Event, Monitor, Output
+from symfric.model.sketch import Sketch
+
+PER_SECOND = {"m/s": "m/s^2", "rad/s": "rad/s^2", "1/s": "1/s^2"}
 
 
-class Starting(ABC):
-    """What a model says of its start; it has the groups of variables and their numbers."""
+@dataclass(frozen=True, eq=False, repr=False)
+class System:
+    """Variables, equations and results of a model, see `Model`; and where its states start."""
 
     name: str
-    x: tuple[Variable, ...]
-    z: tuple[Variable, ...]
-    p: tuple[Variable, ...]
-    u: tuple[Variable, ...]
-    t: ca.SX
+    x: Variables = ()
+    z: Variables = ()
+    u: Variables = ()
+    p: Variables = ()
+    ode: ca.SX | None = None
+    alg: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    residual: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
+    monitors: tuple[Monitor, ...] = ()
+    events: tuple[Event, ...] = ()
+    t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
+    holonomic: Holonomic | None = None
+    details: Callable[[], Mapping[str, Output]] = dict[str, Output]
+    sketch: Callable[[], Sketch] | None = None
+    contacts: tuple[Contact, ...] = ()
 
-    @abstractmethod
     def vector(self, letter: str) -> ca.SX:
-        """The symbols of a group as a column (n, 1)."""
+        """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
+        return self._vectors[letter]
 
-    @abstractmethod
+    @cached_property
+    def _vectors(self) -> dict[str, ca.SX]:
+        return {letter: symbols_of(getattr(self, letter)) for letter in "xzup"}
+
+    def nominal(self, letter: str) -> NDArray[np.float64]:
+        """Typical magnitudes of a group, shape (n,)."""
+        return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
+
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
-        """Numbers of the group "u" or "p"."""
+        """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
+        group: Variables = getattr(self, letter)
+        if not group and given is None:
+            return np.zeros(0)
+        values = self.named(letter, given)
+        for v in self.p if letter == "p" else ():
+            if v.name in values:
+                v.within(f"{self.name}.{v.name}", values[v.name])
+        numbers = {v.name: v.start for v in group} | values
+        return np.array(
+            [checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()], float
+        )
 
-    @abstractmethod
     def named(self, what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
-        """What a user gave by name."""
+        """What a user `given` by name for "x0", "u" or "p"; nothing for None.
+
+        Raises:
+            ValueError: no mapping, or a name that is not in the group.
+        """
+        if given is None:
+            return {}
+        known = [v.name for v in getattr(self, what[0])]
+        values = checks.named(f"model '{self.name}' {what}", given)
+        fixed = ", ".join(f'"{name}"' for name in values if name not in known)
+        ways = {
+            "p": f"free it when the model is made, rabinowicz(law, free=[{fixed}]), or with "
+            f"symbolise(law, {fixed}) and Model(p=...)",
+            "u": "the model has no inputs" * (not known),
+        }
+        hint = ways.get(what, "")
+        if what == "x0" and not {v.name for v in self.z}.isdisjoint(values):
+            hint = "algebraic variables follow from their equations"
+        checks.check_names(f"model '{self.name}' {what}", values, known, hint)
+        return values
 
     def initial_state(
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
@@ -184,3 +238,30 @@ def start_function(
         values = ca.substitute(values, states, values)
     arguments = [known, chosen, u, p, t]
     return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p", "t"], ["x"])
+
+
+def accelerations(model: System) -> dict[str, Output]:
+    """`<q>_acc` for every state q whose rate is a state r: the rate of r, as an expression.
+
+    A speed that is the rate of no state, as where angles do not matter, has `<speed>_acc`; states
+    of friction laws have none, and neither have implicit models, whose rates are no expressions.
+    """
+    if model.ode is None:
+        return {}
+    places = {v.symbol.__hash__(): i for i, v in enumerate(model.x)}
+    of_laws = {v.name for contact in model.contacts for v in contact.states}
+    found: dict[str, Output] = {}
+    rates = ca.vertsplit(ca.densify(model.ode))
+    # a symbol is told by its node, which it shares with what it was taken from
+    pairs = [(v, places.get(r.__hash__()) if r.is_symbolic() else None)
+             for v, r in zip(model.x, rates, strict=True)]  # fmt: skip
+    taken = {i for _, i in pairs if i is not None}
+    for k, (v, i) in enumerate(pairs):
+        alone = k not in taken and v.unit in ("m/s", "rad/s") and v.name not in of_laws
+        if i is None and not alone:
+            continue
+        r = k if i is None else i
+        unit = model.x[r].unit
+        unit = PER_SECOND.get(unit, f"{unit}/s" if unit else "")
+        found[f"{v.name}_acc"] = Output(model.ode[r], unit, f"acceleration of {v.name}")
+    return found

@@ -105,7 +105,7 @@ HELD = (
         ("tests/symfric/laws/base/test_given.py",),
     ),
     Mutant(
-        "an acceleration is the rate", "symfric/model/accelerations.py",
+        "an acceleration is the rate", "symfric/model/start.py",
         "Output(model.ode[r], unit", "Output(model.ode[k], unit", T_ACCELERATIONS,
     ),
     Mutant(

@@ -52,12 +52,12 @@ TOLD = (
         "return dict(self.signals)", results("trajectory"),
     ),
     Mutant(
-        "an acceleration has the unit of its velocity", "symfric/model/accelerations.py",
+        "an acceleration has the unit of its velocity", "symfric/model/start.py",
         'PER_SECOND.get(unit, f"{unit}/s" if unit else "")', "unit",
         ("tests/symfric/model/test_accelerations.py",),
     ),
     Mutant(
-        "states of laws have accelerations", "symfric/model/accelerations.py",
+        "states of laws have accelerations", "symfric/model/start.py",
         "and v.name not in of_laws", "and True", ("tests/symfric/model/test_accelerations.py",),
     ),
     Mutant(

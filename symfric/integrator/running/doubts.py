@@ -33,8 +33,8 @@ from symfric.integrator.running.gains import gains
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.model import Model
-from symfric.model.contact import Contact, by_laws
-from symfric.model.holding import APPLIED
+from symfric.model.contact import APPLIED, Contact
+from symfric.model.forces import by_laws
 
 Array = NDArray[np.float64]
 MARGIN = 0.05

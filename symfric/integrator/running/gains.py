@@ -25,7 +25,8 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.model import Model
-from symfric.model.contact import Contact, by_laws
+from symfric.model.contact import Contact
+from symfric.model.forces import by_laws
 
 Array = NDArray[np.float64]
 SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])

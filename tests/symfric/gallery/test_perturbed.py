@@ -32,7 +32,7 @@ TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         ("symfric/gallery/generalized_maxwell_slip/laws.py", name, GMS)
         for name in ("F_S", "SIGMA_0", "DELTA_L", "ELEMENTS", "LIFE", "PERIOD")
     ),
-    *(("symfric/scenes/prescribed.py", name, GMS) for name in ("_CURVE", "_BRISTLE", "_LEVELS")),
+    *(("symfric/scenes/rigs.py", name, GMS) for name in ("_CURVE", "_BRISTLE", "_LEVELS")),
     ("symfric/gallery/quarter_car_friction/rig.py", "M_B", CAR),
     ("symfric/gallery/quarter_car_friction/rig.py", "THETA", CAR),
     ("symfric/gallery/quarter_car_friction/readings.py", "RESIDUAL", CAR),
@@ -45,31 +45,31 @@ TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 )
 """File, what is assigned there, and which figures depend on it."""
 MACHINES = {
-    "symfric/scenes/four_mass.py": (("m_1", "m_3", "k", "k_4", "v_4", "g"), FOUR),
+    "symfric/scenes/spatial.py": (
+        tuple(f"FourMass.{name}" for name in ("m_1", "m_3", "k", "k_4", "v_4", "g")), FOUR
+    ),
     "symfric/scenes/slider_crank.py": (
         ("m_crank", "m_slider", "J", "r", "l", "b", "c", "e", "a", "R", "omega", "g"), CRANK
     ),
-    "symfric/scenes/quarter_car.py": (("L_d", "middle"), CAR),
-    "symfric/laws/static/exponential.py": (("F_S", "F_C", "sigma_2", "delta"), NIPS),
+    "symfric/scenes/rigs.py": (("QuarterCar.L_d", "QuarterCar.middle"), CAR),
+    "symfric/laws/static/exponential.py": (
+        tuple(f"SteadyStateLuGre.{name}" for name in ("F_S", "F_C", "sigma_2", "delta")), NIPS
+    ),
 }  # fmt: skip
 """File -> fields whose defaults the figures use."""
 LAWS = {
     "static/coulomb": ("Coulomb", BOX),
-    "static/threlfall": ("Threlfall", BELT),
-    "static/piecewise": ("BengisuAkay VelocityBased", BELT),
+    "static/piecewise": ("Threlfall BengisuAkay VelocityBased", BELT),
     "static/applied_force": ("Karnopp Awrejcewicz", BELT),
-    "static/brown_mcphee": ("BrownMcPhee", FOUR),
+    "static/smooth_peak": ("BrownMcPhee", FOUR),
     "static/self_tuning": ("SelfTuning BrittleSelfTuning", ("self_tuning/fig_07", "self_tuning")),
     "static/quarter_car": ("QuarterCarGeneral QuarterCarSimple", CAR),
     "static/exponential": ("SteadyStateLuGre", NIPS),
     "dynamic/dahl": ("Dahl", GMS + BELT),
-    "dynamic/lugre": ("LuGre", GMS + BELT),
-    "dynamic/elasto_plastic": ("ElastoPlastic", GMS + BELT),
+    "dynamic/lugre": ("LuGre ElastoPlastic", GMS + BELT),
     "dynamic/stick_slip": ("StickSlip", BELT),
-    "dynamic/gonthier": ("Gonthier", BELT),
-    "dynamic/gms": ("GMS", GMS),
-    "dynamic/leuven": ("Leuven", GMS),
-    "dynamic/maxwell_slip": ("MaxwellSlip", GMS),
+    "dynamic/dwell": ("Gonthier", BELT),
+    "dynamic/maxwell_slip": ("MaxwellSlip Leuven GMS", GMS),
 }
 """File -> laws, and which figures depend on them."""
 OURS = "invented, and the same on both sides: what is said holds over its range, see the figure"
