@@ -6,8 +6,8 @@ from typing import get_args
 
 from numpy.typing import ArrayLike
 
+from ocp.checking.mesh_refinement import Goals
 from ocp.friction.homotopy import STARTS
-from ocp.job import Friction, Job
 from ocp.result.solution import Solution
 from ocp.solvers.fatrop import Fatrop
 from ocp.solvers.ipopt import Ipopt
@@ -15,6 +15,7 @@ from ocp.solvers.outcome import Report
 from ocp.solvers.sqp import Sqp
 from ocp.solving.one_solve import Clock, Solver
 from ocp.solving.starts import Start
+from ocp.strategies import Direct, Friction, ModeSearch, Verifier, solved
 from ocp.text.doubts import doubts
 from ocp.text.problem import Problem
 from ocp.text.sizes import cost_size, sized
@@ -120,12 +121,10 @@ def solve(
     posed = sized(problem)
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
-    job = Job(
-        problem=posed, scheme=scheme, solver=solver, intervals=intervals, guess=guess,
-        friction=friction, tolerance=tolerance, refine=refine, verify=verify, starts=starts,
-        resting_margin=resting_margin, progress=progress, clock=Clock(max_time),
-    )  # fmt: skip
-    solution = job.solved()
+    goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
+    direct = Direct(posed, scheme, solver, intervals, goals, Clock(max_time), progress)
+    search = ModeSearch(direct, Verifier(tolerance, verify), resting_margin)
+    solution = solved(search, friction, guess, starts)
     odd = "" if solution.ok else doubts(problem)
     if odd:
         solution = replace(solution, message=f"{solution.message} {odd}")
