@@ -19,7 +19,7 @@ from symfric.foundation import checks
 from symfric.foundation.status import SolveError
 
 if TYPE_CHECKING:
-    from ocp.job import Friction
+    from ocp.strategies import Friction
 
 OVER = "obj_scaling_factor"
 """Option of Ipopt: what it multiplies the cost by."""
@@ -96,7 +96,14 @@ def solve(
 
     Limits: a local optimum. With friction it is the best of a few starts.
     """
-    from ocp.job import Friction, Job  # noqa: PLC0415  (slow to load)
+    from ocp.checking.mesh_refinement import Goals  # noqa: PLC0415  (slow to load)
+    from ocp.strategies import (  # noqa: PLC0415  (slow to load)
+        Direct,
+        Friction,
+        ModeSearch,
+        Verifier,
+        solved,
+    )
 
     checks.kind("solve", problem, Problem, "a problem, such as Problem(Phase(model, T=1.0), cost)")
     tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
@@ -120,12 +127,10 @@ def solve(
     posed = sized(problem)
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
-    job = Job(
-        problem=posed, scheme=scheme, solver=solver, intervals=intervals, guess=guess,
-        friction=friction, tolerance=tolerance, refine=refine, verify=verify, starts=starts,
-        resting_margin=resting_margin, progress=progress, clock=Clock(max_time),
-    )  # fmt: skip
-    solution = job.solved()
+    goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
+    direct = Direct(posed, scheme, solver, intervals, goals, Clock(max_time), progress)
+    search = ModeSearch(direct, Verifier(tolerance, verify), resting_margin)
+    solution = solved(search, friction, guess, starts)
     odd = "" if solution.ok else doubts(problem)
     if odd:
         solution = replace(solution, message=f"{solution.message} {odd}")

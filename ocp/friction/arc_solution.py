@@ -144,14 +144,14 @@ class Solved:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Polisher:
+class ModeSolver:
     """What all sequences of one problem share.
 
     Attributes:
         problem: the user's.
         sizes: contact -> typical static level [N].
         at_rest: contacts that are at rest at the start.
-        solver, scheme, progress: as in `polish`.
+        solver, scheme, progress: as in `optimise_modes`.
         shortest: least duration of an arc [s].
         kick: least length of the interval in which a contact breaks away or is caught [s].
         margin: share of the static level that rests keep from it.

@@ -29,7 +29,7 @@ from ocp.checking.interval_errors import local_errors
 from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.problem import Problem
-from ocp.friction.arc_solution import Polisher, Solved, reassemble
+from ocp.friction.arc_solution import ModeSolver, Solved, reassemble
 from ocp.friction.arcs import MARGIN
 from ocp.friction.mode_models import restless
 from ocp.friction.sequence import (
@@ -137,7 +137,7 @@ class _StoppedError(Exception):
     """The user or the clock has stopped a solve: no further one is begun."""
 
 
-def polish(
+def optimise_modes(
     smooth: Solution,
     problem: Problem,
     widths: Mapping[str, float],
@@ -169,7 +169,7 @@ def polish(
         any did, without `modes`.
 
     Raises:
-        ValueError: a problem that is not polished, see `refusal`.
+        ValueError: a problem without modes, see `refusal`.
 
     Limits: the sequence is that of the sharpened motion but for rests, superfluous arcs and what
     bounds tell of: a motion of another kind is not found. Contacts whose slips depend on each
@@ -177,7 +177,7 @@ def polish(
     mode model.
     """
     if reason := refusal(problem):
-        raise ValueError(f"polish: {reason}")
+        raise ValueError(f"optimise_modes: {reason}")
     solver = solver or Ipopt()
     limits = [MOST_ITERATIONS, PATIENT]
     if "max_iter" in solver.options:
@@ -185,7 +185,7 @@ def polish(
     known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
     whole, first = known.motion.T, max(MARGIN, margin)
-    polisher = Polisher(
+    modes_solver = ModeSolver(
         problem=problem,
         sizes=sizes_of(problem, known),
         at_rest=starts_at_rest(problem, known, widths),
@@ -208,20 +208,20 @@ def polish(
     best: Solved | None = None
     with suppress(_StoppedError):
         for limit, legs in _attempts(limits, problem, known, widths):
-            patient = replace(polisher, solver=solver.with_options(max_iter=limit))
+            patient = replace(modes_solver, solver=solver.with_options(max_iter=limit))
             found = keep(patient.solve(legs, known, N, 1e-2))
             if found.ok:
                 best = found
-                best = settled(polisher, best, keep)
-                best = better(polisher, best, NEW_ARC * whole, keep)
-                best = _fine(polisher, best, keep)
+                best = settled(modes_solver, best, keep)
+                best = better(modes_solver, best, NEW_ARC * whole, keep)
+                best = _fine(modes_solver, best, keep)
                 break
     yield _solution(problem, best, tried), first
     if best is None or tried[-1].outcome.status in STOPPED or not best.pressed(first):
         return
     least = margin if margin < first else margin / CLOSER
     for closer in (least, sqrt(least * first)):
-        near, found = replace(polisher, margin=closer), None
+        near, found = replace(modes_solver, margin=closer), None
         with suppress(_StoppedError):
             found = keep(near.again(best))
             found = _fine(near, found, keep) if found.ok else found
@@ -242,7 +242,7 @@ def _solution(problem: Problem, best: Solved | None, tried: Sequence[Solved]) ->
 
 
 def refusal(problem: Problem) -> str:
-    """Why a problem has no polish, in a sentence; empty where it has one."""
+    """Why a problem has no optimise_modes, in a sentence; empty where it has one."""
     if not any(phase.model.contacts for phase in problem.chain):
         return "expected a model with contacts, got none"
     if problem.scenarios:
@@ -290,24 +290,24 @@ def _attempts(
     yield from product(limits[1:], sequences)
 
 
-def settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
+def settled(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
     """Without superfluous arcs, and with rests where contacts touch zero as they slip."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
-        legs = pruned(solved.legs, GONE * polisher.shortest)
+        legs = pruned(solved.legs, GONE * modes_solver.shortest)
         if shown(legs) == shown(solved.legs):
             legs = rests_inside(solved) or legs
         if shown(legs) in seen:
             break
         seen.add(shown(legs))
-        changed = keep(polisher.solve(legs, solved.known, solved.intervals, AGAIN))
+        changed = keep(modes_solver.solve(legs, solved.known, solved.intervals, AGAIN))
         if not changed.ok:
             break
         solved = changed
     return solved
 
 
-def better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Solved:
+def better(modes_solver: ModeSolver, solved: Solved, width: float, keep: Keep) -> Solved:
     """The best of the sequence and of those next to it."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
@@ -315,11 +315,11 @@ def better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Solv
             if shown(legs) in seen:
                 continue
             seen.add(shown(legs))
-            other = keep(polisher.solve(legs, solved.known, solved.intervals, AGAIN))
-            left = pruned(other.legs, GONE * polisher.shortest)
+            other = keep(modes_solver.solve(legs, solved.known, solved.intervals, AGAIN))
+            left = pruned(other.legs, GONE * modes_solver.shortest)
             if not other.ok or shown(left) in seen - {shown(legs)}:
                 continue
-            other = settled(polisher, other, keep)
+            other = settled(modes_solver, other, keep)
             if other.ideal_cost < solved.ideal_cost - WORTH * abs(solved.ideal_cost):
                 solved = other
                 break
@@ -328,7 +328,7 @@ def better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Solv
     return solved
 
 
-def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
+def _fine(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
     """On intervals so short that holding the inputs costs next to nothing.
 
     What that costs is estimated, well enough where two meshes agree on the cost without it. As long
@@ -355,11 +355,11 @@ def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
             t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST
         )
         parts = solved.legs, solved.discretisation, meshes
-        finer = keep(polisher.on(*parts, solved.known, 1e-4))
+        finer = keep(modes_solver.on(*parts, solved.known, 1e-4))
         if not finer.ok:  # a long way along a flat valley
-            finer = keep(polisher.on(*parts, finer.known, 1e-2))
+            finer = keep(modes_solver.on(*parts, finer.known, 1e-2))
         if not finer.ok:
             break
         before = solved.ideal_cost, solved.outcome.cost
-        solved = settled(polisher, finer, keep)
+        solved = settled(modes_solver, finer, keep)
     return solved

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
 from ocp import Problem, Solution, load, solve
-from ocp.job import Friction
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
 from ocp.solvers.methods import Fatrop, Ipopt, Sqp
+from ocp.strategies import Friction
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import completions, output

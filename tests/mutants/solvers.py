@@ -175,7 +175,7 @@ RESULTS = (
         "for v in moving.z}", "for v in held.z}", T_FALLBACK,
     ),
     Mutant(
-        "what fails among modes is raised", "ocp/job.py",
+        "what fails among modes is raised", "ocp/strategies.py",
         'said = f"Modes were not found: {_why(error)}."', "raise", T_FALLBACK,
     ),
     Mutant(

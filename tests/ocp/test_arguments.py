@@ -68,7 +68,7 @@ def test_fractions_say_how_many_intervals_layers_begin_with(
         asked.append(intervals)
         return sharpened(*given, intervals=intervals, **more)
 
-    monkeypatch.setattr("ocp.job.sharpened", seen)
+    monkeypatch.setattr("ocp.strategies.sharpened", seen)
     for intervals in (None, 25, np.int64(25), np.linspace(0, 1, 31), [[0.0, 0.5, 1.0]]):
         solve(move(NARROW), intervals=intervals, max_time=1e-3, throw=False)
     assert asked == [60, 25, 25, 30, 2]

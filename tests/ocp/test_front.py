@@ -9,7 +9,8 @@ from pathlib import Path
 import ocp
 
 HEAVY = (
-    "matplotlib", "scipy", "multiprocessing", "ocp.job", "ocp.checking", "ocp.friction", "ocp.mpc",
+    "matplotlib", "scipy", "multiprocessing", "ocp.strategies", "ocp.checking", "ocp.friction",
+    "ocp.mpc",
     "symfric.multibody", "symfric.integrator.simulate", "symfric.laws.catalogue",
 )  # fmt: skip
 

@@ -6,7 +6,7 @@ from math import pi
 import casadi as ca
 import pytest
 
-import ocp.job as job
+from ocp import strategies
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
@@ -35,7 +35,7 @@ def raising(error: Exception) -> Callable[..., object]:
 def test_a_failure_among_modes_ends_in_the_sharpened_motion(
     error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(job, "polish", raising(error))
+    monkeypatch.setattr(strategies, "optimise_modes", raising(error))
     found = solve(out_and_back(v_t=1e-5), starts=1)
     assert found.verified
     assert found.modes == {}
@@ -48,14 +48,16 @@ def test_a_failure_of_layers_ends_in_the_smooth_motion(monkeypatch: pytest.Monke
     def layers(*_: object, **__: object) -> Iterator[object]:
         yield raising(RuntimeError("variables [z] are free"))()
 
-    monkeypatch.setattr(job, "sharpened", layers)
+    monkeypatch.setattr(strategies, "sharpened", layers)
     found = solve(out_and_back(v_t=0.05), throw=False, intervals=FINE)
     assert found.verified
     assert "Friction was not sharpened: internal error, RuntimeError: variables" in found.message
 
 
 def test_a_failure_of_exact_friction_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(job, "verify_exactly", raising(ValueError("expected no events, got 1")))
+    monkeypatch.setattr(
+        strategies, "verify_exactly", raising(ValueError("expected no events, got 1"))
+    )
     found = solve(out_and_back(v_t=1e-5), starts=1)
     assert found.verified
     assert found.modes
@@ -63,7 +65,7 @@ def test_a_failure_of_exact_friction_is_said(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_failure_of_verification_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(job, "verified", raising(RuntimeError("variables [z] are free")))
+    monkeypatch.setattr(strategies, "verified", raising(RuntimeError("variables [z] are free")))
     found = solve(out_and_back(v_t=0.05), throw=False, intervals=FINE, friction="smooth")
     assert found.ok and not found.verified
     assert "It was not verified: internal error, RuntimeError: variables" in found.message
@@ -73,7 +75,7 @@ def test_ctrl_c_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(*_: object, **__: object) -> object:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(job, "polish", stopped)
+    monkeypatch.setattr(strategies, "optimise_modes", stopped)
     with pytest.raises(KeyboardInterrupt):
         solve(out_and_back(v_t=1e-5), starts=1)
 

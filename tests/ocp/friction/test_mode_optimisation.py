@@ -7,7 +7,7 @@ import pytest
 
 from ocp.formulation.phase import Chain
 from ocp.formulation.problem import Problem
-from ocp.friction.mode_optimisation import polish
+from ocp.friction.mode_optimisation import optimise_modes
 from ocp.friction.smooth_models import smooth_model, widths
 from ocp.problems.friction import out_and_back
 from ocp.result.solution import Solution
@@ -37,7 +37,7 @@ def polished() -> Solution:
     problem = out_and_back()
     smooth = solve_once(smoothed(problem, 0.05), intervals=25)
     smooth = solve_once(smoothed(problem, 0.015), intervals=25, guess=smooth)
-    return next(polish(smooth, problem, {"guide": 0.015}))[0]
+    return next(optimise_modes(smooth, problem, {"guide": 0.015}))[0]
 
 
 def test_out_and_back_is_the_closed_form() -> None:

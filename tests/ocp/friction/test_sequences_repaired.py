@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ocp.formulation.phase import Chain
-from ocp.friction.arc_solution import Polisher, Solved
+from ocp.friction.arc_solution import ModeSolver, Solved
 from ocp.friction.mode_optimisation import KICK, SHORTEST, better, parameters_of, settled
 from ocp.friction.sequence import Leg, Run, Track, cut, neighbours, shown, with_rests
 from ocp.friction.smooth_models import smooth_model, widths
@@ -34,10 +34,10 @@ def known() -> Known:
     return Known(smooth.motions[0], parameters_of(problem, {}), {})
 
 
-def polisher() -> Polisher:
+def modes_solver() -> ModeSolver:
     problem = out_and_back()
     sizes = sizes_of(problem, known())
-    return Polisher(
+    return ModeSolver(
         problem, sizes, ("guide",), Ipopt(max_iter=100), Radau(3), SHORTEST * 2, KICK * 2, None
     )
 
@@ -48,9 +48,9 @@ def legs_of(*runs: tuple[int, float, float]) -> tuple[Leg, ...]:
 
 
 def found_for(legs: tuple[Leg, ...]) -> Solved:
-    first = polisher().solve(legs, known(), 30, 1e-2)
+    first = modes_solver().solve(legs, known(), 30, 1e-2)
     assert first.ok
-    return settled(polisher(), first, lambda solved: solved)
+    return settled(modes_solver(), first, lambda solved: solved)
 
 
 WRONG = {
@@ -82,7 +82,7 @@ def test_sequences_next_to_one_are_tried_and_the_better_one_is_kept() -> None:
     legs = legs_of((1, 0, 1), (-1, 1, 2))
     assert [shown(other) for other in neighbours(legs, 0.01)] == ["+- | -", "+ | +-"]
     found = found_for(legs)
-    kept = better(polisher(), found, 0.01, lambda solved: solved)
+    kept = better(modes_solver(), found, 0.01, lambda solved: solved)
     assert shown(kept.legs) == "+ | -"
     assert kept.outcome.cost <= found.outcome.cost
 
