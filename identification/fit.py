@@ -28,10 +28,8 @@ from identification.result.calls import written
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live
 from identification.solving.descent import Start, descend, remaining
-from identification.solving.loss import THRESHOLD
-from identification.solving.many_starts import Progress, best_of, many_starts
-from identification.solving.scatter import scattered
-from identification.solving.task import Point, Task, task
+from identification.solving.many_starts import Progress, best_of, many_starts, scattered
+from identification.solving.task import THRESHOLD, Point, Task, task
 from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array, Channel
-from identification.solving.loss import influence
-from identification.solving.task import Point, Task
+from identification.solving.task import Point, Task, influence
 from identification.unknowns.unknown import Unknown
 
 
