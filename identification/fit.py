@@ -23,8 +23,7 @@ from identification.residuals.evaluation import Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
-from identification.result.build import fitted, levels_of
-from identification.result.calls import written
+from identification.result.build import fitted, levels_of, written
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live
 from identification.solving.descent import Start, descend, remaining

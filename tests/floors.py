@@ -201,7 +201,12 @@ FLOORS: dict[str, set[str]] = {
         "identification.signals",
         "identification.unknowns",
     },
-    "identification.starts": {"symfric", "identification.data", "identification.signals"},
+    "identification.starts": {
+        "symfric",
+        "identification.data",
+        "identification.signals",
+        "identification.unknowns",
+    },
     "identification.solving": {"symfric", "identification.unknowns", "identification.residuals"},
     "identification.verdict": {
         "symfric",

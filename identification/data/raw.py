@@ -55,6 +55,17 @@ class Column:
     problem: str = ""
     gaps: bool = False
 
+    @classmethod
+    def of(cls, label: str, unit: str, values: Array) -> "Column":
+        """A column of numbers, some of which may be NaN or infinite."""
+        bad, problem = np.flatnonzero(~np.isfinite(values)), ""
+        if bad.size:
+            problem = (
+                f"sample {bad[0]}: expected a finite number, got {values[bad[0]]} ({bad.size} such)"
+            )
+        gaps = bool(np.isnan(values).any()) and not bool(np.isinf(values).any())
+        return cls(label, unit, values, problem, gaps)
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -98,11 +109,6 @@ class Wanted:
 
     def __post_init__(self) -> None:
         checks.choice("read: missing", self.missing, ("refuse", "drop"))
-
-
-def only_gaps(values: Array) -> bool:
-    """Whether some samples are NaN, and no others are bad."""
-    return bool(np.isnan(values).any()) and not bool(np.isinf(values).any())
 
 
 def label(cell: str) -> tuple[str, str]:

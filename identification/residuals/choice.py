@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.residuals.delays import DEAD_TIME
-from identification.residuals.windows import FEWEST
+from identification.residuals.initial import FEWEST
+from identification.residuals.shots import DEAD_TIME
 
 if TYPE_CHECKING:
     from identification.data.dataset import Dataset

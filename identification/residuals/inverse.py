@@ -16,8 +16,8 @@ from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.motions import Motion, Piece, measure, piece
 from identification.residuals.sampled import Sampled
 from identification.signals.filters import Filter
+from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
-from identification.unknowns.unknown import Unknown
 from symfric.foundation import checks
 from symfric.model import Model
 

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
-from identification.result.curve import Curve
-from identification.result.estimate import Errors, Estimate, Tried
 from identification.result.live import Asked, Live
 from identification.result.page import Ranking, page_of
-from identification.result.series import Series
+from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.result.stored import read, to_dict
 from identification.result.text import sentences, text_of
 from identification.verdict.judge import Verdict

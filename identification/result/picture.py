@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from identification.result.curve import Curve
-from identification.result.series import Series
+from identification.result.series import Curve, Series, limits
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.style import colour
@@ -71,15 +69,6 @@ def _curve(axis: Axes, curve: Curve, name: str) -> None:
     axis.set_xlabel(f"v [{curve.v_unit}]")
     axis.set_ylabel(f"friction [{curve.F_unit}]")
     _legend(axis)
-
-
-def limits(curve: Curve) -> tuple[float, float]:
-    """Range of forces that shows the curve and all but the farthest points."""
-    dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
-    ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []
-    low, high = min([*ends, curve.law.y.min()]), max([*ends, curve.law.y.max()])
-    margin = 0.1 * (high - low) or 1.0
-    return float(low - margin), float(high + margin)
 
 
 def _data(axis: Axes, one: Series) -> None:

@@ -1,27 +1,20 @@
-"""From one start to a minimum, with an end that says what was reached.
+"""Descent from one start to a minimum, with a status that says what was reached.
 
 The trust region is SciPy's (`least_squares`, method "trf"): it keeps bounds in the interior,
-scales by the derivatives, is deterministic and well kept; CasADi has Ipopt and SQP, which want
-expressions of the residuals, and simulated ones have none. Robust losses and weights are applied to
-the rows before they are reduced to a triangle, so its linear algebra sees n + 1 rows.
+scales by the derivatives and is deterministic. Robust losses and weights are applied to the rows
+before they are reduced to a triangle, so its linear algebra sees n + 1 rows.
 
-Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain, never by
-the size of a short one:
+Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain:
 
     fall = max over s of  f'f - |f + J s|^2     in the coordinates that no bound holds
 
-Source: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J. Wright,
-Numerical Optimization, 2nd ed., 2006, chapter 10.
-
-
-From a start far off by way of easier problems of the same parameters.
-
 A motion that is simulated over a whole record has many minima far from the truth, one that starts
-again from the data in every window has few. Residuals may therefore bring `easier` ones; what those
-find is where the descent on the residuals proper begins. The first start goes straight: it is the
-one that data or user have chosen.
+again from the data in every window has few. All starts but the first therefore begin on the
+`easier` problems of the task (multiple shooting) and end on the task itself.
 
-Source: H. G. Bock, in Modelling of Chemical Reaction Systems, Springer, 1981 (multiple shooting).
+Sources: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J.
+Wright, Numerical Optimization, 2nd ed., 2006, chapter 10; H. G. Bock, in Modelling of Chemical
+Reaction Systems, Springer, 1981.
 """
 
 from collections.abc import Callable

@@ -1,18 +1,14 @@
-"""Starts around a centre: a Latin hypercube in the coordinates of the fit.
+"""Several starts, on any executor, with the same result to the bit as one after the other.
 
-Positive values are multiplied by factors up to `REACH`, those that the user bounded go over all of
-their range, values of either sign move by half of themselves; start values of records stay, which
-are read from the data.
+Starts are a Latin hypercube around the first one: positive values are multiplied by factors up to
+`REACH`, those that the user bounded cover their range, values of either sign move by half of
+themselves; start values of records stay.
+
+Results are taken in the order of the numbers of the starts. They end early where another start
+cannot matter: one left nothing but white noise, or `AGREE` of them found the same lowest minimum.
+Results beyond that are dropped, so that the outcome does not depend on the executor.
 
 Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21, 1979.
-
-
-Several starts, on any executor, with the same result to the bit as one after the other.
-
-Starts are numbered; results are taken in the order of the numbers, whoever is ready first. They end
-early where another start cannot matter: one left nothing but white noise, or `AGREE` of them have
-found the same lowest minimum. What was computed beyond is thrown away, so that the result does not
-depend on who computed it.
 """
 
 import pickle
@@ -27,7 +23,7 @@ from numpy.typing import NDArray
 
 from identification.solving.descent import Start, Tell, descend, descend_by_way
 from identification.solving.task import Point, Task, square
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation.status import SolveError, Status
 

@@ -1,40 +1,21 @@
-"""Losses of residuals: squares, and what outliers cost less.
-
-    minimise 1/2 sum_i C^2 rho((r_i / C)^2) = 1/2 sum_i e_i^2,   e = C sign(r) sqrt(rho((r/C)^2))
-
-r in standard deviations of the noise, C from which on a residual counts as large. e is smooth, so
-the problem stays one of least squares with exact derivatives, e' = rho' r / e.
-
-Source: P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009; B. Triggs et al., Bundle
-Adjustment, 2000, section 3.
-
-
-Many rows to a few: the triangle R of a QR factorisation, block by block.
-
-    A = Q R,   |A x| = |R x| for every x
-
-Blocks are stacked on the triangle of those before them (a sequential TSQR). They are small enough
-that BLAS does not share one among threads, so the bits of the result do not depend on their number.
-
-Source: J. Demmel, L. Grigori, M. Hoemmen, J. Langou, Communication-optimal parallel and sequential
-QR and LU factorizations, SIAM J. Sci. Comput. 34, 2012.
-
-
-The weighted least-squares problem that residuals and unknowns make together.
+"""The weighted least-squares problem that residuals and unknowns make together.
 
     minimise over w   sum_signals [ n_s ln sigma_s ] + 1/2 sum_rows loss(r_i(p(w)) / sigma_s(i))
 
-sigma_s is the standard deviation of the noise of a signal, given or estimated.
+Losses: C^2 rho((r/C)^2) = e^2 with e = C sign(r) sqrt(rho((r/C)^2)) and C the residual, in standard
+deviations, above which an outlier costs less; e is smooth, so the problem stays one of least
+squares with exact derivatives e' = rho' r / e.
 
-
-Noise levels of signals from what is left of them, by maximum likelihood.
+Noise levels by maximum likelihood, with the share d_s of the parameters that signal s pays for:
 
     sigma_s^2 = sum r^2 / (n_s - d_s),   d_s = tr (J'J)^-1 J_s'J_s
 
-d_s is the share of the parameters that signal s pays for. So a signal weighs as much as it is
-exact, whatever its size; one that the model explains badly weighs little.
+Rows are reduced block by block to the triangle R of a QR factorisation (a sequential TSQR). Blocks
+are so small that BLAS does not share one among threads: bits do not depend on their number.
 
-Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9.
+Sources: P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009; B. Triggs et al., Bundle
+Adjustment, 2000, section 3; Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
+L. Grigori, M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34, 2012.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -8,14 +8,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.starts.hysteresis import Hysteresis, hysteresis, travelled
-from identification.starts.law_curve import law_curve, parts
-from identification.starts.law_elements import HEADROOM, carrying, element_values, scaled, shared
-from identification.starts.law_fit import fit_law, velocity
-from identification.starts.measured import Measured
+from identification.starts.law_fit import fit_law, law_curve, velocity
+from identification.starts.maxwell_slip import HEADROOM, carrying, element_values, scaled, shared
+from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve
+from identification.unknowns.roles import orders, parts
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parameter, parameters, symbolise
+from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
 from symfric.scenes.drive import Drive
 
@@ -29,6 +28,8 @@ DAMPED = 0.6
 """Ratio of bristle damping to sqrt(stiffness mass) where the data do not tell it."""
 BEYOND = 5.0
 """Paths to zero force behind a reversal after which a body counts as sliding."""
+APART = 1.05
+"""Least ratio of velocities that must differ."""
 SPIKE = 0.3
 """Share of the sliding force that bristle damping gives at the largest speed, without a mass."""
 
@@ -235,7 +236,8 @@ def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, 
     known = parameters(what)
     found = {n: _inside(known[n], value) for n, value in values.items()}
     for _ in range(3):  # a pair put into order may leave another one out of it
-        for low, high, ratio in _pairs(what):
+        for low, high, strictly in orders(what):
+            ratio = APART if strictly else 1.0
             at = {n: found.get(n, float(known[n].value)) for n in (low, high)}
             if at[high] >= ratio * at[low]:
                 continue
@@ -253,16 +255,3 @@ def _inside(parameter: Parameter, value: float) -> float:
     if 0 < least < 1e-6 * abs(own):
         least = 1e-6 * abs(own)
     return min(max(value if isfinite(value) else own, least), parameter.upper)
-
-
-def _pairs(what: Law | Drive) -> list[tuple[str, str, float]]:
-    """Names that must be in order: (low, high, least ratio)."""
-    model, variables = symbolise(what, *parameters(what))
-    found = list[tuple[str, str, float]]()
-    for part in parts(model):
-        for pairs, ratio in ((type(part).ordered, 1.0), (type(part).strictly_ordered, 1.05)):
-            for pair in pairs:
-                symbols = [getattr(part, field) for field in pair]
-                low, high = (next(x.name for x in variables if x.symbol is s) for s in symbols)
-                found.append((low, high, ratio))
-    return found

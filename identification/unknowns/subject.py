@@ -16,8 +16,7 @@ from identification.unknowns.drafts import (
     refuse,
     wishes,
 )
-from identification.unknowns.spec import Tied
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Tied, Unknown
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.parameters import Variable, parameters, symbolise, with_values

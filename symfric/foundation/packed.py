@@ -330,6 +330,7 @@ class _Reader:
 
     def _class(self, path: str, wanted: type) -> Any:
         """The class of this name, if it is one that may be in a pack."""
+        path = storable.current(path)
         if self._own is not None and not storable.may_hold(path):
             raise _foreign()
         found = self._named(path, "classes")

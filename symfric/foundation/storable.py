@@ -21,15 +21,29 @@ MODULES = (
     "identification.data.", "identification.fit", "identification.residuals.closed_loop",
     "identification.residuals.inverse", "identification.residuals.points",
     "identification.residuals.shooting", "identification.result.", "identification.signals.filters",
-    "identification.signals.velocity", "identification.unknowns.spec", "identification.verdict.",
+    "identification.unknowns.spec", "identification.verdict.",
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
+MOVED = {
+    "identification.data.loop": "identification.data.record",
+    "identification.result.curve": "identification.result.series",
+    "identification.result.estimate": "identification.result.series",
+    "identification.signals.velocity": "identification.signals.filters",
+    "identification.verdict.whiteness": "identification.verdict.colour",
+}
+"""Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
 
 
 def path_of(named: Any) -> str:
     """Return module and name of a class or function."""
     return f"{named.__module__}:{named.__qualname__}"
+
+
+def current(path: str) -> str:
+    """Return the present path of a class or function that a file may name by an older one."""
+    place, _, name = path.partition(":")
+    return f"{MOVED.get(place, place)}:{name}"
 
 
 def found_at(path: str) -> Any:

@@ -14,7 +14,7 @@ from identification.residuals.evaluation import Channel, Evaluation
 from identification.solving.descent import descend
 from identification.solving.many_starts import best_of, is_white, many_starts
 from identification.solving.task import THRESHOLD, Point, Task, objective, shaped, task, triangle
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
 from symfric.foundation.status import SolveError, Status
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.solving.many_starts import REACH, scattered
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns, unknowns_of
 
 UNKNOWNS = [
