@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
 from identification.first import centre, explained, findings_of, measured, slowest, strongest
-from identification.residuals.choice import choose
 from identification.residuals.evaluation import Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
-from identification.residuals.shooting import Shooting
 from identification.result.build import fitted, levels_of, written
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live
@@ -151,7 +149,9 @@ class Fit:
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
         try:
-            if isinstance(kind, Shooting) and kind.windows == "choose":
+            if getattr(kind, "windows", None) == "choose":
+                from identification.residuals.choice import choose  # noqa: PLC0415 (slow to import)
+
                 kind = choose(kind, found, self.data, self._quickly)
             residuals = kind.prepare(found, self.data, values)
         except ValueError as error:

@@ -12,11 +12,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.held_step import advanced
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.numeric import Scalar
 from symfric.integrator.compiled.columns import Columns
-from symfric.laws import GMS, Law
+from symfric.laws import Law
 
 Array = NDArray[np.float64]
 
@@ -81,6 +80,9 @@ def _held(
     where: str,
 ) -> ca.SX:
     """States after a step with everything held."""
+    from symfric.codegen.blocks.held_step import advanced  # noqa: PLC0415 (slow to import)
+    from symfric.laws import GMS  # noqa: PLC0415 (slow to import)
+
     if isinstance(law, GMS) and law.form != "event":
         law = replace(law, form="event")
     try:

@@ -8,7 +8,6 @@ from typing import final
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, lsq_linear
 
 from identification.starts.stribeck import Curve
 from identification.unknowns.roles import parts
@@ -222,6 +221,8 @@ def _apart(curve: LawCurve, p: Array) -> bool:
 
 def _levels(at: Coordinates, w: Array, F: Array, size: float) -> Array:
     """Coordinates after bounded linear least squares in all but the velocity scales."""
+    from scipy.optimize import lsq_linear  # noqa: PLC0415 (slow to import)
+
     linear = ~at.logarithmic
     if not linear.any():
         return w
@@ -255,6 +256,8 @@ def _cost(at: Coordinates, w: Array, F: Array, size: float) -> float:
 
 def _polished(at: Coordinates, w: Array, F: Array, size: float) -> Array:
     """All coordinates after a few steps of a trust region; `w` where that fails."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
+
     pull, begin = PULL * np.sqrt(F.size), w.copy()
 
     def residuals(w: Array) -> Array:

@@ -16,7 +16,6 @@ from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, nnls
 
 from identification.starts.measured import DEAD, Measured, turning_points
 from identification.starts.stribeck import StribeckCurve
@@ -151,6 +150,8 @@ def _dense(
     measured: Measured, path: Array, beside: Array, radii: Array, loaded: int
 ) -> tuple[Array, float]:
     """Coefficients of a dense set of radii and of the rest, and the norm of the error."""
+    from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
+
     X = np.column_stack([_stretches(measured, path, radii, loaded)[0], beside])
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     w, left = nnls(X / scale, measured.F)
@@ -229,6 +230,8 @@ def _improved(
     steps: int,
 ) -> Elements:
     """Stiffnesses, log radii and the rest together by a trust region."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
+
     viscous, offset, loaded = kinds
     n, size = radii.size, float(np.abs(measured.F).max())
     w = _dense(measured, path, beside, radii, loaded)[0]
