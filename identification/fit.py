@@ -152,7 +152,8 @@ class Fit:
             if getattr(kind, "windows", None) == "choose":
                 from identification.residuals.choice import choose  # noqa: PLC0415 (slow to import)
 
-                kind = choose(kind, found, self.data, self._quickly)
+                chosen: Any = kind
+                kind = choose(chosen, found, self.data, self._quickly)
             residuals = kind.prepare(found, self.data, values)
         except ValueError as error:
             raise explained(error, findings) from None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.record import Record
-from identification.data.units import EXAMPLES, KINDS, by_channel, unit
+from identification.data.units import EXAMPLES, KINDS, by_channel, is_common, unit
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -119,10 +119,10 @@ def label(cell: str) -> tuple[str, str]:
         return match[1], match[2].strip()
     for pattern in (r"(.*?)\s*\((.*)\)", r"(.*\S)\s+/\s*(\S.*)", r"([^/]*\w)/(\w[^/]*)"):
         match = fullmatch(pattern, cell)
-        if match and match[1] and unit(match[2]) is not None:
+        if match and match[1] and is_common(match[2]):
             return match[1], match[2].strip()
     match = fullmatch(r"(.+)_([A-Za-z]+)", cell)
-    if match and unit(match[2]) is not None and _alias(match[1]):
+    if match and is_common(match[2]) and _alias(match[1]):
         return match[1], match[2]
     return cell, ""
 

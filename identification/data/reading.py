@@ -15,7 +15,7 @@ import numpy as np
 from identification.data.mat_file import read_mat, read_npy
 from identification.data.raw import Array, Column, Raw, Wanted, gathered, label, record
 from identification.data.record import Record
-from identification.data.units import unit
+from identification.data.units import is_common, unit
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 
@@ -273,7 +273,7 @@ def _header(rows: Rows, first: int | None) -> tuple[int | None, list[str] | None
     cells = rows.cells[last]
     if len(above) > 1 and all(unit(c.strip("[]()")) is not None for c in cells):
         names = rows.cells[above[-2]]
-        if len(names) == len(cells) and not all(unit(c) is not None for c in names if c):
+        if len(names) == len(cells) and not all(is_common(c) for c in names if c):
             return above[-2], names, [c.strip("[]()") for c in cells]
     while cells and not cells[-1]:
         cells = cells[:-1]

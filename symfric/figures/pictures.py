@@ -18,9 +18,8 @@ from symfric.figures.requirements import phenomena
 from symfric.figures.scales import scales
 from symfric.foundation.panels import blank, dressed, grid, panels, save
 from symfric.foundation.parameters import parameters
-from symfric.foundation.prefixes import readable
 from symfric.foundation.style import DASHES, colour, dash, line
-from symfric.foundation.units import turned
+from symfric.foundation.units import readable, turned
 from symfric.laws import Population, steady_force, steady_inputs
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
-from symfric.foundation.prefixes import readable
 from symfric.foundation.style import colour, line
+from symfric.foundation.units import readable
 from symfric.results.pictures import level
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.panels import save
-from symfric.foundation.prefixes import clock, readable
 from symfric.foundation.style import COLOURS, EDGE, colour, line
+from symfric.foundation.units import clock, readable
 from symfric.model.kinds import ENERGY
 from symfric.results.kinds import Group, every, friction_laws, main
 

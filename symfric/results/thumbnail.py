@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symfric.foundation.prefixes import clock
 from symfric.foundation.style import COLOURS
+from symfric.foundation.units import clock
 from symfric.model.kinds import CONSTRAINTS, FRICTION
 from symfric.results.kinds import kinds
 

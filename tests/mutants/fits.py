@@ -45,12 +45,12 @@ T_SLIDING = (f"{TESTS}starts/test_pre_sliding.py",)
 
 MEASURED = (
     Mutant(
-        "units behind a slash multiply", DATA + "units.py",
-        "factor *= found[0] ** sense", "factor *= found[0]", T_UNITS,
+        "units behind a slash multiply", "symfric/foundation/units.py",
+        "size *= factor[0] ** sense", "size *= factor[0]", T_UNITS,
     ),
     Mutant(
-        "the arm of a torque has no prefix", DATA + "units.py",
-        'return force[0] * arm[0], {"N": 1, "m": 1}', 'return force[0], {"N": 1, "m": 1}', T_UNITS,
+        "a bracket behind a slash is not turned round", "symfric/foundation/units.py",
+        "powers.get(symbol, 0) + sense * power", "powers.get(symbol, 0) + power", T_UNITS,
     ),
     Mutant(
         "gaps of a record are bridged", DATA + "record.py", "GAP = 5.0", "GAP = 5e9", T_DATASET,
