@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
-from identification.first import centre, explained, findings_of, measured, slowest, strongest
 from identification.residuals.evaluation import Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
@@ -28,6 +27,7 @@ from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Point, Task, task
 from identification.starts.measured import Measured
+from identification.starts.start import centre, explained, findings_of, measured, slowest, strongest
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import covariance
@@ -150,7 +150,7 @@ class Fit:
         values = centre(found, None if self.start == "law" else seen, given)
         try:
             if getattr(kind, "windows", None) == "choose":
-                from identification.residuals.choice import choose  # noqa: PLC0415 (slow to import)
+                from identification.residuals.shooting import choose  # noqa: PLC0415 (slow to import)
 
                 chosen: Any = kind
                 kind = choose(chosen, found, self.data, self._quickly)

@@ -206,6 +206,7 @@ FLOORS: dict[str, set[str]] = {
         "identification.data",
         "identification.signals",
         "identification.unknowns",
+        "identification.residuals",
     },
     "identification.solving": {"symfric", "identification.unknowns", "identification.residuals"},
     "identification.verdict": {

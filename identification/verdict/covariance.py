@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour, colour
-from identification.verdict.combinations import Trace, lost
-from identification.verdict.minimum import Minimum, minimum, places, positions, trace
+from identification.verdict.minimum import Minimum, Trace, lost, minimum, places, positions, trace
 from symfric.foundation.brief import brief
 
 RANK = 1e-7

@@ -9,10 +9,10 @@ from typing import Annotated, Any, final
 import typer
 
 from identification.data.dataset import Dataset
-from identification.first import findings_of
 from identification.fit import Fit
 from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
+from identification.starts.start import findings_of
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status
 from symfric.cli import output
