@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from identification.data.dataset import Dataset as Dataset
     from identification.data.findings import Finding as Finding
     from identification.data.findings import Findings as Findings
-    from identification.data.loop import PositionLoop as PositionLoop
+    from identification.data.record import PositionLoop as PositionLoop
     from identification.data.record import Record as Record
     from identification.data.synthetic import synthetic_drive_data as synthetic_drive_data
     from identification.fit import Fit as Fit
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
     from identification.residuals.inverse import InverseDynamics as InverseDynamics
     from identification.residuals.points import Points as Points
     from identification.residuals.shooting import Shooting as Shooting
-    from identification.result.estimate import Estimate as Estimate
     from identification.result.fitted import Fitted as Fitted
     from identification.result.fitted import load_fit as load_fit
+    from identification.result.series import Estimate as Estimate
     from identification.select import select as select
+    from identification.signals.differentiate import LinearFit as LinearFit
     from identification.signals.differentiate import MotionSignals as MotionSignals
     from identification.signals.differentiate import differentiate as differentiate
+    from identification.signals.differentiate import linear_regression as linear_regression
+    from identification.signals.differentiate import plateaus as plateaus
     from identification.signals.filters import Filter as Filter
     from identification.signals.filters import central_difference as central_difference
     from identification.signals.filters import lowpass as lowpass
-    from identification.signals.plateaus import plateaus as plateaus
-    from identification.signals.regress import LinearFit as LinearFit
-    from identification.signals.regress import linear_regression as linear_regression
-    from identification.starts.break_away import break_away as break_away
-    from identification.starts.hysteresis import hysteresis as hysteresis
     from identification.starts.maxwell_slip import fit_elements as fit_elements
     from identification.starts.measured import Measured as Measured
+    from identification.starts.measured import break_away as break_away
+    from identification.starts.measured import hysteresis as hysteresis
     from identification.starts.six_steps import six_steps as six_steps
     from identification.starts.start import start_values as start_values
     from identification.starts.stribeck import binned as binned
@@ -57,8 +57,7 @@ else:
         {
             "identification.data.dataset": "Dataset",
             "identification.data.findings": "Finding Findings",
-            "identification.data.loop": "PositionLoop",
-            "identification.data.record": "Record",
+            "identification.data.record": "PositionLoop Record",
             "identification.data.synthetic": "synthetic_drive_data",
             "identification.cross": "cross_validate",
             "identification.fit": "Fit",
@@ -66,17 +65,15 @@ else:
             "identification.residuals.inverse": "InverseDynamics",
             "identification.residuals.points": "Points",
             "identification.residuals.shooting": "Shooting",
-            "identification.result.estimate": "Estimate",
+            "identification.result.series": "Estimate",
             "identification.result.fitted": "Fitted load_fit",
             "identification.select": "select",
-            "identification.signals.differentiate": "MotionSignals differentiate",
+            "identification.signals.differentiate": (
+                "MotionSignals differentiate plateaus LinearFit linear_regression"
+            ),
             "identification.signals.filters": "Filter central_difference lowpass",
-            "identification.signals.plateaus": "plateaus",
-            "identification.signals.regress": "LinearFit linear_regression",
-            "identification.starts.break_away": "break_away",
-            "identification.starts.hysteresis": "hysteresis",
+            "identification.starts.measured": "break_away hysteresis Measured",
             "identification.starts.maxwell_slip": "fit_elements",
-            "identification.starts.measured": "Measured",
             "identification.starts.six_steps": "six_steps",
             "identification.starts.start": "start_values",
             "identification.starts.stribeck": "binned fit_curve",

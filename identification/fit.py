@@ -17,22 +17,17 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
-from identification.first import centre, explained, findings_of, measured, slowest, strongest
-from identification.residuals.choice import choose
 from identification.residuals.evaluation import Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
-from identification.residuals.shooting import Shooting
-from identification.result.build import fitted, levels_of
-from identification.result.calls import written
+from identification.result.build import fitted, levels_of, written
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live
 from identification.solving.descent import Start, descend, remaining
-from identification.solving.loss import THRESHOLD
-from identification.solving.many_starts import Progress, best_of, many_starts
-from identification.solving.scatter import scattered
-from identification.solving.task import Point, Task, task
+from identification.solving.many_starts import Progress, best_of, many_starts, scattered
+from identification.solving.task import THRESHOLD, Point, Task, task
 from identification.starts.measured import Measured
+from identification.starts.start import centre, explained, findings_of, measured, slowest, strongest
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import covariance
@@ -154,8 +149,11 @@ class Fit:
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
         try:
-            if isinstance(kind, Shooting) and kind.windows == "choose":
-                kind = choose(kind, found, self.data, self._quickly)
+            if getattr(kind, "windows", None) == "choose":
+                from identification.residuals.shooting import choose  # noqa: PLC0415 (slow to import)
+
+                chosen: Any = kind
+                kind = choose(chosen, found, self.data, self._quickly)
             residuals = kind.prepare(found, self.data, values)
         except ValueError as error:
             raise explained(error, findings) from None

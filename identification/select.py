@@ -179,7 +179,7 @@ class Ranking:
         Args:
             path: image file.
         """
-        from identification.verdict.picture import plot_ranking  # noqa: PLC0415 (Matplotlib is slow)
+        from identification.result.picture import plot_ranking  # noqa: PLC0415 (Matplotlib is slow)
 
         return plot_ranking(self.to_dict(), path)
 

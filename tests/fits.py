@@ -15,8 +15,8 @@ from identification.result.build import fitted
 from identification.result.fitted import Fitted
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import task
+from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject, subject
-from identification.unknowns.unknown import Unknown
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge

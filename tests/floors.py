@@ -201,7 +201,13 @@ FLOORS: dict[str, set[str]] = {
         "identification.signals",
         "identification.unknowns",
     },
-    "identification.starts": {"symfric", "identification.data", "identification.signals"},
+    "identification.starts": {
+        "symfric",
+        "identification.data",
+        "identification.signals",
+        "identification.unknowns",
+        "identification.residuals",
+    },
     "identification.solving": {"symfric", "identification.unknowns", "identification.residuals"},
     "identification.verdict": {
         "symfric",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.solving.descent import descend
 from identification.solving.task import Point, Task, task
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.minimum import Minimum
 

@@ -1,25 +1,234 @@
-"""All checks of some data, one after the other."""
+"""All checks of some data, and those of times, points, units and a measured velocity."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from identification.data.check_clipping import of_clipping
-from identification.data.check_direction import of_direction
-from identification.data.check_drift import of_dead_time, of_drift
-from identification.data.check_excitation import of_excitation
-from identification.data.check_frozen import of_frozen
-from identification.data.check_jumps import of_jumps
-from identification.data.check_motion import of_motion
-from identification.data.check_points import of_points
-from identification.data.check_residue import of_residue
-from identification.data.check_resolution import of_resolution
-from identification.data.check_spikes import of_spikes
-from identification.data.check_times import of_times
-from identification.data.check_units import of_units
-from identification.data.check_velocity import of_velocity
-from identification.data.findings import Finding, Findings
-from identification.data.record import Record
-from identification.data.rough import rough_model
-from identification.data.view import View
+import numpy as np
+
+from identification.data.check_drive import (
+    of_dead_time,
+    of_direction,
+    of_drift,
+    of_excitation,
+    of_motion,
+    of_residue,
+)
+from identification.data.check_signals import (
+    of_clipping,
+    of_frozen,
+    of_jumps,
+    of_resolution,
+    of_spikes,
+)
+from identification.data.findings import Finding, Findings, View
+from identification.data.record import GAP, JITTER, Record
+from identification.data.rough import Rough, rough_model, smoothed
+
+FEWEST, FEW = 20, 50
+"""Samples without which nothing can be said, and little."""
+SLOW = 0.5
+"""Sample interval [s] from which on times may be in ms."""
+
+
+def of_times(view: View) -> Iterator[Finding]:
+    """Gaps, irregular intervals, too few samples, times that may be in another unit."""
+    record = view.record
+    if record.size < FEW:
+        yield view.finding(
+            "short",
+            "t",
+            f"There are {record.size} samples only.",
+            "error" if record.size < FEWEST else "warning",
+        )
+    if record.t is None or record.size < 3:
+        return
+    intervals = np.diff(record.t)
+    usual = float(np.median(intervals))
+    gaps = np.flatnonzero(intervals > GAP * usual)
+    if gaps.size:
+        k = int(gaps[np.argmax(intervals[gaps])])
+        yield view.finding(
+            "gap",
+            "t",
+            f"The times have {gaps.size} gap(s), the longest of {intervals[k]:.3g} s at "
+            f"{view.at(k)}: data.resampled() makes a record of each piece.",
+            "warning",
+            k,
+            k + 1,
+        )
+    off = np.abs(intervals - usual)
+    off[gaps] = 0.0
+    k = int(np.argmax(off))
+    if off[k] > 2 * JITTER * usual:
+        uneven = float(np.mean(off > 2 * JITTER * usual))
+        yield view.finding(
+            "irregular",
+            "t",
+            f"The sample intervals are not equal: {uneven:.1%} are off {usual:.4g} s by more than "
+            f"{2 * JITTER:.0%}, most {intervals[k]:.4g} s at {view.at(k)}: use data.resampled().",
+            "warning",
+            k,
+            k + 1,
+        )
+    whole = bool(np.all(np.abs(record.t - np.rint(record.t)) < 1e-9))
+    if usual >= SLOW and whole and record.size >= 200:
+        yield view.finding(
+            "units",
+            "t",
+            f"The samples are {usual:g} s apart over {np.ptp(record.t) / 3600:.2g} hours, at whole "
+            "seconds: are the times in ms, or row numbers?",
+            "warning",
+        )
+
+
+FEWEST_POINTS = 4
+WRONG = 0.2
+"""Share of points whose force goes with the motion below which the sign is wrong."""
+
+
+def of_points(view: View) -> Iterator[Finding]:
+    """Too few points, one direction, one speed, a force that drives instead of braking."""
+    record = view.record
+    if "v" not in record or "F" not in record:
+        return
+    v, force = record["v"], record["F"]
+    if record.size < FEWEST_POINTS:
+        yield view.finding("short", "v", f"There are {record.size} points only.", "warning")
+    if np.ptp(v) == 0 or np.ptp(force) == 0:
+        name = "v" if np.ptp(v) == 0 else "F"
+        yield view.finding("constant", name, f"{name} is {record[name][0]:g} throughout.", "error")
+        return
+    moving = np.abs(v) > 0.01 * np.abs(v).max()
+    both = min(np.mean(v > 0), np.mean(v < 0)) > 0.1
+    around = float(np.median(force)) if both else 0.0
+    if np.mean(v[moving] * (force[moving] - around) > 0) < WRONG:
+        yield view.finding(
+            "sign",
+            "F",
+            "F is opposite to v in most points: friction is counted as what the drive needs, so "
+            "F v > 0; turn one sign round.",
+            "error",
+        )
+    if not both:
+        yield view.finding(
+            "one-way", "v", "All points are of one direction: friction cannot be told from a "
+            "constant force.", "warning",
+        )  # fmt: skip
+
+
+LIMITS = {
+    "m": (1e-9, 50.0, 1e5),
+    "rad": (1e-9, 1e5, 1e9),
+    "N": (1e-9, 1e6, 1e10),
+    "N m": (1e-12, 1e6, 1e10),
+    "m/s": (1e-9, 100.0, 1e5),
+    "rad/s": (1e-9, 1e4, 1e8),
+}
+"""Ranges: smaller than the first or larger than the last is an error, than the second a doubt."""
+FASTEST = {"m": (50.0, 1e5), "rad": (1e4, 1e8)}
+"""Speeds of a position: doubt, error."""
+TOGETHER = (("m", "N"), ("rad", "N m"))
+
+
+def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
+    """Units that do not belong together, and ranges that no machine has."""
+    record = view.record
+    mixed = [record.units[view.roles[r]] for r in ("x", "force") if r in view.roles]
+    if len(mixed) == 2 and "" not in mixed and tuple(mixed) not in TOGETHER:
+        yield view.finding(
+            "units",
+            view.name("force"),
+            f"{view.name('x')} is in {mixed[0]} and {view.name('force')} in {mixed[1]}: a slide "
+            "needs m and N, a shaft rad and N m.",
+            "error",
+        )
+    for signal in view.roles.values():
+        low, doubt, high = LIMITS.get(record.units[signal], (0.0, np.inf, np.inf))
+        range_ = float(np.ptp(record.signals[signal]))
+        if 0 < range_ < low or range_ > doubt:
+            yield view.finding(
+                "units",
+                signal,
+                f"{signal} has a range of {range_:.3g} {record.units[signal]}: check its unit.",
+                "error" if range_ < low or range_ > high else "warning",
+            )
+    if model is not None and model.clean:
+        unit = record.units[view.roles["x"]]
+        fastest = float(np.quantile(np.abs(model.v), 0.99))
+        doubt, high = FASTEST.get(unit, (np.inf, np.inf))
+        if fastest > doubt:
+            yield view.finding(
+                "units",
+                view.roles["x"],
+                f"{view.roles['x']} moves at {fastest:.3g} {unit}/s: check its unit and that of "
+                "the times.",
+                "error" if fastest > high else "warning",
+            )
+
+
+WIDTH = 12.0
+"""Standard deviation of the window under which both are compared, in samples."""
+ALIKE = 0.7
+"""Correlation that both must have."""
+OFF = 0.2
+"""Relative error of the scale from which on it is told."""
+KNOWN = {
+    57.2958: "deg/s taken as rad/s",
+    0.0174533: "rad/s taken as deg/s",
+    9.5493: "rpm taken as rad/s",
+    0.10472: "rad/s taken as rpm",
+    6.28319: "rad/s taken as rev/s",
+    0.159155: "rev/s taken as rad/s",
+    1000.0: "mm/s taken as m/s",
+    0.001: "m/s taken as mm/s",
+    1e6: "um/s taken as m/s",
+    100.0: "cm/s taken as m/s",
+    60.0: "per minute taken as per second",
+}
+
+
+def of_velocity(view: View) -> Iterator[Finding]:
+    """A velocity of another sign or scale than the position has, likewise an acceleration."""
+    record = view.steady
+    if record is None or record.size < 100:
+        return
+    for of, rate in (("x", "v"), ("v", "a")):
+        if of not in view.roles or rate not in view.roles:
+            continue
+        name, other = view.roles[rate], view.roles[of]
+        if np.ptp(record[name]) == 0 or np.ptp(record[other]) == 0:
+            continue
+        edge = int(3 * WIDTH)
+        derived = (smoothed(record[other], WIDTH, 1) / record.step)[edge:-edge]
+        given = smoothed(record[name], WIDTH)[edge:-edge]
+        if derived.std() == 0 or given.std() == 0:
+            continue
+        alike = float(np.corrcoef(derived, given)[0, 1])
+        scale = float(given.std() / derived.std())
+        if alike < -ALIKE:
+            yield view.finding(
+                "sign",
+                name,
+                f"{name} is opposite to the slope of {other} (correlation {alike:.2f}): the sign "
+                "of one is wrong.",
+                "error",
+            )
+        elif alike < ALIKE:
+            yield view.finding(
+                "velocity",
+                name,
+                f"{name} is not the slope of {other} (correlation {alike:.2f}).",
+                "warning",
+            )
+        elif abs(scale - 1) > OFF:
+            near = [text for known, text in KNOWN.items() if abs(scale / known - 1) < 0.1]
+            yield view.finding(
+                "units",
+                name,
+                f"{name} is {scale:.4g} times the slope of {other}: "
+                f"{near[0] if near else 'a wrong unit or scale'}.",
+                "error" if near or scale > 5 or scale < 0.2 else "warning",
+            )
+
 
 HOPELESS = {"standstill", "noise", "constant", "short", "wrap", "swapped", "glitch", "frozen"}
 """Errors after which a rough model of the drive says nothing."""

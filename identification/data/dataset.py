@@ -9,14 +9,11 @@ import numpy as np
 
 from identification.data.check import check
 from identification.data.findings import Findings
-from identification.data.frames import ASSUMED, columns_of
 from identification.data.merge import merged
 from identification.data.raw import Missing, Wanted, record
-from identification.data.reading import Paths, files, read_records
+from identification.data.reading import ASSUMED, Paths, columns_of, files, read_records, to_csv
 from identification.data.record import Record
-from identification.data.repair import scaled, unwrapped, without_spikes
-from identification.data.resample import delayed, resampled
-from identification.data.text_file import to_csv
+from identification.data.resample import delayed, resampled, scaled, unwrapped, without_spikes
 from symfric.foundation import checks
 
 

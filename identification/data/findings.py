@@ -1,8 +1,15 @@
-"""What is doubtful about data: findings, each with its place."""
+"""Doubts about data, each with its place, and the view of a record that the checks share."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.record import GAP, Record
+from symfric.foundation import checks
 
 Severity = Literal["error", "warning"]
 
@@ -88,3 +95,121 @@ class Findings:
 
     def __str__(self) -> str:
         return self.text
+
+
+Array = NDArray[np.float64]
+
+ROLES = ("x", "v", "a", "force")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class View:
+    """One record under check.
+
+    Attributes:
+        record: itself.
+        number: of it in the data.
+        roles: part in the drive ("x", "v", "a", "force") -> name of its signal.
+    """
+
+    record: Record
+    number: int
+    roles: Mapping[str, str]
+
+    @classmethod
+    def of(cls, record: Record, number: int, roles: Mapping[str, str]) -> "View":
+        """The view of a record; `roles` names signals that are not called by their part."""
+        named = checks.named("check", roles, ROLES)
+        given = {role: name for role, name in named.items() if role != name or name in record}
+        found = {role: role for role in ROLES if role in record.signals}
+        found |= {role: record.channel(name) for role, name in given.items()}
+        return cls(record, number, found)
+
+    def signal(self, role: str) -> Array | None:
+        """The signal that plays a part, if there is one."""
+        return self.record.signals[self.roles[role]] if role in self.roles else None
+
+    def known(self) -> Iterator[tuple[str, Array]]:
+        """Signals with a part or a unit; others may be anything, such as predictions of a model."""
+        for name, values in self.record.signals.items():
+            if self.record.units[name] or name in self.roles.values():
+                yield name, values
+
+    def name(self, role: str) -> str:
+        """What the signal of a part is called."""
+        return self.roles.get(role, role)
+
+    @cached_property
+    def steady(self) -> Record | None:
+        """The longest piece without a gap, at equal intervals; None if it is too short."""
+        record = self.record
+        if record.t is None or record.size < 20:
+            return None
+        intervals = np.diff(record.t)
+        usual = float(np.median(intervals))
+        edges = [0, *(np.flatnonzero(intervals > GAP * usual) + 1).tolist(), record.size]
+        k = int(np.argmax(np.diff(edges)))
+        piece = record.at(slice(edges[k], edges[k + 1]))
+        if piece.size < 20:
+            return None
+        step = (piece.time[-1] - piece.time[0]) / (piece.size - 1)
+        grid = piece.time[0] + step * np.arange(piece.size)
+        if np.abs(grid - piece.time).max() < 0.05 * step:
+            return piece
+        signals = {key: np.interp(grid, piece.time, y) for key, y in piece.signals.items()}
+        return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
+
+    def finding(
+        self,
+        kind: str,
+        signal: str,
+        sentence: str,
+        severity: Severity,
+        begin: int | None = None,
+        end: int | None = None,
+    ) -> Finding:
+        """A finding at the samples `begin` to `end`; without them it holds throughout."""
+        first = 0 if begin is None else begin
+        last = (self.record.size - 1 if begin is None else begin) if end is None else end
+        t = self.record.t
+        times = (float(first), float(last)) if t is None else (float(t[first]), float(t[last]))
+        return Finding(kind, self.number, signal, sentence, *times, severity)
+
+    def at(self, sample: int) -> str:
+        """A place in words: its time and its row."""
+        t = self.record.t
+        place = self.record.place(sample)
+        return place if t is None else f"t = {t[sample]:.6g} s ({place})"
+
+
+def runs(there: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and last sample of each run of true ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        yield first, end - 1
+
+
+def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First samples and lengths of the runs of equal values that make up a signal."""
+    first = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0) + 1])
+    return first, np.diff(np.concatenate([first, [y.size]]))
+
+
+def count_of(y: Array) -> float:
+    """The smallest step between values of a signal; 0 where it has hundreds of them and no grid."""
+    levels = np.unique(y)
+    if levels.size < 2 or levels.size > 0.5 * y.size:
+        return 0.0
+    steps = np.diff(levels)
+    smallest = float(np.quantile(steps, 0.05))
+    off = np.abs(steps / smallest - np.rint(steps / smallest)) if smallest > 0 else np.ones(1)
+    return smallest if np.median(off) < 0.02 and smallest > 1e-12 * np.ptp(y) else 0.0
+
+
+def noise_of(y: Array) -> float:
+    """Standard deviation of the white part of a smooth signal, from its third differences."""
+    if y.size < 8:
+        return 0.0
+    third = np.diff(y, 3)
+    return float(1.4826 * np.median(np.abs(third - np.median(third))) / np.sqrt(20))

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.data.loop import PositionLoop
 from identification.data.mat_bytes import variables
-from identification.data.raw import Array, Column, Raw, label, only_gaps
-from identification.data.record import Record
+from identification.data.raw import Array, Column, Raw, label
+from identification.data.record import PositionLoop, Record
 
 EMPS = ("t", "qm", "vir", "gtau")
 """Variables that tell an EMPS file."""
@@ -133,7 +132,7 @@ def _matrix(name: str, value: Array) -> Raw:
     """The columns of a matrix; one that lies on its side is turned."""
     if value.shape[0] < value.shape[1]:
         value = value.T
-    columns = (Column("", "", c, _problem(c), only_gaps(c)) for c in value.T)
+    columns = (Column.of("", "", c) for c in value.T)
     return Raw(name, tuple(columns))
 
 
@@ -156,7 +155,7 @@ def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
             problem = f"expected {usual} numbers as in the others, got {value.size}"
             columns.append(Column(text, said, np.full(usual, np.nan), problem))
         else:
-            columns.append(Column(text, said, value, _problem(value), only_gaps(value)))
+            columns.append(Column.of(text, said, value))
     return Raw(name, tuple(columns))
 
 
@@ -182,13 +181,6 @@ def _flat(variables: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str
                 yield f"{prefix}{key}_{k}", column
         else:
             yield f"{prefix}{key}", _kind(value)
-
-
-def _problem(values: Array) -> str:
-    bad = np.flatnonzero(~np.isfinite(values))
-    if not bad.size:
-        return ""
-    return f"sample {bad[0]}: expected a finite number, got {values[bad[0]]} ({bad.size} such)"
 
 
 def _is_vector(value: Node) -> bool:

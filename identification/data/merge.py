@@ -1,14 +1,240 @@
-"""Two recorders of one experiment as one record."""
+"""Two recorders of one experiment as one record, and the delay between them.
 
-from dataclasses import replace
-from typing import Literal
+    y1(t) = gain y2(t - shift - drift (t - middle)) + offset
+
+The cross-correlation of both at the step of the coarser one, normalised over their overlap, gives
+the shift to a sample; Gauss-Newton on smoothed signals gives it to a fraction of one, with its
+standard error and the drift of the clocks.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from identification.data.delay import Delay, estimated_delay
-from identification.data.record import Record
-from identification.data.resample import GAP, SHORTEST, interpolated
+from identification.data.record import GAP, Record
+from identification.data.resample import SHORTEST, hermite, interpolated
 from symfric.foundation import checks
+
+Array = NDArray[np.float64]
+
+ALIKE = 0.8
+"""Least correlation of two recordings of one thing."""
+OVERLAP = 0.5
+"""Share of the shorter record that both must have in common."""
+RIVAL = 1.5
+"""A second shift whose unexplained part is at most so many times that of the best one rivals it."""
+SMOOTHING = 2.0
+"""Standard deviation of the smoothing window, in steps."""
+NEIGHBOURS = 2 * np.sqrt(np.pi) * SMOOTHING
+"""Samples that count as one after the smoothing."""
+SURE = 5.0
+"""Standard deviations that make a statement."""
+FLATTEST = 50
+"""So many lags that explain as much as the best one, within its chance, tell no delay."""
+ITERATIONS = 30
+
+
+@final
+@dataclass(frozen=True)
+class Delay:
+    """How the clock of one record stands to that of another.
+
+    Attributes:
+        shift: what is added to the times of the second [s], at the middle of the overlap.
+        drift: how much faster the first clock runs, relative.
+        middle: time of the first at which `shift` holds [s].
+        shift_error, drift_error: standard errors.
+        correlation: of both signals at this delay.
+    """
+
+    shift: float
+    drift: float
+    middle: float
+    shift_error: float
+    drift_error: float
+    correlation: float
+
+    def second(self, t: Array) -> Array:
+        """Times of the second record at times of the first."""
+        return t - self.shift - self.drift * (t - self.middle)
+
+
+def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: bool) -> Delay:
+    """The delay between `first[on[0]]` and `second[on[1]]`.
+
+    Args:
+        first, second: two recordings that hold one quantity, up to a gain and an offset.
+        on: what it is called in each.
+        drift: whether the clocks may run at different speeds; else that is an error.
+
+    Raises:
+        ValueError: recordings that have nothing in common at any shift, several shifts that
+            explain them as well, none that is determined, clocks that drift.
+    """
+    where = f"data '{first.name}': merged with '{second.name}'"
+    step = max(first.median_step, second.median_step)
+    one, two = _Even.of(first, on[0], step), _Even.of(second, on[1], step)
+    lag, correlation = _coarse(where, one, two)
+    rigid = _refined(where, one, two, lag, correlation, with_drift=False)
+    free = _refined(where, one, two, lag, correlation, with_drift=True)
+    gained = one.values.size / NEIGHBOURS * (rigid.rest / free.rest - 1)
+    total = abs(free.delay.drift) * one.values.size * step
+    drifts = gained > SURE**2 and total > 0.5 * step
+    if drifts and not drift:
+        raise ValueError(
+            f"{where}: expected clocks of one speed, got a drift of {1e6 * free.delay.drift:.0f} "
+            f"ppm, {total:.3g} s over the record; write drift='estimate'"
+        )
+    return free.delay if drift else rigid.delay
+
+
+@final
+@dataclass(frozen=True)
+class _Fit:
+    delay: Delay
+    rest: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Even:
+    """A signal at equal intervals; `there` is false inside gaps."""
+
+    start: float
+    step: float
+    values: Array
+    there: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, record: Record, signal: str, step: float) -> "_Even":
+        t, y = record.time, record[signal]
+        grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
+        k = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, t.size - 2)
+        there = (t[k + 1] - t[k]) <= GAP * record.median_step
+        if step > 1.5 * record.median_step:  # the mean over a step, not a sample of it
+            area = np.concatenate([[0.0], np.cumsum(np.diff(t) * (y[1:] + y[:-1]) / 2)])
+            low, high = np.clip(grid - step / 2, t[0], t[-1]), np.clip(grid + step / 2, t[0], t[-1])
+            values = (np.interp(high, t, area) - np.interp(low, t, area)) / (high - low)
+        else:
+            values = np.interp(grid, t, y)
+        scale = float(np.std(values[there])) if there.any() else 0.0
+        if scale == 0:
+            raise ValueError(
+                f"data '{record.name}': merged: expected a signal '{signal}' that changes, "
+                f"got {y[0]:g} throughout"
+            )
+        return cls(float(grid[0]), step, (values - values[there].mean()) / scale, there)
+
+
+def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
+    """The lag in steps of the best correlation, and that."""
+    size = 1 << int(np.ceil(np.log2(one.values.size + two.values.size)))
+
+    def product(a: Array, b: Array) -> Array:
+        return np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
+
+    m1, m2 = one.there.astype(float), two.there.astype(float)
+    y1, y2 = one.values * m1, two.values * m2
+    n = np.maximum(product(m1, m2), 1e-9)
+    s1, s2 = product(y1, m2), product(m1, y2)
+    var1 = np.maximum(product(y1**2, m2) - s1**2 / n, 1e-30)
+    var2 = np.maximum(product(m1, y2**2) - s2**2 / n, 0.0)
+    common = n >= OVERLAP * min(m1.sum(), m2.sum())
+    lively = common & (var1 > 1e-3 * n) & (var2 > 1e-3 * n)
+    found = np.where(lively, (product(y1, y2) - s1 * s2 / n) / np.sqrt(var1 * var2 + 1e-30), 0.0)
+    found = np.clip(found, -1.0, 1 - 1e-9)
+    best = int(np.argmax(found))
+    lags = np.where(np.arange(size) < one.values.size, np.arange(size), np.arange(size) - size)
+    if found[best] < ALIKE:
+        low = float(found.min())
+        hint = "; one of them has the opposite sign" if low < -ALIKE else ""
+        raise ValueError(
+            f"{where}: expected two recordings of one thing, got a correlation of at most "
+            f"{found[best]:.2f} at any shift{hint}"
+        )
+    order = np.argsort(lags, kind="stable")
+    values, at = found[order], int(np.flatnonzero(order == best)[0])
+    _check_single(where, values, at, one.step)
+    rest = ((1 - found**2) * var1 / n)[order]  # unexplained variance, whatever the overlap
+    likely = lively[order] & (rest < rest[at] * (1 + 9 * NEIGHBOURS / n[best] + 9 / n[best] ** 0.5))
+    if np.count_nonzero(likely) > FLATTEST:
+        raise ValueError(
+            f"{where}: expected signals that tell their delay, got {np.count_nonzero(likely)} "
+            f"shifts of {one.step:.2g} s that explain as much; say shift= [s]"
+        )
+    return int(lags[best]), float(found[best])
+
+
+def _check_single(where: str, values: Array, at: int, step: float) -> None:
+    """Refuse if another shift, beyond the hill of the best one, explains as much."""
+    peak = values[at]
+    low = peak - max(0.02, 2 * RIVAL * (1 - peak))
+    left, right = at, at
+    while left > 0 and values[left - 1] >= low:
+        left -= 1
+    while right < values.size - 1 and values[right + 1] >= low:
+        right += 1
+    others = np.concatenate([values[:left], values[right + 1 :]])
+    places = np.concatenate([np.arange(left), np.arange(right + 1, values.size)])
+    if others.size and 1 - others.max() ** 2 < RIVAL * (1 - peak**2) + 1e-4:
+        away = (int(places[int(np.argmax(others))]) - at) * step
+        raise ValueError(
+            f"{where}: expected one delay, got a second one {abs(away):.4g} s away that explains "
+            f"as much (correlation {others.max():.4f} against {peak:.4f}); say shift= [s]"
+        )
+
+
+def _smoothed(signal: _Even) -> Array:
+    reach = int(4 * SMOOTHING)
+    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING) ** 2)
+    padded = np.pad(signal.values, reach, mode="edge")
+    kernel = (window / window.sum()).astype(np.float64)
+    return np.asarray(np.convolve(padded, kernel, mode="valid"), dtype=np.float64)
+
+
+def _refined(
+    where: str, one: _Even, two: _Even, lag: int, correlation: float, *, with_drift: bool
+) -> _Fit:
+    """Gauss-Newton on shift, drift, gain and offset."""
+    y1, y2 = _smoothed(one), _smoothed(two)
+    t1 = one.start + one.step * np.arange(y1.size, dtype=np.float64)
+    t2 = two.start + two.step * np.arange(y2.size, dtype=np.float64)
+    slope = np.gradient(y2, two.step)
+    begin = one.start - two.start + lag * one.step
+    shift, drift = begin, 0.0
+    middle = float(t1.mean())
+    covariance, rest = np.eye(4), 1.0
+    for _ in range(ITERATIONS):
+        at = t1 - shift - drift * (t1 - middle)
+        k = np.clip(np.rint((at - two.start) / two.step).astype(int), 0, y2.size - 1)
+        use = (at >= t2[0]) & (at <= t2[-1]) & one.there & two.there[k]
+        base, inner = hermite(at[use], t2, y2), np.interp(at[use], t2, slope)
+        gain, offset = np.polyfit(base, y1[use], 1)
+        columns = [-gain * inner, -gain * inner * (t1[use] - middle), base, np.ones_like(base)]
+        jacobian = np.column_stack(columns if with_drift else [columns[0], *columns[2:]])
+        residual = y1[use] - gain * base - offset
+        scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+        step, *_ = np.linalg.lstsq(jacobian / scale, residual, rcond=1e-9)
+        step = step / scale
+        inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12)
+        rest = float(residual @ residual) * NEIGHBOURS / max(residual.size - 4, 1) + 1e-30
+        covariance = rest * inverse / np.outer(scale, scale)
+        limit = 2 * one.step
+        shift += float(np.clip(step[0], -limit, limit))
+        if with_drift:
+            drift += float(np.clip(step[1], -1e-3, 1e-3))
+        if abs(step[0]) < 1e-6 * one.step and (not with_drift or abs(step[1]) < 1e-9):
+            break
+    error = float(np.sqrt(covariance[0, 0]))
+    if not error < one.step or abs(shift - begin) > 20 * one.step:
+        raise ValueError(
+            f"{where}: expected signals that tell their delay, got one known to {error:.2g} s only "
+            f"at samples of {one.step:.2g} s; say shift= [s]"
+        )
+    drift_error = float(np.sqrt(covariance[1, 1])) if with_drift else 0.0
+    return _Fit(Delay(shift, drift, middle, error, drift_error, correlation), rest)
 
 
 def merged(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.record import Record
-from identification.data.units import EXAMPLES, KINDS, by_channel, unit
+from identification.data.units import EXAMPLES, KINDS, by_channel, is_common, unit
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -54,6 +54,17 @@ class Column:
     values: Array
     problem: str = ""
     gaps: bool = False
+
+    @classmethod
+    def of(cls, label: str, unit: str, values: Array) -> "Column":
+        """A column of numbers, some of which may be NaN or infinite."""
+        bad, problem = np.flatnonzero(~np.isfinite(values)), ""
+        if bad.size:
+            problem = (
+                f"sample {bad[0]}: expected a finite number, got {values[bad[0]]} ({bad.size} such)"
+            )
+        gaps = bool(np.isnan(values).any()) and not bool(np.isinf(values).any())
+        return cls(label, unit, values, problem, gaps)
 
 
 @final
@@ -100,11 +111,6 @@ class Wanted:
         checks.choice("read: missing", self.missing, ("refuse", "drop"))
 
 
-def only_gaps(values: Array) -> bool:
-    """Whether some samples are NaN, and no others are bad."""
-    return bool(np.isnan(values).any()) and not bool(np.isinf(values).any())
-
-
 def label(cell: str) -> tuple[str, str]:
     """Name and unit of a header cell: `x [mm]`, `x (mm)`, `x / mm`; of anything else the cell."""
     cell = cell.strip()
@@ -113,10 +119,10 @@ def label(cell: str) -> tuple[str, str]:
         return match[1], match[2].strip()
     for pattern in (r"(.*?)\s*\((.*)\)", r"(.*\S)\s+/\s*(\S.*)", r"([^/]*\w)/(\w[^/]*)"):
         match = fullmatch(pattern, cell)
-        if match and match[1] and unit(match[2]) is not None:
+        if match and match[1] and is_common(match[2]):
             return match[1], match[2].strip()
     match = fullmatch(r"(.+)_([A-Za-z]+)", cell)
-    if match and unit(match[2]) is not None and _alias(match[1]):
+    if match and is_common(match[2]) and _alias(match[1]):
         return match[1], match[2]
     return cell, ""
 

@@ -1,16 +1,329 @@
-"""Which files are meant, and who reads each."""
+"""Columns from text files (CSV in its dialects), from other files and from Python objects."""
 
-from collections.abc import Callable, Sequence
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from glob import glob, has_magic
 from os import PathLike
 from pathlib import Path
+from re import fullmatch
+from typing import Any, final
+
+import numpy as np
 
 from identification.data.mat_file import read_mat, read_npy
-from identification.data.raw import Wanted, gathered, record
+from identification.data.raw import Array, Column, Raw, Wanted, gathered, label, record
 from identification.data.record import Record
-from identification.data.text_file import read_text
+from identification.data.units import is_common, unit
 from symfric.foundation import checks
+from symfric.foundation.files import write_table
+
+ASSUMED = {"t": "s", "x": "m", "v": "m/s", "a": "m/s^2", "force": "N", "F": "N", "N": "N"}
+"""Units of arrays about which nobody says anything: numbers in Python are SI everywhere here."""
+
+
+def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[Raw, bool]:
+    """The columns of `frame` and `arrays`, and whether they come from a frame.
+
+    A frame is what has `columns` and gives one by its name: pandas, polars. A mapping holds
+    arrays. Times with a date become seconds from the first one.
+
+    Raises:
+        ValueError: neither, columns that are no vectors or of different lengths.
+    """
+    where = f"data '{name}'"
+    given: dict[str, object] = {}
+    framed = hasattr(frame, "columns") and hasattr(frame, "__getitem__")
+    if framed:
+        held: Any = frame
+        given = {str(key): held[key] for key in held.columns}
+        index = getattr(held, "index", None)
+        if getattr(index, "name", None) is not None:
+            given = {str(getattr(index, "name", "")): index, **given}
+    elif isinstance(frame, Mapping):
+        given = dict(checks.named(where, frame))
+    elif frame is not None:
+        raise checks.refused(
+            where, "arrays by name or a frame", frame, "write Dataset.of(t=t, x=x, force=force)"
+        )
+    twice = [key for key in arrays if key in given]
+    if twice:
+        raise ValueError(f"{where}: expected every column once, got {', '.join(twice)} twice")
+    columns = tuple(_held(where, key, v) for key, v in (given | dict(arrays)).items())
+    if not columns:
+        raise ValueError(f"{where}: expected columns such as t=..., x=..., force=..., got none")
+    labels = [c.label for c in columns]
+    if len(set(labels)) < len(labels):
+        raise ValueError(f"{where}: expected every column once, got {', '.join(labels)}")
+    sizes = {c.label: c.values.size for c in columns}
+    if len(set(sizes.values())) > 1:
+        got = ", ".join(f"{key}: {size}" for key, size in sizes.items())
+        raise ValueError(f"{where}: expected columns of one length, got {got}")
+    return Raw(name, columns, verb="data"), framed
+
+
+def _held(where: str, key: str, values: object) -> Column:
+    name, said = label(key)
+    if isinstance(values, np.ma.MaskedArray):  # what is masked was not measured
+        masked: Any = values  # pyright: ignore[reportUnknownVariableType]
+        values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
+    try:
+        found = np.asarray(values)
+    except (ValueError, TypeError):
+        raise checks.refused(f"{where}: {key}", "a vector of numbers", values) from None
+    if found.ndim == 2 and min(found.shape) == 1:  # a vector as MATLAB has them
+        found = found.ravel()
+    if found.dtype.kind in "mM" and found.ndim == 1 and found.size:
+        seconds = (found - found[0]).astype("timedelta64[ns]").astype(np.int64) * 1e-9
+        return Column.of(name, "s", seconds)
+    if found.ndim != 1:
+        raise checks.refused(f"{where}: {key}", "a vector of numbers", values)
+    numbers, problem = np.full(found.size, np.nan), ""
+    if found.dtype.kind in "iufb":
+        numbers = found.astype(float)
+    elif found.dtype.kind == "O":
+        for k, item in enumerate(found):
+            number = checks.as_number(item)
+            if number is None:
+                problem = f"sample {k}: expected a number, got {checks.shown(item)}"
+                break
+            numbers[k] = number
+    else:
+        problem = f"sample 0: expected a number, got {checks.shown(found[0])}" if found.size else ""
+    return Column(name, said, numbers, problem) if problem else Column.of(name, said, numbers)
+
+
+COMMENTS = ("#", "%", "//")
+"""What a line begins with that says something about the file."""
+DELIMITERS = ("\t", ";", ",", " ")
+EMPTY = ("", "-", "na", "n/a", "null")
+"""Cells that say that there is no number, beside NaN."""
+LOOKED_AT = 40
+"""Lines at the end of the file that tell the delimiter."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Lines as cells.
+
+    Attributes:
+        delimiter: between the cells; a space stands for any number of spaces and tabs.
+        numbers: of the rows in the file.
+        cells: of each row.
+        comments: rows that begin with a sign of comment, before the first other one.
+    """
+
+    delimiter: str
+    numbers: list[int]
+    cells: list[list[str]]
+    comments: list[str]
+
+
+def read_text(file: Path) -> Raw:
+    """The columns of a text file.
+
+    Comma, semicolon, tab or spaces separate the cells; decimal commas are understood where they
+    do not separate. Lines before the header and lines that begin with #, % or // are passed over,
+    but a last comment with as many words as there are columns is the header of a file without
+    another. A row of units may follow the header.
+
+    Raises:
+        ValueError: no file, no text, no rows of numbers, rows of different lengths.
+    """
+    rows = _rows(file)
+    where = f"read '{file.name}'"
+    comma = rows.delimiter != "," and _decimal_comma(rows)
+    first = _first(rows, comma)
+    header, names, units = _header(rows, first)
+    if first is None:
+        got = "an empty file" if not rows.cells else f"{len(rows.cells)} rows of text only"
+        if header is not None:
+            got = "a header alone"
+        raise ValueError(f"{where}: expected rows of numbers, got {got}")
+    width = len(names) if names else len(rows.cells[first])
+    body, numbers = rows.cells[first:], rows.numbers[first:]
+    for number, row in zip(numbers, body, strict=True):
+        if len(row) > width and any(cell for cell in row[width:]):
+            hint = "; write numbers with a decimal point" if rows.delimiter == "," else ""
+            raise ValueError(
+                f"{where}: row {number}: expected {width} cells as in the "
+                f"{'header' if names else 'first row'}, got {len(row)}{hint}"
+            )
+    columns: list[Column] = []
+    for k in range(width):
+        values, problem, gaps = _column(body, numbers, k, comma)
+        name, said = label(names[k]) if names else ("", "")
+        columns.append(Column(name, said or (units[k] if units else ""), values, problem, gaps))
+    return Raw(file.name, tuple(columns), numbers[0])
+
+
+def _rows(file: Path) -> Rows:
+    """Lines that are not empty, as cells."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raw = file.read_bytes()
+        if not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+            text = raw.decode("latin-1")  # degrees and micro of older recorders
+        else:
+            try:
+                text = raw.decode("utf-16")
+            except UnicodeDecodeError:
+                raise ValueError(
+                    f"read '{file.name}': expected text in UTF-8 or UTF-16, got other bytes"
+                ) from None
+    if "\0" in text:
+        raise ValueError(f"read '{file.name}': expected a text file, got one with binary numbers")
+    lines = [(n, line.strip("\ufeff \r")) for n, line in enumerate(text.split("\n"), start=1)]
+    comments: list[str] = []
+    plain: list[tuple[int, str]] = []
+    for number, line in lines:
+        if line.lstrip('" \t').startswith(COMMENTS):
+            if not plain:
+                comments.append(line.lstrip('" \t#%/').strip())
+        elif line.strip(" \t,;"):
+            plain.append((number, line))
+    if not plain:
+        return Rows(",", [], [], comments)
+    delimiter = _delimiter([line for _, line in plain])
+    cells = [split_line(line, delimiter) for _, line in plain]
+    return Rows(delimiter, [n for n, _ in plain], cells, comments)
+
+
+def _delimiter(lines: Sequence[str]) -> str:
+    """The delimiter that makes most of the last lines rows of as many numbers."""
+    last = lines[-LOOKED_AT:]
+
+    def score(delimiter: str) -> tuple[float, int]:
+        rows = [split_line(line, delimiter) for line in last]
+        widths = [len(row) for row in rows]
+        usual = max(set(widths), key=widths.count)
+        numbers = sum(sum(map(_is_number, row)) for row in rows if len(row) == usual)
+        return (numbers / (usual * len(rows)) if usual > 1 else 0.0), -DELIMITERS.index(delimiter)
+
+    best = max(DELIMITERS, key=score)
+    if score(best)[0] > 0:
+        return best
+    return max(",;\t", key=lines[0].count) if any(d in lines[0] for d in ",;\t") else " "
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """The cells of one line."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        try:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+        except (csv.Error, StopIteration):
+            pass
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def _number(cell: str) -> float:
+    if "_" in cell:  # which Python takes for a number
+        raise ValueError
+    return float(cell)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        _number(cell)
+    except ValueError:
+        return fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell) is not None
+    return True
+
+
+def _decimal_comma(rows: Rows) -> bool:
+    """Whether numbers have decimal commas: cells of digits with one comma, and no point."""
+    cells = [cell for row in rows.cells[-LOOKED_AT:] for cell in row]
+    with_comma = sum(fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", c) is not None for c in cells)
+    with_point = sum(fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", c) is not None for c in cells)
+    return with_comma > with_point
+
+
+def _numeric(row: Sequence[str], comma: bool) -> bool:
+    """Whether most of the cells are numbers, so that the row is no header."""
+    cells = [cell.replace(",", ".") if comma else cell for cell in row if cell]
+    numbers = sum(map(_is_number, cells))
+    return numbers > 0 and numbers >= len(cells) / 2
+
+
+def _first(rows: Rows, comma: bool) -> int | None:
+    """The first row of numbers: as wide as most of the last ones are."""
+    widths = [_trimmed(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
+    usual = max(set(widths), key=widths.count, default=0)
+    return next(
+        (k for k, r in enumerate(rows.cells) if _trimmed(r) >= usual and _numeric(r, comma)), None
+    )
+
+
+def _header(rows: Rows, first: int | None) -> tuple[int | None, list[str] | None, list[str] | None]:
+    """Number of the header row, names and units of the columns, as far as there are any."""
+    end = len(rows.cells) if first is None else first
+    width = 0 if first is None else _trimmed(rows.cells[first])
+    above = [k for k in range(end) if first is None or len(rows.cells[k]) >= width]
+    if not above:
+        spoken = [split_line(c, rows.delimiter) for c in rows.comments[-1:]]
+        spoken += [c.split() for c in rows.comments[-1:]]
+        names = next((s for s in spoken if len(s) == width and width), None)
+        return None, names, None
+    last = above[-1]
+    cells = rows.cells[last]
+    if len(above) > 1 and all(unit(c.strip("[]()")) is not None for c in cells):
+        names = rows.cells[above[-2]]
+        if len(names) == len(cells) and not all(is_common(c) for c in names if c):
+            return above[-2], names, [c.strip("[]()") for c in cells]
+    while cells and not cells[-1]:
+        cells = cells[:-1]
+    return last, cells, None
+
+
+def _trimmed(row: Sequence[str]) -> int:
+    """Number of cells up to the last that holds something."""
+    return max((k + 1 for k, cell in enumerate(row) if cell), default=0)
+
+
+def _column(
+    body: Sequence[Sequence[str]], numbers: Sequence[int], index: int, comma: bool
+) -> tuple[Array, str, bool]:
+    """One column as numbers, a sentence about its first bad cell, whether all such are empty."""
+    cells = [row[index] if index < len(row) else "" for row in body]
+    if comma:
+        cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
+    values = np.full(len(cells), np.nan)
+    problem = ""
+    for k, cell in enumerate(cells):
+        try:
+            values[k] = _number(cell)
+        except ValueError:
+            problem = problem or f"row {numbers[k]}: expected a number, got '{cell[:40]}'"
+            if cell.lower() not in EMPTY:
+                return values, problem, False
+    gaps = not bool(np.isinf(values).any())
+    if problem:
+        return values, problem, gaps
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        place = f"row {numbers[int(bad[0])]}"
+        return (
+            values,
+            f"{place}: expected a finite number, got {cells[int(bad[0])][:40]}"
+            + (f" ({bad.size} such cells)" if bad.size > 1 else ""),
+            gaps,
+        )
+    return values, "", False
+
+
+def to_csv(record: Record, path: Path) -> Path:
+    """Write a record with units in its header, and give the path back."""
+    signals = {**({} if record.t is None else {"t": record.t}), **record.signals}
+    units = {key: record.unit(key) for key in signals}
+    header = [f"{key} [{units[key]}]" if units[key] else key for key in signals]
+    write_table(path, header, np.column_stack(list(signals.values())).tolist())
+    return path
+
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".data", "")
 NUMPY = (".npy", ".npz")

@@ -1,4 +1,7 @@
-"""Records at equal intervals, or with signals moved in time; a gap is never bridged silently."""
+"""Records at equal intervals, moved in time, or repaired: nothing happens unless it is requested.
+
+A gap is never bridged silently.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,13 +11,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Record
+from identification.data.check_signals import spike_samples
+from identification.data.record import GAP, Record
+from identification.data.units import unit
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
 
-GAP = 5.0
-"""An interval of more than so many median intervals is a gap."""
 SHORTEST = 10
 """Samples of a piece between two gaps that is kept."""
 MOST = 1e8
@@ -143,3 +146,58 @@ def hermite(at: Array, t: Array, y: Array) -> Array:
     s = (at - t[k]) / h
     ends = y[k] * (1 + 2 * s) * (1 - s) ** 2 + y[k + 1] * s**2 * (3 - 2 * s)
     return ends + h * s * (1 - s) * (slope[k] * (1 - s) - slope[k + 1] * s)
+
+
+def without_spikes(record: Record) -> Record:
+    """The record with samples far off their neighbours replaced by a line between those."""
+    signals = dict(record.signals)
+    for name, values in record.signals.items():
+        far, _ = spike_samples(values, position=name == "x")
+        if far.size:
+            rest = np.setdiff1d(np.arange(values.size), far)
+            signals[name] = np.interp(np.arange(values.size), rest, values[rest])
+    return replace(record, signals=signals)
+
+
+def unwrapped(record: Record, periods: Mapping[str, float]) -> Record:
+    """The record with signals that were counted modulo a period counted through.
+
+    Raises:
+        ValueError: an unknown signal, a period that is not positive.
+    """
+    where = f"data '{record.name}': unwrapped"
+    signals = dict(record.signals)
+    for name, period in checks.named(where, periods).items():
+        key = record.channel(name)
+        step = checks.number(f"{where}: {name}", period, unit=record.units[key], above=0.0)
+        signals[key] = np.unwrap(signals[key], period=step)
+    return replace(record, signals=signals)
+
+
+def scaled(
+    record: Record, factors: Mapping[str, float], units: Mapping[str, str] | None = None
+) -> Record:
+    """The record with signals times factors: a sign that was wrong, newtons from volts.
+
+    Args:
+        record: to change.
+        factors: signal -> factor.
+        units: signal -> its unit afterwards, where that changes.
+
+    Raises:
+        ValueError: an unknown signal, a factor of 0, no unit.
+    """
+    where = f"data '{record.name}': scaled"
+    signals, now = dict(record.signals), dict(record.units)
+    for name, factor in checks.named(where, factors).items():
+        key = record.channel(name)
+        number = checks.number(f"{where}: {name}", factor)
+        if number == 0:
+            raise ValueError(f"{where}: {name}: expected a factor other than 0, got 0")
+        signals[key] = number * signals[key]
+    for name, said in checks.named(f"{where}: units", units).items():
+        key, meant = record.channel(name), unit(checks.text(f"{where}: units: {name}", said))
+        if meant is None:
+            raise checks.refused(f"{where}: units: {name}", "a unit, such as N or N m", said)
+        signals[key], now[key] = meant.factor * signals[key], meant.si
+    return replace(record, signals=signals, units=now)

@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.view import View, count_of
+from identification.data.findings import View, count_of
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.loop import PositionLoop
-from identification.data.record import Record
+from identification.data.record import PositionLoop, Record
 from symfric.foundation import checks
 from symfric.integrator.stepper import stepper
 from symfric.laws import Law, Stribeck

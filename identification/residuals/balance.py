@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.imposed import imposed_step
-from identification.residuals.sampled import Equations
+from identification.residuals.sampled import Equations, imposed_step
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, starts_of, symbols_of

@@ -19,8 +19,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.loop import PositionLoop
-from identification.data.record import Record
+from identification.data.record import PositionLoop, Record
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.initial import local, noise_of
 from identification.residuals.stepper import (
@@ -31,7 +30,7 @@ from identification.residuals.stepper import (
     Tangent,
     why_no_motion,
 )
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
 
 if TYPE_CHECKING:

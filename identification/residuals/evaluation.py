@@ -8,7 +8,7 @@ from typing import Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 
 Array = NDArray[np.float64]
 

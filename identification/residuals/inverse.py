@@ -8,7 +8,6 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from identification.data.dataset import Dataset
 from identification.residuals.balance import Balance, Row, balance, coordinates
@@ -16,8 +15,8 @@ from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.motions import Motion, Piece, measure, piece
 from identification.residuals.sampled import Sampled
 from identification.signals.filters import Filter
+from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
-from identification.unknowns.unknown import Unknown
 from symfric.foundation import checks
 from symfric.model import Model
 
@@ -205,6 +204,8 @@ class InverseRows:
         """`w` with the force that acts, u(t - delay), and du/dt there (inputs, n)."""
         if delay is None:
             return motion.w, np.zeros((0, 0))
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
+
         spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)
         at = np.clip(motion.t - delay, motion.t[0], motion.t[-1])
         w = motion.w.copy()

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate
-from identification.residuals.imposed import moving_start
+from identification.residuals.sampled import moving_start
 from identification.signals.differentiate import derivatives, uncertain
-from identification.signals.filters import Decimation, Filter, choose_filter
-from identification.signals.velocity import Velocity
+from identification.signals.filters import Decimation, Filter, Velocity, choose_filter
 from symfric.model import Model
 
 Array = NDArray[np.float64]

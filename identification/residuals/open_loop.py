@@ -1,9 +1,10 @@
-"""The motion of a drive under its measured force, without feedback, by the sampled engine.
+"""The motion of one mass under its measured force by the sampled engine, without feedback.
 
-What shooting simulates where friction has no states: some 20 times faster than error control, with
-exact sensitivities. One call is one window: from a start that is fitted, over its samples.
+Shooting simulates so where friction has no states: some hundred times faster than error control,
+with exact sensitivities, and as right as the samples of the inputs are; see `stepper`.
 """
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, cast
 
 import numpy as np
@@ -18,6 +19,7 @@ from identification.residuals.stepper import (
     why_not_sampled,
 )
 from symfric.foundation import checks
+from symfric.foundation.numeric import is_number
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -109,3 +111,43 @@ def _chain(model: Model) -> Chain:
         count = len(mass.inputs)
         model.memory[KEY] = Chain.of(mass, given_inputs(count), row=count, substeps=1)
     return cast(Chain, model.memory[KEY])
+
+
+SUBSTEPS = (1, 2, 4, 8, 16, 32)
+"""Steps a sample to choose from."""
+SHARE = 1e-5
+"""Error over the spread of a signal that is taken where the engine is asked for: laws err more."""
+
+
+def why_not(model: Model, signals: Sequence[str], inputs: Mapping[str, object]) -> str:
+    """Why the windows of a model are not for the sampled engine; "" where they are."""
+    why = why_not_sampled(model)
+    states = [v.name for v in model.x]
+    others = [name for name in signals if name not in states]
+    if not why and others:
+        why = f"expected signals among the states {', '.join(states)}, got {', '.join(others)}"
+    odd = [n for n, given in inputs.items() if not isinstance(given, str) and not is_number(given)]
+    if not why and odd:
+        why = f"expected inputs that are channels or numbers, got another one for {', '.join(odd)}"
+    return why
+
+
+def choose_substeps(
+    predicted: Callable[[int], Array | str], tolerable: Sequence[tuple[slice, float]]
+) -> int | None:
+    """Steps a sample that are enough; None: the most are not, or there is no motion.
+
+    Args:
+        predicted: steps a sample -> simulated values of all rows.
+        tolerable: rows of a channel and the root mean square error that it may have.
+    """
+    coarse = predicted(SUBSTEPS[0])
+    for substeps in SUBSTEPS:
+        fine = predicted(2 * substeps)
+        if isinstance(coarse, str) or isinstance(fine, str):
+            return None
+        error = fine - coarse
+        if all(np.sqrt(np.mean(error[rows] ** 2)) <= most for rows, most in tolerable):
+            return substeps
+        coarse = fine
+    return None

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.residuals.evaluation import Channel, Evaluation
-from identification.residuals.imposed import imposed_step, moving_start
-from identification.residuals.sampled import Equations, Sampled
+from identification.residuals.sampled import Equations, Sampled, imposed_step, moving_start
+from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
-from identification.unknowns.unknown import Unknown
 from symfric.foundation import checks
 from symfric.foundation.parameters import symbolise
 from symfric.foundation.symbols import symbols_of

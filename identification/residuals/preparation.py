@@ -8,19 +8,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.delays import DEAD_TIME, delayed
 from identification.residuals.evaluation import Channel
-from identification.residuals.initial import Begin, Sensed, hidden, noise_of
-from identification.residuals.portable import plain
-from identification.residuals.sampled_shots import (
+from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
+from identification.residuals.open_loop import (
     SHARE,
     SUBSTEPS,
     choose_substeps,
     why_not,
 )
-from identification.residuals.shots import Drives, Shot, Shots
-from identification.residuals.windows import cut, turnaround
-from identification.unknowns.unknown import Unknown
+from identification.residuals.shots import DEAD_TIME, Drives, Shot, Shots, delayed, plain
+from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import is_number

@@ -1,21 +1,98 @@
-"""Simulations of windows of records, and what they leave of the data."""
+"""Simulations of windows of records, and their difference from the data.
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+Dead time of inputs: a model is driven by what was recorded a while earlier,
+
+    u(t) = recorded(t - tau),     du/dtau = -recorded'(t - tau)
+
+Between samples an input is linear, so its rate is constant there and jumps at the samples. With a
+further parameter theta, which stays 0, the model is driven by u - theta u_rate: its derivative by
+theta is that of the motion by tau, whatever the model.
+"""
+
+import pickle
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.delays import DEAD_TIME, RATE, rate
 from identification.residuals.evaluation import Channel, Evaluation
-from identification.residuals.portable import packed, unpacked
-from identification.residuals.sampled_shots import SampledRun, sampled_run
-from identification.unknowns.unknown import Unknown
+from identification.residuals.open_loop import means, refined, stepped
+from identification.residuals.stepper import Motion
+from identification.unknowns.spec import Unknown
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import stacked
 from symfric.integrator import Hold, Input, Linear, Trajectory, simulate
-from symfric.model import Model
+from symfric.model import Model, Output
 
 Array = NDArray[np.float64]
+DEAD_TIME = "dead_time"
+"""Name of the unknown and of the parameter of a delayed model."""
+RATE = "_rate"
+"""Behind the name of an input: its rate."""
+
+
+def delayed(model: Model, inputs: Sequence[str]) -> Model:
+    """The model with a parameter `dead_time` (0) and the rates of `inputs` as inputs."""
+    theta = Variable(DEAD_TIME, "s", nominal=1e-3, doc="0; derivatives by it are by the dead time")
+    driven = [v for v in model.u if v.name in inputs]
+    rates = [Variable(v.name + RATE, f"{v.unit}/s", nominal=v.nominal) for v in driven]
+    old = stacked(v.symbol for v in driven)
+    new = old - theta.symbol * stacked(v.symbol for v in rates)
+
+    def put(expression: Any) -> ca.SX:
+        return ca.substitute(ca.SX(expression), old, new)
+
+    changes: dict[str, Any] = {
+        "u": (*model.u, *rates),
+        "p": (*model.p, theta),
+        "outputs": {n: replace(o, expression=put(o.expression)) for n, o in model.outputs.items()},
+        "monitors": tuple(replace(m, expression=put(m.expression)) for m in model.monitors),
+        "events": tuple(
+            replace(e, expression=put(e.expression), reset={n: put(v) for n, v in e.reset.items()})
+            for e in model.events
+        ),
+    }
+    if model.holonomic is not None:
+        mechanics = model.holonomic
+        parts = {n: put(getattr(mechanics, n)) for n in ("implicit", "rates", "pressing")}
+        changes |= {"holonomic": replace(mechanics, **parts), "ode": None, "alg": ca.SX(0, 1)}
+    elif model.ode is None:
+        changes["residual"] = put(model.residual)
+    else:
+        changes |= {"ode": put(model.ode), "alg": put(model.alg)}
+    return replace(model, **changes)
+
+
+def rate(t: Array, values: Array) -> Hold:
+    """Rate of linear samples, 0 before the first and after the last one."""
+    begin = np.concatenate([[t[0] - (t[1] - t[0])], t])
+    return Hold(begin, np.concatenate([[0.0], np.diff(values) / np.diff(t), [0.0]]))
+
+
+def plain(model: Model, signals: Iterable[str] | None = None) -> Model:
+    """The equations of `model` with the outputs among `signals` alone; None keeps them all."""
+    wanted = model.signals if signals is None else set(signals)
+    outputs = {name: output for name, output in model.outputs.items() if name in wanted}
+    return replace(
+        model, outputs=outputs, contacts=(), opening=None, details=dict[str, Output], sketch=None
+    )
+
+
+def packed(model: Model) -> bytes:
+    """A plain model as bytes."""
+    with ca.global_pickle_context():
+        return pickle.dumps(model)
+
+
+def unpacked(data: bytes) -> Model:
+    """The model of such bytes."""
+    with ca.global_unpickle_context():
+        return checks.kind("unpacked", pickle.loads(data), Model, "packed(model)")
+
 
 METHOD = "radau5"
 """What `simulate` takes for derivatives; without them it would take another one."""
@@ -85,6 +162,68 @@ class Shot:
     drives: Drives
     held: Mapping[str, float]
     free: Mapping[str, int]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SampledRun:
+    """A motion of one window at the times that are compared."""
+
+    signals: Mapping[str, Array]
+    sensitivities: Mapping[str, Mapping[str, Array]]
+
+    def __getitem__(self, name: str) -> Array:
+        return self.signals[name]
+
+
+def sampled_run(
+    model: Model, shot: Shot, x0: Mapping[str, float], p: Array, tau: float, substeps: int
+) -> SampledRun | str:
+    """The motion of one window from `x0`, with all its derivatives; why there is none.
+
+    Args:
+        model: one mass; plain, perhaps with a dead time.
+        shot: the window.
+        x0: start values that are known.
+        p: values of `model.p`.
+        tau: dead time of the inputs [s].
+        substeps: steps a sample.
+    """
+    drives = shot.drives
+    first, last = np.searchsorted(drives.t, [shot.t[0], shot.end])
+    t = drives.t[first : last + 1]
+    names = [v.name for v in model.x]
+    known = dict(zip([v.name for v in model.p], p.tolist(), strict=True))
+    start = x0 if len(x0) == 2 else dict(zip(names, model.initial_state(x0, known), strict=True))
+    begin = np.array([start[name] for name in names], dtype=float)
+    instants = refined(t, substeps)
+    columns = [_mean(v.name, drives, instants - tau) for v in model.u]
+    between = np.array(columns).reshape(len(columns), instants.size - 1).T
+    motion = stepped(model, instants, between, p, begin)
+    look = np.searchsorted(t, shot.t) * substeps
+    return motion if isinstance(motion, str) else _run(model, motion, look)
+
+
+def _mean(name: str, drives: Drives, at: Array) -> Array:
+    if name in drives.sampled:
+        return means(drives.t, drives.sampled[name], at, drives.held)
+    if name in drives.others:
+        return np.full(at.size - 1, float(drives.others[name]))  # type: ignore[arg-type]
+    values = np.interp(at, drives.t, drives.sampled[name.removesuffix(RATE)])
+    return np.diff(values) / np.diff(at)
+
+
+def _run(model: Model, motion: Motion, look: NDArray[np.intp]) -> SampledRun:
+    states = [v.name for v in model.x]
+    unknowns = [*(v.name for v in model.p), *(f"x0.{name}" for name in states)]
+    slopes = motion.slopes[look]
+    return SampledRun(
+        {name: motion.states[look, k] for k, name in enumerate(states)},
+        {
+            unknown: {name: slopes[:, k, i] for k, name in enumerate(states)}
+            for i, unknown in enumerate(unknowns)
+        },
+    )
 
 
 @final

@@ -1,34 +1,97 @@
-"""The result of a fit, put together from where the solver ended and what the residuals say."""
+"""The result of a fit, put together from the end of the search and the verdict on the residuals."""
 
 import platform
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from dataclasses import MISSING, fields, is_dataclass
+from math import inf, isfinite
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
-from identification.result.calls import written
-from identification.result.curve import Curve, of_drive, of_points
-from identification.result.estimate import Estimate
 from identification.result.fitted import Fitted, Tried
 from identification.result.live import Asked, Kind, Live, errors_of, labels
-from identification.result.series import Series, points_each, series
+from identification.result.series import (
+    Curve,
+    Estimate,
+    Series,
+    of_drive,
+    of_points,
+    points_each,
+    series,
+)
 from identification.solving.descent import Start
 from identification.solving.task import Point, Task
 from identification.unknowns.roles import is_coefficient
+from identification.unknowns.spec import Above, Range, Tied
 from identification.unknowns.subject import Subject
-from identification.verdict.covariance import Covariance
+from identification.verdict.covariance import Covariance, Levels
 from identification.verdict.judge import Verdict
-from identification.verdict.levels import Levels
 from symfric import __version__
-from symfric.foundation.parameters import parameters
+from symfric.foundation.parameters import Parametric, parameters
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
 from symfric.laws import Law
+from symfric.model import Model
 from symfric.scenes import Drive
 from symfric.scenes.base import Scene
+
+SHOWN = 6
+"""Numbers of an array that are written out."""
+
+
+def written(value: object) -> str:
+    """Python that says `value`, without what is as by default; data and models by a name.
+
+    Long arrays are three dots.
+    Fields without a default stand first, without their names.
+    """
+    if isinstance(value, Dataset):
+        return "data"
+    if isinstance(value, Model):
+        return value.name
+    if isinstance(value, Range | Above | Tied):
+        return _rule(value)
+    if isinstance(value, np.ndarray) and value.size > SHOWN:
+        return "..."
+    if isinstance(value, Mapping):
+        items: Mapping[Any, Any] = value  # pyright: ignore[reportUnknownVariableType]
+        return f"{{{', '.join(f'{k!r}: {written(v)}' for k, v in items.items())}}}"
+    if callable(value) and not is_dataclass(value):
+        return getattr(value, "__name__", "function")
+    if not is_dataclass(value) or isinstance(value, Parametric):
+        return repr(value)
+    given: list[str] = []
+    for item in fields(value):
+        own = getattr(value, item.name)
+        if item.default is MISSING:
+            given.append(written(own))
+        elif own is not item.default and not _same(own, item.default):
+            given.append(f"{item.name}={written(own)}")
+    return f"{type(value).__name__}({', '.join(given)})"
+
+
+def _same(value: object, default: object) -> bool:
+    plain = (str, int, float, tuple)
+    return isinstance(value, plain) and isinstance(default, plain) and value == default
+
+
+def _rule(rule: Range | Above | Tied) -> str:
+    """What `log`, `linear`, `above` or `tied` was called with."""
+    if isinstance(rule, Tied):
+        name, factor = (getattr(rule.rule, n, None) for n in ("name", "factor"))
+        return f"tied({name!r}, {factor!r})" if name else f"tied({written(rule.rule)})"
+    start = [] if rule.start is None else [f"start={rule.start!r}"]
+    if isinstance(rule, Above):
+        upper = [repr(rule.upper)] if rule.upper < inf else []
+        return f"above({', '.join([repr(rule.name), *upper, *start])})"
+    if rule.logarithmic is None and rule.start is not None and rule.lower == -inf:
+        return repr(rule.start)
+    kind = {True: "log", False: "linear", None: ""}[rule.logarithmic]
+    return f"{kind}({', '.join([repr(rule.lower), repr(rule.upper), *start])})"
+
 
 MOST = 40
 """Values of which all correlations are kept; of more, start values of records are left out."""

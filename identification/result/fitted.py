@@ -11,12 +11,8 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
-from identification.result.curve import Curve
-from identification.result.estimate import Errors, Estimate, Tried
 from identification.result.live import Asked, Live
-from identification.result.page import Ranking, page_of
-from identification.result.series import Series
-from identification.result.stored import read, to_dict
+from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.result.text import sentences, text_of
 from identification.verdict.judge import Verdict
 from identification.verdict.profile import Profile, profile
@@ -28,13 +24,14 @@ from symfric.foundation.status import Status
 from symfric.foundation.typed import agree
 from symfric.laws import Law
 from symfric.model import Model
-from symfric.results import tables
 from symfric.results.stored import Format
 from symfric.scenes import Drive
 from symfric.scenes.base import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from identification.result.page import Ranking
 
 Array = NDArray[np.float64]
 
@@ -214,13 +211,15 @@ class Fitted:
 
         return picture(self, names, path)
 
-    def to_html(self, path: str | Path, ranking: Ranking | None = None) -> None:
+    def to_html(self, path: str | Path, ranking: "Ranking | None" = None) -> None:
         """Write one HTML page with everything, self-contained: no network, no scripts.
 
         Args:
             path: of the page.
             ranking: of several laws, from `select`.
         """
+        from identification.result.page import page_of  # noqa: PLC0415 (slow to import)
+
         write_text(path, page_of(self, ranking))
 
     def to_dataframe(self) -> Any:
@@ -229,6 +228,8 @@ class Fitted:
         Raises:
             ImportError: no pandas.
         """
+        from symfric.results import tables  # noqa: PLC0415 (slow to import)
+
         pandas = tables.module("to_dataframe", "pandas")
         rows = {name: vars(estimate) for name, estimate in self.parameters.items()}
         frame = pandas.DataFrame.from_dict(rows, orient="index")
@@ -238,6 +239,8 @@ class Fitted:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but `live` as plain data, ready for JSON."""
+        from identification.result.stored import to_dict  # noqa: PLC0415 (slow to import)
+
         return to_dict(self)
 
     def to_json(self, path: str | Path) -> None:
@@ -255,6 +258,8 @@ class Fitted:
         Raises:
             ValueError: no such file, one that something else wrote, or one of a later version.
         """
+        from identification.result.stored import read  # noqa: PLC0415 (slow to import)
+
         return read(Fitted, path, own)
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Residuals
 from identification.residuals.inverse import InverseDynamics, InverseRows
-from identification.result.estimate import Errors
-from identification.result.series import error
+from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task
 from identification.unknowns.spec import Tied

@@ -1,14 +1,17 @@
-"""A fit as one HTML page that needs nothing from elsewhere."""
+"""A fit as one self-contained HTML page: tables and charts."""
 
 from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
-from identification.result import charts
-from identification.result.estimate import Errors, Estimate
-from identification.result.law_data import source_of
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.result.series import Curve, Errors, Estimate, Series, limits
+from identification.result.stored import source_of
 from identification.result.text import (
     MANY,
+    SAME,
     best_starts,
     correlated,
     count_of,
@@ -22,10 +25,118 @@ from identification.result.text import (
     with_unit,
 )
 from symfric.page import html
+from symfric.page.scale import Axis, around
+from symfric.page.svg import Band, Dots, Level, Mark, Path, Stems, chart
 
 if TYPE_CHECKING:
     from identification.result.fitted import Fitted
     from identification.verdict.judge import Test
+
+Array = NDArray[np.float64]
+
+WINDOWS = 60
+"""Beginnings of windows that are drawn."""
+FLOOR = 1e-3
+"""Smallest difference that the waterfall shows."""
+
+
+def _across(one: Series) -> Axis:
+    name, _, unit = one.abscissa.rstrip("]").partition(" [")
+    low, high = float(one.residual.t.min()), float(one.residual.t.max())
+    if low < high and one.ordered:
+        return Axis(name, unit, low, high)
+    return around(name, unit, [one.residual.t])
+
+
+def _windows(one: Series) -> list[Mark]:
+    """Where windows begin; of many none, they would be a hatching."""
+    if one.breaks.size > WINDOWS:
+        return []
+    return [Level("window", float(t), upright=True) for t in one.breaks]
+
+
+def data_and_fit(one: Series) -> str:
+    """Measured and fitted signal."""
+    shape = Path if one.ordered else Dots
+    y = around(one.signal, one.unit, [one.measured.y, one.predicted.y])
+    marks = [
+        *_windows(one),
+        shape("measured", one.measured.t, one.measured.y, "measured"),
+        shape("predicted", one.predicted.t, one.predicted.y, "fitted"),
+    ]
+    says = f"{one.signal} of {one.record} over {one.abscissa}, measured and fitted"
+    return chart(f"{one.record}: {one.signal}", _across(one), y, marks, says=says)
+
+
+def left(one: Series) -> str:
+    """Residuals."""
+    shape = Path if one.ordered else Dots
+    y = around("difference", one.unit, [one.residual.y, np.zeros(1)])
+    marks = [
+        *_windows(one),
+        Level("zero", 0.0),
+        shape("residual", one.residual.t, one.residual.y),
+    ]
+    size = float(np.abs(one.residual.y).max(initial=0.0))
+    says = f"fitted minus measured {one.signal}, at most {number(size, 3)} {one.unit}"
+    title = f"{one.record}: what is left of {one.signal}"
+    return chart(title, _across(one), y, marks, height=170.0, says=says)
+
+
+def lags(one: Series) -> str:
+    """Autocorrelation of the residuals with the limits of white ones; "" without order."""
+    if not one.correlation.size:
+        return ""
+    x = Axis("lag", "samples", 0.0, float(one.lags.max()) + 0.5, whole=True)
+    y = around("autocorrelation", "", [one.correlation, one.low, one.high, np.array([0.0, 1.0])])
+    marks = [
+        Band("band", float(np.min(one.low)), float(np.max(one.high))),
+        Level("zero", 0.0),
+        Stems("residual", one.lags, one.correlation),
+        Dots("residual", one.lags, one.correlation),
+    ]
+    outside = int(((one.correlation > one.high) | (one.correlation < one.low)).sum())
+    says = f"{outside} of {one.lags.size} autocorrelations lie outside the limits of white noise"
+    title = f"{one.record}: autocorrelation of what is left of {one.signal}"
+    return chart(title, x, y, marks, height=190.0, says=says)
+
+
+def friction(curve: Curve, name: str) -> str:
+    """Friction over velocity: dots of the data, line of the law."""
+    dots = [Dots("measured", line.t, line.y) for line in curve.measured.values()]
+    low, high = limits(curve)
+    x = around("v", curve.v_unit, [curve.law.t, *(line.t for line in curve.measured.values())])
+    marks: list[Mark] = [
+        *dots,
+        Path("law", curve.law.t, curve.law.y, name),
+        Dots("measured", np.zeros(0), np.zeros(0), curve.says),
+    ]
+    says = f"friction of {name} over velocity, {float(curve.law.y.min()):.4g} to "
+    says += f"{float(curve.law.y.max()):.4g} {curve.F_unit}"
+    y = Axis("friction", curve.F_unit, low, high)
+    return chart("Friction over velocity", x, y, marks, height=300.0, says=says)
+
+
+def waterfall(fit: "Fitted") -> str:
+    """How far the starts ended from the best one; "" for a single start."""
+    above = np.sort([s.above for s in fit.starts if isfinite(s.above)])
+    if above.size < 2:
+        return ""
+    same = above < SAME
+    shown = np.maximum(above, FLOOR)
+    numbers = np.arange(1.0, above.size + 1)
+    x = Axis("start, best first", "", 0.5, above.size + 0.5, whole=True)
+    name = "-2 ln L above the best"
+    y = around(name, "", [shown, np.array([FLOOR, 10.0])], logarithmic=True)
+    marks: list[Mark] = [
+        Level("bound", SAME),
+        Path("zero", numbers, shown),
+        Dots("good", numbers[same], shown[same], "the same minimum"),
+        Dots("bad", numbers[~same], shown[~same], "another minimum, or none"),
+    ]
+    says = f"{int(same.sum())} of {len(fit.starts)} starts ended at the best minimum"
+    return chart("Waterfall of the starts", x, y, marks, height=210.0, says=says)
+
 
 CONTENTS = (
     ("parameters", "Parameters"),
@@ -143,13 +254,13 @@ def _data(fit: "Fitted") -> Iterator[str]:
     yield _errors("What the fit leaves of each signal", fit.errors, fit.records)
     yield _errors("The same parameters on other data", fit.validation or {}, ())
     for one in fit.series:
-        yield html.figure(charts.data_and_fit(one) + charts.left(one))
+        yield html.figure(data_and_fit(one) + left(one))
 
 
 def _friction(fit: "Fitted") -> Iterator[str]:
     if fit.curve is not None:
         yield html.figure(
-            charts.friction(fit.curve, fit.name),
+            friction(fit.curve, fit.name),
             f"Line: the law in steady sliding. Dots: {fit.curve.says}.",
         )
 
@@ -168,7 +279,7 @@ def _residuals(fit: "Fitted") -> Iterator[str]:
         caption = "Noise by which the signals were weighted"
         yield html.table(caption, ("signal", "standard deviation"), noise, (1,))
     for one in fit.series:
-        drawing = charts.lags(one)
+        drawing = lags(one)
         if drawing:
             yield html.figure(drawing)
 
@@ -195,7 +306,7 @@ def _starts(fit: "Fitted") -> Iterator[str]:
     yield html.paragraph(
         f"{best_starts(fit)} of {len(fit.starts)} starts ended at the best minimum."
     )
-    yield html.figure(charts.waterfall(fit))
+    yield html.figure(waterfall(fit))
     names = [n for n in fit.starts[0].values if not fit.parameters[n].nuisance]
     rows = [
         (f"{s.number}", above(s.above), number(s.cost, 6), f"{s.evaluations}",

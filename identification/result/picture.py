@@ -1,17 +1,16 @@
-"""The pictures of a fit in one figure."""
+"""Pictures of a fit, and of a ranking of laws."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from identification.result.curve import Curve
-from identification.result.series import Series
+from identification.result.series import Curve, Series, limits
 from symfric.foundation import checks
-from symfric.foundation.panels import panels, save
+from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
 
 if TYPE_CHECKING:
@@ -73,15 +72,6 @@ def _curve(axis: Axes, curve: Curve, name: str) -> None:
     _legend(axis)
 
 
-def limits(curve: Curve) -> tuple[float, float]:
-    """Range of forces that shows the curve and all but the farthest points."""
-    dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
-    ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []
-    low, high = min([*ends, curve.law.y.min()]), max([*ends, curve.law.y.max()])
-    margin = 0.1 * (high - low) or 1.0
-    return float(low - margin), float(high + margin)
-
-
 def _data(axis: Axes, one: Series) -> None:
     style = "-" if one.ordered else "."
     axis.plot(one.measured.t, one.measured.y, style, color="0.6", lw=2.2, label="measured")
@@ -109,3 +99,41 @@ def _lags(axis: Axes, one: Series) -> None:
     axis.set_ylabel("autocorrelation")
     axis.set_xlabel(f"lag [samples], residuals of {one.signal}")
     _legend(axis)
+
+
+def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> Figure:
+    """Errors and BIC of several laws, a bar for each, the best one on top."""
+    rows = [row for row in found["rows"] if row["status"]]
+    figure, ((errors, criterion),) = grid(1, 2, 8.5, 1.2 + 0.42 * max(1, len(rows)), sharey=True)
+    places = np.arange(len(rows))[::-1]
+    for shift, key, label, shade in (
+        (0.2, "validation [%]", "not fitted to", colour(0)), (-0.2, "fit [%]", "fitted to", "0.7"),
+    ):  # fmt: skip
+        values = [row[key] or 0.0 for row in rows]
+        errors.barh(places + shift, values, height=0.38, color=shade, label=label)
+    errors.set_yticks(
+        places,
+        labels=[f"{row['law']}\n{row['parameters']} par., {_operations(row)}" for row in rows],
+    )
+    errors.set_xlabel("rms error over the spread [%]")
+    errors.legend(fontsize="small")
+    colours = [colour(2) if row["status"] == "SOLVED" else colour(1) for row in rows]
+    criterion.barh(places, [row["BIC"] or 0.0 for row in rows], height=0.5, color=colours)
+    for place, row in zip(places, rows, strict=True):
+        criterion.annotate(
+            row["status"],
+            (0.0, place),
+            (4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize="small",
+        )
+    criterion.set_xlabel("BIC over that of the best")
+    for axis in (errors, criterion):
+        axis.grid(visible=False, axis="y")
+    figure.suptitle(f"{found['data']}: {found['how']}", fontsize="medium")
+    return save(figure, path)
+
+
+def _operations(row: Mapping[str, Any]) -> str:
+    return "no law" if row["operations"] is None else f"{row['operations']} op."

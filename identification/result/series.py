@@ -1,5 +1,6 @@
-"""Signals as they are drawn and stored: measured, predicted, what is left, and its correlation."""
+"""Parts of a result: estimates, errors, signals as they are drawn, friction over velocity."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import nan
@@ -8,10 +9,104 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.record import Record
 from identification.residuals.evaluation import Channel
-from identification.result.estimate import Error
-from identification.verdict.whiteness import Whiteness
+from identification.signals.differentiate import differentiate
+from identification.verdict.colour import Whiteness
 from symfric.foundation.brief import brief
+from symfric.foundation.status import Status
+from symfric.foundation.units import turned
+from symfric.laws import Law
+from symfric.laws.steady import steady_force
+from symfric.scenes import Drive
+
+
+@final
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter, start value or dead time.
+
+    Attributes:
+        value, unit: the estimate, in the unit of the user.
+        standard_error: right for the colour that the residuals have; None where the parameter is
+            held, stands at a bound or cannot be told from others.
+        low, high: 95 % interval; of what is fitted by its logarithm it is symmetric there, so that
+            a stiffness stays positive. None with `standard_error`.
+        white_error: what the standard error would be if residuals were white: much less than
+            `standard_error` where neighbouring samples say the same.
+        fixed: not fitted.
+        note: why it is held or has no interval; or what it is tied to.
+        nuisance: fitted, but not what is asked for: a start value, a dead time.
+    """
+
+    value: float
+    unit: str
+    standard_error: float | None = None
+    low: float | None = None
+    high: float | None = None
+    white_error: float | None = None
+    fixed: bool = False
+    note: str = ""
+    nuisance: bool = False
+
+    @property
+    def relative_error(self) -> float | None:
+        """Standard error over the magnitude of the value [%]; None at zero or without an error."""
+        if self.standard_error is None or self.value == 0.0:
+            return None
+        return 100.0 * self.standard_error / abs(self.value)
+
+
+@final
+@dataclass(frozen=True)
+class Error:
+    """What a fit leaves of one signal of one record.
+
+    Attributes:
+        unit: of the signal.
+        rms: root mean square of predicted - measured.
+        relative: norm of the difference over the norm of the signal [%], as the EMPS benchmark
+            has it; it says little of a signal far from zero, such as a position with an offset.
+        largest: largest magnitude of the difference.
+        rows: number of differences.
+        effective: how many independent ones they count as, by their colour; NaN where unknown.
+    """
+
+    unit: str
+    rms: float
+    relative: float
+    largest: float
+    rows: int
+    effective: float = nan
+
+
+@final
+@dataclass(frozen=True)
+class Tried:
+    """One start and where it ended.
+
+    Attributes:
+        number: of the start.
+        above: minus twice the logarithm of its likelihood over that of the best one; below 1 the
+            two are the same minimum.
+        cost: sum of weighted squares, or of the robust losses.
+        status, message: how it ended.
+        evaluations: of the residuals.
+        values: where it ended.
+    """
+
+    number: int
+    above: float
+    cost: float
+    status: Status
+    message: str
+    evaluations: int
+    values: dict[str, float]
+
+
+Errors = dict[tuple[str, str], Error]
+"""(record, signal) -> what is left of it."""
+
 
 Array = NDArray[np.float64]
 
@@ -153,3 +248,83 @@ def error(channel: Channel, r: Array, effective: float = nan) -> Error:
         rows=left.size,
         effective=effective,
     )
+
+
+SIDE = 300
+"""Points of the law's curve each way, the nearest to rest a millionth of the largest speed."""
+DOTS = 4000
+"""Measured points that are drawn, over all records."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Friction over velocity.
+
+    Attributes:
+        v_unit, F_unit: units.
+        law: force of the fitted law in steady sliding, a point for each velocity.
+        measured: record -> points (velocity, friction).
+        says: how the points come about.
+    """
+
+    v_unit: str
+    F_unit: str
+    law: Line
+    measured: dict[str, Line]
+    says: str
+
+
+def of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
+    """The curve beside measured points (v, F) of each record."""
+    measured = _thinned({name: Line(v, F) for name, (v, F) in points.items()})
+    return _curve(law, N, measured, turning, "measured points")
+
+
+def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
+    """The curve of a drive's law beside force - m a - offset of its records.
+
+    Records without position, force or equal intervals have no points.
+    """
+    measured = _thinned(dict(_frictions(drive, records)))
+    says = "measured: force - m a - offset" if measured else "no record has force and position"
+    return _curve(drive.law, float(drive.N), measured, drive.turning, says)
+
+
+def _frictions(drive: Drive, records: Sequence[Record]) -> Iterator[tuple[str, Line]]:
+    for record in records:
+        if record.t is None or "force" not in record or "x" not in record:
+            continue
+        try:
+            signals = differentiate(record)
+        except ValueError:  # unequal intervals, too short: there is no acceleration
+            continue
+        friction = signals.force - float(drive.m) * signals.a - float(drive.offset)
+        yield record.name, Line(signals.equations(signals.v), signals.equations(friction))
+
+
+def _thinned(lines: dict[str, Line]) -> dict[str, Line]:
+    """Every so many points, so that there are not more than `DOTS`."""
+    total = sum(line.t.size for line in lines.values())
+    every = max(1, -(-total // DOTS))
+    return {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
+
+
+def _curve(law: Law, N: float, measured: dict[str, Line], turning: bool, says: str) -> Curve:
+    top = max([float(np.abs(line.t).max(initial=0.0)) for line in measured.values()], default=0.0)
+    if top == 0.0:
+        scale = law.velocity_scale
+        top = 10.0 * float(scale) if np.isfinite(float(scale)) else 1.0
+    side = np.geomspace(1e-6 * top, top, SIDE)
+    v = np.concatenate([-side[::-1], [0.0], side])
+    unit = turned if turning else str
+    return Curve(unit("m/s"), unit("N"), Line(v, steady_force(law, v, N)), measured, says)
+
+
+def limits(curve: Curve) -> tuple[float, float]:
+    """Range of forces that shows the curve and all but the farthest points."""
+    dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
+    ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []
+    low, high = min([*ends, curve.law.y.min()]), max([*ends, curve.law.y.max()])
+    margin = 0.1 * (high - low) or 1.0
+    return float(low - margin), float(high + margin)

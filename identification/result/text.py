@@ -6,7 +6,7 @@ from math import floor, isfinite, log10
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from identification.result.estimate import Errors, Estimate
+from identification.result.series import Errors, Estimate
 
 if TYPE_CHECKING:
     from identification.result.fitted import Fitted

@@ -1,5 +1,11 @@
-"""Velocity and acceleration of a record, and its equations after decimation."""
+"""Velocity and acceleration of a record, points of constant velocity, linear least squares.
 
+    force = m a + F_v v + F_c sign(v) + offset
+
+Source: Janot, Gautier and Brunot, Data set and reference models of EMPS, 2019.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -8,15 +14,17 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.signals.filters import (
     Decimation,
     Filter,
+    Velocity,
     central_difference,
     choose_filter,
     lowpass,
 )
-from identification.signals.velocity import Velocity
+from symfric.foundation import checks
 from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
@@ -179,3 +187,163 @@ def differentiate(
             "raise the cut-off, lower the decimation or v_min"
         )
     return signals
+
+
+SMOOTHINGS = 2.0
+"""Cut-off of the velocity that is looked at, over 1 / (shortest plateau)."""
+REST = 1e-3
+"""Speed over the largest one below which a stretch is rest and no point of a curve."""
+
+
+def plateaus(
+    data: Dataset,
+    *,
+    force: str = "force",
+    v: str | None = None,
+    x: str = "x",
+    shortest: float = 0.2,
+    change: float = 0.05,
+    settle: float = 0.2,
+) -> Dataset:
+    """Means of velocity and force over stretches of constant velocity, as points for `Points`.
+
+    A staircase of speeds, a triangle of positions: wherever the smoothed velocity changes by less
+    than the share `change` in the time `shortest`, for at least that time, is a plateau. Its first
+    part, of the share `settle`, is left out. Rest is none. There the acceleration is nothing, so
+    that the mean force is friction and what is constant, such as weight.
+
+    Args:
+        data: equally spaced records; each gives a record of points.
+        force: channel of the driving force or torque.
+        v: channel of the velocity; None: "v" where there is one, else the slope of `x`.
+        x: channel of the position.
+        shortest: duration [s].
+        change: largest relative change of velocity.
+        settle: share of a plateau, 0 <= settle < 1.
+
+    Returns:
+        Channels v, F, `n` (samples behind a mean, for `Points(weight="n")`) and `spread` (standard
+        deviation of the force there); mean times as `t_mean`.
+
+    Raises:
+        ValueError: no record has a plateau; unequal intervals; arguments out of range.
+    """
+    shortest = checks.number("plateaus: shortest", shortest, unit="s", above=0.0)
+    change = checks.number("plateaus: change", change, above=0.0)
+    settle = checks.number("plateaus: settle", settle, lower=0.0, upper=0.9)
+    found: list[Record] = []
+    for record in data:
+        speed = v or ("v" if "v" in record else None)
+        name = x if speed is None else speed
+        velocity = record[name] if speed is not None else _slope(record, x)
+        begins = _stretches(velocity, record.uniform().step, shortest, change)
+        cut = [slice(b + ceil(settle * (e - b)), e) for b, e in begins]
+        if not cut:
+            continue
+        rotary = record.unit(name).startswith("rad")
+        units = {"v": "rad/s" if rotary else "m/s", "F": record.unit(force) or "N"}
+        columns = {
+            "v": [velocity[s].mean() for s in cut],
+            "F": [record[force][s].mean() for s in cut],
+            "n": [float(s.stop - s.start) for s in cut],
+            "spread": [record[force][s].std() for s in cut],
+            "t_mean": [record.time[s].mean() for s in cut],
+        }
+        units |= {"n": "1", "spread": units["F"], "t_mean": "s"}
+        signals = {key: np.array(values, float) for key, values in columns.items()}
+        if len(cut) > 1:
+            found.append(Record(f"plateaus of {record.name}", None, signals, units))
+    if not found:
+        raise ValueError(
+            f"data '{data.name}': plateaus: expected at least two stretches of {shortest:g} s with "
+            f"a velocity constant to {change:.0%}, got none; lower shortest= or raise change="
+        )
+    return Dataset(tuple(found), f"plateaus of {data.name}")
+
+
+def _slope(record: Record, x: str) -> Array:
+    return central_difference(record[x], record.uniform().step)
+
+
+def _stretches(v: Array, step: float, shortest: float, change: float) -> list[tuple[int, int]]:
+    """Begin and end of each plateau."""
+    cutoff = min(SMOOTHINGS / shortest, 0.45 / step)
+    smooth = lowpass(v, cutoff, step)
+    steady = np.abs(central_difference(smooth, step)) * shortest < change * np.abs(smooth)
+    steady &= np.abs(smooth) > REST * np.abs(smooth).max()
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(int)))
+    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(b, e) for b, e in runs if (e - b) * step >= shortest]
+
+
+RANK = 1e-7
+"""Smallest singular value of the scaled regressors, over the largest, that counts."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Estimates by name with standard errors, and the force error they leave.
+
+    Attributes:
+        values: m [kg], F_v [N s/m], F_c [N], offset [N]; with directions F_v_pos, F_v_neg, ...
+        standard_errors: of the same names, for residuals that are white after decimation; None
+            where the data cannot tell the value.
+        force_relative: norm of the force error over norm of the force [%].
+        force_rms: root mean square force error [N].
+    """
+
+    values: dict[str, float]
+    standard_errors: dict[str, float | None]
+    force_relative: float
+    force_rms: float
+
+
+def linear_regression(
+    signals: MotionSignals | Sequence[MotionSignals], directions: bool = False
+) -> LinearFit:
+    """Least squares on the decimated equations of one record or of several.
+
+    Args:
+        signals: differentiated records.
+        directions: separate F_v and F_c for the two directions, and no offset.
+
+    A drive that moves one way only cannot tell Coulomb friction from an offset: the smallest values
+    that fit are returned, without standard errors.
+    """
+    records = [signals] if isinstance(signals, MotionSignals) else list(signals)
+    parts = [_regressors(record, directions) for record in records]
+    X = np.vstack([np.column_stack([*part.values()]) for part in parts])
+    y = np.concatenate([record.equations(record.force) for record in records])
+    values = np.linalg.lstsq(X, y, rcond=None)[0]
+    error = y - X @ values
+    names = list(parts[0])
+    return LinearFit(
+        dict(zip(names, values.tolist(), strict=True)),
+        dict(zip(names, _standard_errors(X, error), strict=True)),
+        100 * float(np.linalg.norm(error) / max(np.linalg.norm(y), 1e-300)),
+        float(np.sqrt(np.mean(error**2))),
+    )
+
+
+def _regressors(signals: MotionSignals, directions: bool) -> dict[str, Array]:
+    v, sign = signals.v, np.sign(signals.v)
+    columns: dict[str, Array] = {"m": signals.a}
+    if directions:
+        for side, mask in (("pos", v > 0), ("neg", v < 0)):
+            columns |= {f"F_v_{side}": v * mask, f"F_c_{side}": sign * mask}
+    else:
+        columns |= {"F_v": v, "F_c": sign, "offset": np.ones_like(v)}
+    return {name: signals.equations(column) for name, column in columns.items()}
+
+
+def _standard_errors(X: Array, error: Array) -> list[float | None]:
+    """Of the columns that the others do not make up."""
+    size = np.linalg.norm(X, axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    _, s, Vt = np.linalg.svd(X / scale, full_matrices=False)
+    kept = s > RANK * max(s[0], 1e-300)
+    lost = np.sqrt(np.sum(Vt[~kept] ** 2, axis=0)) > 1e-3
+    spread = np.sqrt(np.sum((Vt[kept] / s[kept, None]) ** 2, axis=0)) / scale
+    noise = np.sqrt(error @ error / max(1, error.size - X.shape[1]))
+    return [None if gone else float(noise * e) for gone, e in zip(lost, spread, strict=True)]

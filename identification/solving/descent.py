@@ -1,29 +1,31 @@
-"""From one start to a minimum, with an end that says what was reached.
+"""Descent from one start to a minimum, with a status that says what was reached.
 
 The trust region is SciPy's (`least_squares`, method "trf"): it keeps bounds in the interior,
-scales by the derivatives, is deterministic and well kept; CasADi has Ipopt and SQP, which want
-expressions of the residuals, and simulated ones have none. Robust losses and weights are applied to
-the rows before they are reduced to a triangle, so its linear algebra sees n + 1 rows.
+scales by the derivatives and is deterministic. Robust losses and weights are applied to the rows
+before they are reduced to a triangle, so its linear algebra sees n + 1 rows.
 
-Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain, never by
-the size of a short one:
+Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain:
 
     fall = max over s of  f'f - |f + J s|^2     in the coordinates that no bound holds
 
-Source: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J. Wright,
-Numerical Optimization, 2nd ed., 2006, chapter 10.
+A motion that is simulated over a whole record has many minima far from the truth, one that starts
+again from the data in every window has few. All starts but the first therefore begin on the
+`easier` problems of the task (multiple shooting) and end on the task itself.
+
+Sources: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J.
+Wright, Numerical Optimization, 2nd ed., 2006, chapter 10; H. G. Bock, in Modelling of Chemical
+Reaction Systems, Springer, 1981.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.noise import LEAST, change, levels, objective
-from identification.solving.task import Point, Task
+from identification.solving.task import NOISELESS, Point, Task, change, levels, objective
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
@@ -236,7 +238,7 @@ def variance(task: Task, point: Point) -> float:
     freedom = max(1, point.sigma.size - point.w.size)
     least = 1.0
     if set(task.noise) == set(task.estimated):
-        least = max((LEAST * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)
+        least = max((NOISELESS * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)
     return max(least, point.cost / freedom)
 
 
@@ -275,3 +277,47 @@ def _verdict(search: _Search) -> tuple[Status, str]:
     if fall <= KINKS:
         return Status.ACCEPTABLE, f"{said}: less than a standard error, as where a law has kinks"
     return Status.NO_DESCENT, said
+
+
+ENOUGH = 40
+"""Evaluations on an easier problem: it need not end at its minimum."""
+REACH = 100.0
+"""Largest factor by which it may change a positive value."""
+
+
+def descend_by_way(
+    task: Task, w0: Array, number: int, evaluations: int, tell: Tell | None = None
+) -> Start:
+    """`descend`, for all but the first start by way of the easier problems of the task."""
+    w, spent = w0, 0
+    for other in task.easier if number else ():
+        shared = set(task.unknowns.fitted) & set(other.unknowns.fitted)
+        here = _parameters(task, w, shared)
+        first = other.unknowns.of(here)
+        end = descend(_near(other, first), first, number, min(evaluations, ENOUGH), tell)
+        spent += end.evaluations
+        if end.status is Status.INTERRUPTED:
+            return replace(end, w0=w0, w=w, cost=np.inf, objective=np.inf)
+        if np.isfinite(end.cost):
+            w = task.unknowns.of(_parameters(other, end.w, shared))
+    found = descend(task, w, number, evaluations, tell)
+    return replace(found, w0=w0, evaluations=found.evaluations + spent)
+
+
+def _near(task: Task, w: Array) -> Task:
+    """The problem with logarithmic values within a factor of `REACH` of those at `w`.
+
+    Parts of a record may be fitted as well by something that vanishes or grows without bound.
+    """
+    box = task.unknowns
+    free = np.array([np.log(REACH) if u.logarithmic else np.inf for u in box.unknowns])
+    near = replace(
+        box, lower=np.maximum(box.lower, w - free), upper=np.minimum(box.upper, w + free)
+    )
+    return replace(task, unknowns=near)
+
+
+def _parameters(task: Task, w: Array, shared: set[str]) -> dict[str, float]:
+    """Values of what both problems fit, without what belongs to records and windows."""
+    values, own = task.unknowns.named(w), set(task.unknowns.nuisance)
+    return {name: x for name, x in values.items() if name in shared and name not in own}

@@ -2,28 +2,100 @@
 
     minimise over w   sum_signals [ n_s ln sigma_s ] + 1/2 sum_rows loss(r_i(p(w)) / sigma_s(i))
 
-sigma_s is the standard deviation of the noise of a signal, given or estimated.
+Losses: C^2 rho((r/C)^2) = e^2 with e = C sign(r) sqrt(rho((r/C)^2)) and C the residual, in standard
+deviations, above which an outlier costs less; e is smooth, so the problem stays one of least
+squares with exact derivatives e' = rho' r / e.
+
+Noise levels by maximum likelihood, with the share d_s of the parameters that signal s pays for:
+
+    sigma_s^2 = sum r^2 / (n_s - d_s),   d_s = tr (J'J)^-1 J_s'J_s
+
+Rows are reduced block by block to the triangle R of a QR factorisation (a sequential TSQR). Blocks
+are so small that BLAS does not share one among threads: bits do not depend on their number.
+
+Sources: P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009; B. Triggs et al., Bundle
+Adjustment, 2000, section 3; Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
+L. Grigori, M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34, 2012.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import log
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Channel, Evaluation, Residuals
-from identification.solving.loss import THRESHOLD, influence, shaped
-from identification.solving.reduce import square, triangle
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
-Guard = Callable[[Mapping[str, float]], object]
 
-LEAST = 1e-9
-"""Least noise level over the spread of a signal: a model cannot be right to more than this."""
+THRESHOLD = {"squares": np.inf, "huber": 1.345, "soft_l1": 1.0, "cauchy": 2.385, "arctan": 3.0}
+"""Loss -> C. Of huber and cauchy that for 95 % efficiency on normal noise."""
+
+
+def shaped(r: Array, loss: str) -> tuple[Array, Array]:
+    """E and de/dr of residuals r in standard deviations, shape of r both."""
+    C = THRESHOLD[loss]
+    if loss == "squares":
+        return r, np.ones_like(r)
+    z = (r / C) ** 2
+    rho, slope = _rho(z, loss)
+    small = z < 1e-12
+    e = np.where(small, np.abs(r), C * np.sqrt(np.where(small, 1.0, rho)))
+    de = np.where(small, 1.0, slope * np.abs(r) / np.where(small, 1.0, e))
+    return np.sign(r) * e, de
+
+
+def influence(r: Array, loss: str) -> Array:
+    """Weight rho' of each residual in the normal equations: 1 for small ones, shape of r."""
+    if loss == "squares":
+        return np.ones_like(r)
+    return _rho((r / THRESHOLD[loss]) ** 2, loss)[1]
+
+
+def _rho(z: Array, loss: str) -> tuple[Array, Array]:
+    """rho(z) and its derivative, rho(z) = z + O(z^2)."""
+    if loss == "huber":
+        root = np.sqrt(np.maximum(z, 1.0))
+        return np.where(z <= 1, z, 2 * root - 1), 1 / root
+    if loss == "soft_l1":
+        root = np.sqrt(1 + z)
+        return 2 * (root - 1), 1 / root
+    if loss == "cauchy":
+        return np.log1p(z), 1 / (1 + z)
+    return np.arctan(z), 1 / (1 + z**2)
+
+
+ENTRIES = 8192
+"""Of a block with its triangle; OpenBLAS takes threads from 9216 on for matrix times vector."""
+FEWEST = 32
+"""Fewest new rows of a block, however many columns there are."""
+
+
+def triangle(columns: Array) -> Array:
+    """R of `columns` (rows, k), shape (k, k), upper triangular with a diagonal >= 0."""
+    rows, k = columns.shape
+    found = np.zeros((0, k))
+    size = max(FEWEST, ENTRIES // max(k, 1) - k)
+    for first in range(0, rows, size):
+        block = np.vstack([found, columns[first : first + size]])
+        found = np.asarray(np.linalg.qr(block, mode="r"))
+    whole = np.zeros((k, k))
+    whole[: found.shape[0]] = found
+    sign = np.where(np.diag(whole) < 0, -1.0, 1.0)
+    return whole * sign[:, None]
+
+
+def square(x: Array) -> float:
+    """Sum of squares without BLAS, which shares long ones among threads."""
+    return float(np.sum(x * x))
+
+
+Guard = Callable[[Mapping[str, float]], object]
 
 
 @final
@@ -182,3 +254,50 @@ def task(
 
 def _shown(names: Sequence[str], values: Array) -> str:
     return ", ".join(f"{n} = {x:.5g}" for n, x in zip(names, values.tolist(), strict=True))
+
+
+NOISELESS = 1e-8
+"""Least noise level over the spread of a signal: no simulation is right to more than this."""
+NORMAL = 1.4826
+"""Standard deviation of normal noise over the median of its magnitude."""
+
+
+def levels(task: Task, point: Point) -> dict[str, float]:
+    """Noise levels [SI] by signal: those given, and those that the residuals at `point` have."""
+    found = dict(task.noise)
+    shares = _shares(task, point)
+    for signal in task.estimated:
+        r = np.concatenate([point.evaluation.r[c.rows] for c in _of(task, signal)])
+        if task.loss == "squares":
+            level = float(np.sqrt(square(r) / max(r.size - shares[signal], 1.0)))
+        else:
+            level = NORMAL * float(np.median(np.abs(r)))
+        found[signal] = max(level, NOISELESS * task.spread(signal))
+    return found
+
+
+def change(old: dict[str, float], new: dict[str, float]) -> float:
+    """Largest change of a noise level, as a logarithm."""
+    return max((abs(log(new[s] / old[s])) for s in new), default=0.0)
+
+
+def objective(task: Task, point: Point) -> float:
+    """Minus twice the logarithm of the likelihood, without its constant: lower is likelier."""
+    rows = {s: sum(c.t.size for c in _of(task, s)) for s in task.noise}
+    return point.cost + sum(2 * n * log(task.noise[s]) for s, n in rows.items())
+
+
+def _of(task: Task, signal: str) -> list[Channel]:
+    return [c for c in task.channels if c.signal == signal]
+
+
+def _shares(task: Task, point: Point) -> dict[str, float]:
+    """Degrees of freedom that the fit takes from each signal."""
+    _, J = point.reduced
+    _, s, vt = np.linalg.svd(J, full_matrices=False)
+    kept = s > 1e-10 * s.max(initial=1e-300)
+    directions = vt[kept].T / s[kept]
+    whitened = np.einsum("ij,jk->ik", point.J, directions)
+    return {
+        signal: sum(square(whitened[c.rows]) for c in _of(task, signal)) for signal in task.noise
+    }

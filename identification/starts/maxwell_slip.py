@@ -5,21 +5,24 @@
 For given radii r_i (break-away displacements) the e_i are known, and k_i >= 0 a non-negative least
 squares problem with one minimum. A dense set of radii gives the virgin curve
 f(x) = sum k_i min(x, r_i); a few elements start where it bends and are improved together with their
-radii, with exact derivatives.
+radii, with exact derivatives. They start the elements of laws that have some (GMS, Leuven).
 Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteresis curve);
 Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
 """
 
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, nnls
 
-from identification.starts.hysteresis import DEAD, turning_points
-from identification.starts.measured import Measured
+from identification.starts.measured import DEAD, Measured, turning_points
+from identification.starts.stribeck import StribeckCurve
+from identification.unknowns.roles import parts
 from symfric.foundation import checks
+from symfric.foundation.parameters import Parameter, parameters
+from symfric.laws.base.law import Law
 
 Array = NDArray[np.float64]
 
@@ -147,6 +150,8 @@ def _dense(
     measured: Measured, path: Array, beside: Array, radii: Array, loaded: int
 ) -> tuple[Array, float]:
     """Coefficients of a dense set of radii and of the rest, and the norm of the error."""
+    from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
+
     X = np.column_stack([_stretches(measured, path, radii, loaded)[0], beside])
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     w, left = nnls(X / scale, measured.F)
@@ -172,18 +177,7 @@ def _thinned(measured: Measured, most: int) -> Measured:
         turns = turning_points(path[r], DEAD * float(np.ptp(path[r])))
         regular = np.arange(0, r.stop - r.start, every)
         kept.append(r.start + np.union1d(regular, np.array(turns, dtype=np.intp)))
-    rows = np.concatenate(kept)
-    breaks = tuple(np.cumsum([k.size for k in kept])[:-1].tolist())
-    t = None if measured.t is None else measured.t[rows]
-    return Measured(
-        v=measured.v[rows],
-        F=measured.F[rows],
-        x=path[rows],
-        t=t,
-        a=None,
-        N=measured.N,
-        breaks=breaks,
-    )
+    return measured.at(kept)
 
 
 def _beside(measured: Measured, viscous: bool, offset: bool) -> Array:
@@ -236,6 +230,8 @@ def _improved(
     steps: int,
 ) -> Elements:
     """Stiffnesses, log radii and the rest together by a trust region."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
+
     viscous, offset, loaded = kinds
     n, size = radii.size, float(np.abs(measured.F).max())
     w = _dense(measured, path, beside, radii, loaded)[0]
@@ -272,3 +268,121 @@ def _improved(
     shift = float(rest[-2] - rest[-1]) if offset else 0.0
     rms = left / float(np.sqrt(measured.F.size))
     return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, loaded, rms)
+
+
+FIELDS = ("k", "mu", "alpha")
+"""Fields of an element: stiffness, friction coefficient or share."""
+ENOUGH = 1500
+"""Samples that are enough for a start."""
+SLOW = 0.75
+"""Share of the static level that friction keeps, by the median, in a record of pre-sliding."""
+LEAST = 0.05
+"""Least share of it that a force is divided by."""
+APART = 1.25
+"""Radii over those of the element that is split where fewer explain the data than the law has."""
+HEADROOM = 1.1
+"""What the elements of a law carry together over its static level, where it has one."""
+
+
+def element_names(law: Law) -> dict[str, tuple[str, ...]]:
+    """Field of an element -> names of the parameters of all elements, in their order.
+
+    Empty for a law without elements, or with two sets of them (one for each direction).
+    """
+    sets = [e for part in parts(law) if isinstance(e := getattr(part, "elements", None), tuple)]
+    if len(sets) != 1:
+        return {}
+    known = parameters(law)
+    own = {f: tuple(n for n, p in known.items() if p.field == f) for f in FIELDS}
+    return {f: names for f, names in own.items() if len(names) == len(sets[0])}
+
+
+def element_values(
+    law: Law, measured: Measured, curve: StribeckCurve, *, offset: float, free: Collection[str]
+) -> dict[str, float]:
+    """Stiffness and level of each element of `law`, the one that slips first in front.
+
+    The Maxwell-slip elements of `fit_elements`; for a law with a Stribeck curve, of the force over
+    this curve, which is alike in pre-sliding and in sliding. Empty where the data or the law have
+    no elements.
+
+    Args:
+        law: with N = measured.N.
+        measured: friction alone, with positions or times.
+        curve: its Stribeck curve.
+        offset: constant force [N] beside friction.
+        free: names that are asked for. Shares alpha_i count by their ratios alone; where some are
+            held, the others stand in the right ratio to the first one of them.
+    """
+    names = element_names(law)
+    if not names or measured.x is None:
+        return {}
+    falls = "mu_s" in parameters(law)
+    viscous = any(p.role == "viscous" for p in parameters(law).values())
+    force = measured.F - offset
+    friction = replace(measured, F=force, a=None)
+    if falls:
+        friction = _as_if_slow(friction, curve)
+    count = len(next(iter(names.values())))
+    try:
+        found = fit_elements(friction, count, viscous=viscous and not falls, most=ENOUGH)
+    except ValueError:
+        return {}  # no hysteresis in these data: what the law has is as good
+    k, levels = _as_many(found, count)
+    total = float(levels.sum())
+    carried = HEADROOM * curve.F_S / total if falls else 1.0
+    shares = levels / total
+    held = [(i, n) for i, n in enumerate(names.get("alpha", ())) if n not in free]
+    if held:
+        i, name = held[0]
+        shares = shares / shares[i] * float(parameters(law)[name].value)
+    each = {"k": k, "alpha": shares, "mu": carried * levels / measured.N}
+    return {n: float(x) for f, own in names.items() for n, x in zip(own, each[f], strict=True)}
+
+
+def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
+    """Forces over the Stribeck curve, times its top; slow records alone where there are some."""
+    side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
+    sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
+    sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
+    share = np.maximum(sliding / max(curve.F_S, float(sliding.max())), LEAST)
+    force = (friction.F - curve.sigma_2 * friction.v) / share
+    slow = [r for r in friction.records if float(np.median(share[r])) > SLOW]
+    kept = slow or list(friction.records)
+    return friction.at([np.arange(r.start, r.stop) for r in kept], force)
+
+
+def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
+    """Coefficients of elements, raised together until they carry mu_s, where a law asks for it."""
+    mine, known = element_names(law).get("mu", ()), parameters(law)
+    if "mu_s" not in known or not set(mine) & values.keys():
+        return {}
+    at = {n: values.get(n, float(known[n].value)) for n in (*mine, "mu_s")}
+    missing = HEADROOM * at["mu_s"] - sum(at[n] for n in mine)
+    free = [n for n in mine if n in values]
+    carried = sum(at[n] for n in free)
+    return {n: at[n] * (1 + max(missing, 0.0) / carried) for n in free}
+
+
+def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
+    """Stiffnesses and levels of `count` elements: the strongest ones are split."""
+    levels, radii = elements.levels, elements.radii
+    while levels.size < count:
+        i = int(np.argmax(levels))
+        levels = np.r_[levels[:i], levels[i] / 2, levels[i] / 2, levels[i + 1 :]]
+        radii = np.r_[radii[:i], radii[i] / APART, radii[i] * APART, radii[i + 1 :]]
+    order = np.argsort(radii)
+    return (levels / radii)[order], levels[order]
+
+
+def shared(parameter: Parameter, law: Law) -> int:
+    """Elements that a parameter of one of them stands beside, itself included; else 1."""
+    if parameter.field not in FIELDS:
+        return 1
+    return max(len(getattr(part, "elements", "1")) for part in parts(law))
+
+
+def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
+    """Sum of the values of one field over `count` elements."""
+    same = [float(p.value) for p in values.values() if p.field == field]
+    return sum(same) * count / len(same)

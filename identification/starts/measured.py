@@ -1,7 +1,9 @@
-"""What start values are read from: force against velocity, and the path where there is one."""
+"""Samples of friction for start values: break-away forces from ramps, stiffness from reversals."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import log
 from typing import final
 
 import numpy as np
@@ -66,6 +68,14 @@ class Measured:
         edges = (0, *self.breaks, np.size(self.v))
         return tuple(slice(a, b) for a, b in pairwise(edges))
 
+    def at(self, rows: Sequence[NDArray[np.intp]], F: Array | None = None) -> "Measured":
+        """Samples `rows` of each record, with other forces `F`, shape (n,), if given."""
+        taken = np.concatenate(rows)
+        x, t = (None if y is None else y[taken] for y in (self.x, self.t))
+        breaks = tuple(np.cumsum([r.size for r in rows])[:-1].tolist())
+        force = self.F if F is None else F
+        return Measured(self.v[taken], force[taken], x=x, t=t, N=self.N, breaks=breaks)
+
     @property
     def fastest(self) -> float:
         """Largest speed [m/s]."""
@@ -85,3 +95,306 @@ def _samples(name: str, given: object, size: int) -> Array:
             "leave such rows out"
         )
     return found
+
+
+REST = 0.02
+"""Share of the largest speed below which a body counts as resting."""
+SHORTEST = 5
+"""Samples of a rest."""
+RISE = (0.3, 0.9)
+"""Shares of the break-away force between which its rate is read."""
+APART = 2.0
+"""Ratio of the rates without which nothing is said about their effect."""
+
+
+@final
+@dataclass(frozen=True)
+class BreakAway:
+    """One break-away.
+
+    Attributes:
+        t: when the force is largest [s].
+        force: that force in the direction of the motion that follows [N].
+        rate: how fast it was loaded before [N/s].
+        side: direction of the motion, 1 or -1.
+    """
+
+    t: float
+    force: float
+    rate: float
+    side: int
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BreakAways:
+    """All break-aways of a data set.
+
+    Attributes:
+        events: in order of time.
+        level: median force of both directions [N].
+        scatter: median absolute deviation of the force over its median.
+        per_decade: change of the force when it is loaded ten times as fast [N], of a straight line
+            over the logarithm of the rate; None where the rates differ by less than a factor of 2.
+        error: standard error of `per_decade` [N].
+    """
+
+    events: tuple[BreakAway, ...]
+    level: float
+    scatter: float
+    per_decade: float | None
+    error: float
+
+    @property
+    def note(self) -> str:
+        """What is known about the loading rate, in a sentence."""
+        rates = [event.rate for event in self.events]
+        span = f"{min(rates):.3g} to {max(rates):.3g} N/s"
+        if self.per_decade is None:
+            return f"all loaded alike ({span}): how the force depends on the rate is not known"
+        if abs(self.per_decade) < 2 * self.error:
+            return f"no effect of the loading rate is seen ({span})"
+        word = "falls" if self.per_decade < 0 else "rises"
+        return (
+            f"the force {word} by {abs(self.per_decade):.3g} +- {self.error:.2g} N for each factor "
+            f"of ten of the loading rate ({span}): take the slowest ramps for the static level"
+        )
+
+
+def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -> BreakAways:
+    """Break-away forces of all ramps in a record.
+
+    A rest is a stretch of at least 5 samples below `rest` times the largest speed that ends in
+    motion; the break-away force is the largest one along that motion until it begins. The samples
+    must resolve the rise, or the maximum is missed.
+
+    Args:
+        measured: with times; the force with what accelerates the mass left out, or of slow ramps.
+        rest: share of the largest speed.
+        offset: constant force [N] beside friction.
+
+    Raises:
+        ValueError: no times; no rest that ends in motion.
+    """
+    rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
+    if measured.t is None:
+        raise ValueError("break_away: expected a record with times, got points; give t=")
+    events = tuple(e for r in measured.records for e in _events(measured, r, rest, offset))
+    if not events:
+        raise ValueError(
+            f"break_away: expected a rest of at least {SHORTEST} samples below {rest:g} of the "
+            "largest speed that ends in motion, got none"
+        )
+    forces = np.array([event.force for event in events])
+    level = float(np.median(forces))
+    scatter = float(np.median(np.abs(forces - level))) / abs(level)
+    return BreakAways(events, level, scatter, *_by_rate(events))
+
+
+def _events(measured: Measured, record: slice, rest: float, offset: float) -> Iterator[BreakAway]:
+    t, v = np.asarray(measured.t)[record], measured.v[record]
+    F = measured.F[record] - offset
+    still = np.abs(v) < rest * measured.fastest
+    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(int)))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin < SHORTEST or end >= v.size:
+            continue
+        side = int(np.sign(v[end]))
+        ramp = side * F[begin : end + 1]
+        top = int(np.argmax(ramp))
+        if top == 0 or ramp[top] <= 0:
+            continue
+        rising = (ramp[:top] > RISE[0] * ramp[top]) & (ramp[:top] < RISE[1] * ramp[top])
+        last = np.flatnonzero(ramp[:top] <= RISE[0] * ramp[top])
+        rising[: last[-1] + 1 if last.size else 0] = False  # what came before the last rise
+        if rising.sum() >= 2:
+            rate = float(np.polyfit(t[begin : begin + top][rising], ramp[:top][rising], 1)[0])
+            if rate > 0:
+                yield BreakAway(float(t[begin + top]), float(ramp[top]), rate, side)
+
+
+def _by_rate(events: tuple[BreakAway, ...]) -> tuple[float | None, float]:
+    """Slope of the force over the decades of the rate, and its standard error."""
+    decades = np.log10([event.rate for event in events])
+    if len(events) < 3 or np.ptp(decades) < np.log10(APART):
+        return None, 0.0
+    X = np.column_stack([np.ones(decades.size), decades])
+    forces = np.array([event.force for event in events])
+    w, *_ = np.linalg.lstsq(X, forces, rcond=None)
+    spread = float(np.sum((forces - X @ w) ** 2)) / (decades.size - 2)
+    return float(w[1]), float(np.sqrt(spread * np.linalg.inv(X.T @ X)[1, 1]))
+
+
+DEAD = 2e-3
+"""Share of the travel by which the position must come back to count as a reversal."""
+PART = 0.3
+"""Share of the typical force that a branch must start from, and reach on the other side."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Force against path after one reversal, up to the next one.
+
+    Attributes:
+        first, last: samples of the reversal and of the branch's end.
+        side: direction of motion, 1 or -1.
+        level: force [N] before the reversal, positive.
+        half: path [m] from the reversal until the force is zero.
+        slope: least-squares slope of the force over this path [N/m].
+        damping: least-squares coefficient of velocity beside it [N s/m], >= 0.
+    """
+
+    first: int
+    last: int
+    side: int
+    level: float
+    half: float
+    slope: float
+    damping: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Hysteresis:
+    """What all branches say together: medians over `branches`.
+
+    Attributes:
+        branches: those on which the force changes its sign.
+        half: path [m] from a reversal until the force is zero.
+        level: force [N] from which it falls.
+        damping: coefficient of velocity on this path [N s/m].
+        scatter: median absolute deviation of `half` over its median.
+    """
+
+    branches: tuple[Branch, ...]
+    half: float
+    level: float
+    damping: float
+    scatter: float
+
+    @property
+    def elastic(self) -> float:
+        """Stiffness level/half [N/m] of elements that unload elastically (Maxwell, Bouc-Wen)."""
+        return self.level / self.half
+
+    @property
+    def bristle(self) -> float:
+        """Stiffness level ln(2)/half [N/m] of a bristle (LuGre, Dahl).
+
+        From z = -g/sigma_0 it comes back as z = g/sigma_0 (1 - 2 exp(-sigma_0 x/g)), so that its
+        slope is 2 sigma_0 at the reversal and sigma_0 where the force is zero.
+        """
+        return self.level * log(2) / self.half
+
+
+def turning_points(x: Array, dead: float) -> list[int]:
+    """Samples at which a position turns back by more than `dead`, in order."""
+    found = list[int]()
+    side, extreme = 0, 0
+    for i in range(1, x.size):
+        moved = x[i] - x[extreme]
+        if side * moved >= 0 and moved:
+            if side == 0 and abs(moved) <= dead:
+                continue
+            side = side or int(np.sign(moved))
+            extreme = i
+        elif abs(moved) > dead:
+            found.append(extreme)
+            side, extreme = -side, i
+    return found
+
+
+def travelled(measured: Measured) -> Array:
+    """Path [m] since the last reversal at each sample; inf before the first one."""
+    found = np.full(measured.v.size, np.inf)
+    if measured.x is None:
+        return found
+    for record in measured.records:
+        x, path = measured.x[record], found[record]
+        ends = turning_points(x, DEAD * float(np.ptp(x)))
+        for first, last in pairwise([*ends, x.size]):
+            path[first:last] = np.abs(x[first:last] - x[first])
+    return found
+
+
+def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -> Hysteresis | None:
+    """Stiffness and damping of pre-sliding from the branches after each reversal.
+
+    Args:
+        measured: with positions or times; the force without what accelerates a mass.
+        offset: constant force [N] beside friction.
+        dead: share of the travel by which the position must come back to count as a reversal.
+
+    Returns:
+        None where there is no path, or no reversal after which the force changes sign.
+    """
+    if measured.x is None:
+        return None
+    branches = list[Branch]()
+    for record in measured.records:
+        x, F, v = measured.x[record], measured.F[record] - offset, measured.v[record]
+        typical = float(np.quantile(np.abs(F), 0.75))
+        ends = turning_points(x, dead * float(np.ptp(x)))
+        shift = record.start
+        branches += _branches(x, F, v, [*ends, x.size - 1], typical, shift)
+    if not branches:
+        return None
+    halves = np.array([b.half for b in branches])
+    half = float(np.median(halves))
+    return Hysteresis(
+        tuple(branches),
+        half,
+        float(np.median([b.level for b in branches])),
+        float(np.median([b.damping for b in branches])),
+        float(np.median(np.abs(halves - half))) / half,
+    )
+
+
+def _branches(
+    x: Array, F: Array, v: Array, ends: list[int], typical: float, shift: int
+) -> Iterator[Branch]:
+    smooth = _median_of_three(F)
+    for first, last in pairwise(ends):
+        side = 1 if x[last] > x[first] else -1
+        along, force = side * (x[first : last + 1] - x[first]), side * smooth[first : last + 1]
+        level = -float(force[: max(2, force.size // 50)].mean())
+        crossed = np.flatnonzero(force > 0)
+        if level < PART * typical or not crossed.size or force.max() < PART * typical:
+            continue
+        k = int(crossed[0])
+        if k < 1 or along[k] <= 0:
+            continue
+        share = -force[k - 1] / (force[k] - force[k - 1])
+        half = float(along[k - 1] + share * (along[k] - along[k - 1]))
+        if half <= 0:
+            continue
+        speed = side * v[first : first + k + 1]
+        slope, damping = _slopes(along[: k + 1], speed, force[: k + 1])
+        yield Branch(
+            first=first + shift,
+            last=last + shift,
+            side=side,
+            level=level,
+            half=half,
+            slope=slope,
+            damping=damping,
+        )
+
+
+def _median_of_three(F: Array) -> Array:
+    """Against single spikes."""
+    inner = np.median([F[:-2], F[1:-1], F[2:]], axis=0)
+    return np.concatenate([F[:1], inner, F[-1:]])
+
+
+def _slopes(along: Array, speed: Array, force: Array) -> tuple[float, float]:
+    """Slopes of the force over path and speed; over the path alone where the speed says nothing."""
+    one = np.ones(along.size)
+    if along.size > 4 and np.ptp(speed) > 0:
+        scale = np.array([1.0, along.max(), np.abs(speed).max()])
+        X = np.column_stack([one, along, speed]) / scale
+        w = np.linalg.lstsq(X, force, rcond=1e-9)[0] / scale
+        if w[1] > 0 and w[2] >= 0:
+            return float(w[1]), float(w[2])
+    return float((force[-1] - force[0]) / along[-1]), 0.0

@@ -8,14 +8,18 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.starts.hysteresis import Hysteresis, hysteresis, travelled
-from identification.starts.law_curve import law_curve, parts
-from identification.starts.law_elements import HEADROOM, carrying, element_values, scaled, shared
-from identification.starts.law_fit import fit_law, velocity
-from identification.starts.measured import Measured
+from identification.data.dataset import Dataset
+from identification.data.findings import Findings
+from identification.residuals.points import Points
+from identification.signals.differentiate import differentiate
+from identification.starts.law_fit import fit_law, law_curve, velocity
+from identification.starts.maxwell_slip import HEADROOM, carrying, element_values, scaled, shared
+from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve
+from identification.unknowns.roles import orders, parts
+from identification.unknowns.subject import Subject
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parameter, parameters, symbolise
+from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
 from symfric.scenes.drive import Drive
 
@@ -29,6 +33,8 @@ DAMPED = 0.6
 """Ratio of bristle damping to sqrt(stiffness mass) where the data do not tell it."""
 BEYOND = 5.0
 """Paths to zero force behind a reversal after which a body counts as sliding."""
+APART = 1.05
+"""Least ratio of velocities that must differ."""
 SPIKE = 0.3
 """Share of the sliding force that bristle damping gives at the largest speed, without a mass."""
 
@@ -111,7 +117,7 @@ def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) ->
     m = _mass(measured) if mass else 0.0
     friction = measured.F if measured.a is None else measured.F - m * measured.a
     pure = replace(measured, F=friction)
-    slides = np.abs(measured.v) > slowest(measured)
+    slides = np.abs(measured.v) > noise_speed(measured)
     curve = binned(measured.v[slides], friction[slides])
     stribeck = fit_curve(curve)
     reversals = hysteresis(pure, offset=stribeck.offset)
@@ -135,7 +141,7 @@ def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) ->
     )
 
 
-def slowest(measured: Measured) -> float:
+def noise_speed(measured: Measured) -> float:
     """Speed [m/s] below which noise hides the direction: three standard deviations of velocity.
 
     From second differences of records with times, which smooth motion leaves nearly out; 0 for
@@ -235,7 +241,8 @@ def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, 
     known = parameters(what)
     found = {n: _inside(known[n], value) for n, value in values.items()}
     for _ in range(3):  # a pair put into order may leave another one out of it
-        for low, high, ratio in _pairs(what):
+        for low, high, strictly in orders(what):
+            ratio = APART if strictly else 1.0
             at = {n: found.get(n, float(known[n].value)) for n in (low, high)}
             if at[high] >= ratio * at[low]:
                 continue
@@ -255,14 +262,100 @@ def _inside(parameter: Parameter, value: float) -> float:
     return min(max(value if isfinite(value) else own, least), parameter.upper)
 
 
-def _pairs(what: Law | Drive) -> list[tuple[str, str, float]]:
-    """Names that must be in order: (low, high, least ratio)."""
-    model, variables = symbolise(what, *parameters(what))
-    found = list[tuple[str, str, float]]()
-    for part in parts(model):
-        for pairs, ratio in ((type(part).ordered, 1.0), (type(part).strictly_ordered, 1.05)):
-            for pair in pairs:
-                symbols = [getattr(part, field) for field in pair]
-                low, high = (next(x.name for x in variables if x.symbol is s) for s in symbols)
-                found.append((low, high, ratio))
-    return found
+FEW = 0.01
+"""Share of points whose speed may be any small number, such as noise about rest."""
+
+
+def findings_of(kind: object, data: Dataset) -> Findings:
+    """What is doubtful about the data, for who uses them like this."""
+    if isinstance(kind, Points):
+        return data.check()
+    called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
+    return data.check(**called)
+
+
+def explained(error: ValueError, findings: Findings) -> ValueError:
+    """The error of residuals that could not be made, behind what is wrong with the data."""
+    if not findings.errors:
+        return error
+    sentence = findings.errors[0].sentence.rstrip(".")
+    return ValueError(f"data '{findings.name}': {sentence}; then {error}")
+
+
+def _roles(kind: object) -> dict[str, str]:
+    """Channels of position and force of a drive."""
+    names = {name: getattr(kind, name, name) for name in ("x", "force")}
+    return {name: given if isinstance(given, str) else name for name, given in names.items()}
+
+
+def measured(kind: object, data: Dataset, load: float) -> Measured | None:
+    """Velocity and force of points or of a drive, all records; None where the data have none."""
+    try:
+        if isinstance(kind, Points):
+            return _of_points(kind, data, load)
+        return _of_drive(kind, data, load)
+    except ValueError:  # whoever prepares the residuals says what is missing
+        return None
+
+
+def _of_points(kind: Points, data: Dataset, load: float) -> Measured:
+    v, F = (np.concatenate([r[name] for r in data]) for name in (kind.v, kind.F))
+    times = [r.t for r in data]
+    t = None if any(one is None for one in times) else np.concatenate([r.time for r in data])
+    return Measured(v, F, t=t, N=load, breaks=_breaks([r.size for r in data]))
+
+
+def _of_drive(kind: object, data: Dataset, load: float) -> Measured:
+    names, chosen = _roles(kind), getattr(kind, "filter", None)
+    each = [differentiate(r, chosen, x=names["x"], force=names["force"]) for r in data]
+    v, F, x, t, a = (
+        np.concatenate([getattr(one, name) for one in each])
+        for name in ("v", "force", "x", "t", "a")
+    )
+    return Measured(v, F, x=x, t=t, a=a, N=load, breaks=_breaks([one.v.size for one in each]))
+
+
+def strongest(
+    kind: object, data: Dataset, seen: Measured | None, mass: float | None
+) -> float | None:
+    """Largest force on the friction of points or of a drive [N]; None where nobody knows it.
+
+    In sliding it is F - m a, at rest F. Not known of points with a measured normal force.
+    """
+    loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
+    if seen is None or loaded:
+        return None
+    if seen.a is None or mass is None:
+        return float(np.abs(seen.F).max())
+    return float(max(np.abs(seen.F).max(), np.abs(seen.F - mass * seen.a).max()))
+
+
+def slowest(kind: object, seen: Measured | None) -> float:
+    """Speed [m/s] above which nearly all points lie that are not at rest; 0 for motions."""
+    if seen is None or not isinstance(kind, Points):
+        return 0.0
+    speeds = np.abs(seen.v[seen.v != 0])
+    return float(np.quantile(speeds, FEW)) if speeds.size else 0.0
+
+
+def _breaks(sizes: list[int]) -> tuple[int, ...]:
+    return tuple(np.cumsum(sizes)[:-1].tolist())
+
+
+def from_data(subject: Subject, seen: Measured | None) -> dict[str, float]:
+    """Start values of the free parameters of a law or a drive that the data tell."""
+    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
+    if whole is None or seen is None:
+        return {}
+    names = [u.name for u in subject.unknowns]
+    try:
+        return start_values(whole, seen, free=names)
+    except ValueError:  # data that do not move: the law's own values are as good as any
+        return {}
+
+
+def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
+    """Start value of every free parameter: what the user says, else the data, else the law."""
+    values = {u.name: u.start for u in subject.unknowns}
+    told = {n: x for n, x in from_data(subject, seen).items() if n not in subject.started}
+    return values | told | dict(given)

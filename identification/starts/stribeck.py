@@ -6,7 +6,6 @@ from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, nnls
 
 from symfric.foundation import checks
 
@@ -143,6 +142,8 @@ def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
 
     Of a curve that does not fall, F_S = F_C and v_s says nothing.
     """
+    from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
+
     speed = np.abs(curve.v)
     exponents = EXPONENTS if delta is None else (delta,)
     scales = np.geomspace(speed.min(), max(speed.max(), speed.min() * 1.01), SCALES)
@@ -185,11 +186,15 @@ def _columns(curve: Curve, v_s: float, delta: float) -> Array:
 
 def _levels(curve: Curve, v_s: float, delta: float) -> tuple[list[float], float]:
     """F_C, F_S - F_C, sigma_2 and both signs of the offset, and the norm of the error."""
+    from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
+
     w, cost = nnls(_columns(curve, v_s, delta), curve.F)
     w[2] /= np.abs(curve.v).max()
     return w.tolist(), float(cost)
 
 
 def _residuals(curve: Curve, v_s: float, delta: float) -> Array:
+    from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
+
     X = _columns(curve, v_s, delta)
     return X @ nnls(X, curve.F)[0] - curve.F

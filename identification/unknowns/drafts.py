@@ -6,8 +6,7 @@ from math import inf, sqrt
 from typing import Any, final
 
 from identification.unknowns import roles
-from identification.unknowns.spec import Above, Range, Spec, Tied, as_spec
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Above, Range, Spec, Tied, Unknown, as_spec
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, Variable
 

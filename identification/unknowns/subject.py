@@ -16,14 +16,13 @@ from identification.unknowns.drafts import (
     refuse,
     wishes,
 )
-from identification.unknowns.spec import Tied
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Tied, Unknown
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.parameters import Variable, parameters, symbolise, with_values
 from symfric.foundation.symbols import symbols_of
 from symfric.foundation.units import turned
-from symfric.laws import Law, law_from_text, law_name
+from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.scenes import Drive
 from symfric.scenes.base import Scene
@@ -140,6 +139,8 @@ def subject(
     if isinstance(what, Model):
         return _of_model(what, wished)
     if isinstance(what, str):
+        from symfric.laws import law_from_text  # noqa: PLC0415 (slow to import)
+
         what = law_from_text(what)
     if not isinstance(what, Law | Scene):
         such = "a law or its text such as 'stribeck', a scene such as Drive(...), or a model"
@@ -168,6 +169,8 @@ class _Setting:
 
 def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
     """The subject that a law (of points) or a scene (of a motion) is."""
+    from symfric.laws import law_name  # noqa: PLC0415 (slow to import)
+
     known = parameters(whole)
     symbols = [n for n, p in known.items() if not is_number(p.value)]
     if symbols:

@@ -21,8 +21,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.unknowns.spec import Tied
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Tied, Unknown
 from symfric.foundation.numeric import evaluate_all
 
 Array = NDArray[np.float64]

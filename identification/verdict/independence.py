@@ -1,30 +1,203 @@
-"""Whether residuals depend on what was applied and how it moved: added variables under colour.
+"""Test whether residuals depend on inputs and motion: added variables under coloured noise.
 
-Residuals and columns of a family are whitened by an autoregressive model, what the fit could still
-take up (J) is projected out of both, and the rest is regressed on the columns:
+Inputs, and the motion that the model predicts (the measured one shares its noise with the
+residuals), give families of columns. A right model leaves none of them in the residuals; each
+family is what one kind of error leaves:
+
+| family | columns | what is missing |
+|---|---|---|
+| response to a regressor | it, now and earlier | dynamics, delay, mass, viscous |
+| direction of motion | sign v, v abs(v), v^3, abs(v) | Coulomb level, asymmetry, viscous terms |
+| speed | bins of abs(v), each way | shape of the friction curve: Stribeck |
+| time or distance since reversal | bins, each way | pre-sliding, hysteresis, dwell |
+| place | harmonics of the position | ripple, cogging, gravity |
+
+Residuals and columns are whitened by an autoregressive model, what the fit could still take up (J)
+is projected out of both, and the rest is regressed on the columns:
 
     F = (explained / q) / (rest / (n - k - q))  ~  F(q, n - k - q)     if there is no dependence
 
-For one column this is a cross-correlation with the variance of Bartlett's formula; whitening
-makes its distribution right also for coloured residuals and periodic motions, where the usual
-limits 1.96/sqrt(n) raise false alarms. The model is first that of the residuals. It takes a missing
-harmonic for colour; so unless F is large already, the model is that of what the columns leave of
-the residuals, by restricted likelihood where it matters.
+For one column this is a cross-correlation with the variance of Bartlett's formula. The
+autoregressive model is first that of the residuals, which takes a missing harmonic for colour; so
+unless F is large already, it is that of what the columns leave of the residuals.
 Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 (added variables);
 Ljung, System Identification, 1999, section 16.6.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Literal, final
 
 import numpy as np
 
-from identification.residuals.evaluation import Array
+from identification.residuals.evaluation import Array, Channel
 from identification.verdict.colour import Colour, span, whitened
 from identification.verdict.colour import colour as autoregressive
-from identification.verdict.features import Clue, families
-from identification.verdict.order import Count
+from identification.verdict.minimum import Count, Minimum, lagged, positions
+
+Kind = Literal["position", "velocity", "acceleration", ""]
+
+DELAYS = (0, 1, 2, 4, 8, 16, 32)
+"""Samples by which a regressor may act late."""
+BINS = 8
+"""Bins of speed and of the distance since a reversal, each way."""
+HARMONICS = 12
+"""Of the position over its range."""
+ROWS_EACH = 12
+"""Rows that a column needs at least."""
+MOVING = 1e-3
+"""Share of the largest speed below which there is no direction."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Clue:
+    """A signal that residuals may depend on, shape (n,), and what it is."""
+
+    name: str
+    signal: Array
+    kind: Kind = ""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Columns of one kind.
+
+    Attributes:
+        what: what they are functions of, for a sentence: "the residuals of x depend on ...".
+        hint: what such a dependence means.
+        columns: shape (n, q).
+        smoothed: whether they come from a signal that had to be smoothed, which leaves traces.
+    """
+
+    what: str
+    hint: str
+    columns: Array
+    smoothed: bool = False
+
+
+def families(clues: Sequence[Clue], position: Count) -> Iterator[Family]:
+    """The families that `clues` give; those with too many columns for the rows are thinned."""
+    n = position.size
+    delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
+    for clue in clues:
+        name, signal = clue.name, clue.signal
+        if not np.ptp(signal) > 0:
+            continue
+        if clue.kind == "position":
+            yield _of_place(name, signal, n)
+            continue
+        columns = np.column_stack([lagged(signal, position, d) for d in delays])
+        hint = f"dynamics or a delay from {name} is missing"
+        yield Family(f"{name} and its past", hint, columns, clue.kind == "acceleration")
+        if clue.kind == "velocity":
+            yield from _of_speed(name, signal, n)
+            if position.any():
+                since = _since_reversal(signal, position)
+                yield Family(
+                    f"the path since {name} last changed its sign",
+                    "hysteresis or pre-sliding is not described",
+                    _bins(since, _way(signal), _count(n)),
+                )
+
+
+def _of_place(name: str, x: Array, n: int) -> Family:
+    turns = 2 * np.pi * (x - x.min()) / np.ptp(x)
+    orders = np.arange(1, max(1, min(HARMONICS, n // (2 * ROWS_EACH))) + 1) / 2
+    waves = np.outer(turns, orders)
+    return Family(
+        f"the place {name}",
+        "something changes along the way: ripple, cogging, a spring, gravity",
+        np.column_stack([np.cos(waves), np.sin(waves)]),
+    )
+
+
+def _count(n: int) -> int:
+    """Bins each way that n rows allow."""
+    return max(2, min(BINS, n // (2 * ROWS_EACH)))
+
+
+def _of_speed(name: str, v: Array, n: int) -> Iterator[Family]:
+    size = np.abs(v).max()
+    yield Family(
+        f"the direction and size of {name}",
+        "friction of another level or another power of the speed is there",
+        np.column_stack([_way(v), v * np.abs(v) / size**2, (v / size) ** 3, np.abs(v) / size]),
+    )
+    yield Family(
+        f"the speed {name}",
+        "the friction curve has another shape, such as a Stribeck peak",
+        _bins(np.abs(v), _way(v), _count(n)),
+    )
+
+
+def _way(v: Array) -> Array:
+    """Sign of v; 0 at standstill."""
+    return np.where(np.abs(v) > MOVING * np.abs(v).max(), np.sign(v), 0.0)
+
+
+def _bins(signal: Array, way: Array, count: int) -> Array:
+    """One column for each bin of equal shares of `signal` and each way, (n, up to 2 count)."""
+    moving = way != 0
+    if not moving.any():
+        return np.zeros((signal.size, 0))
+    edges = np.quantile(signal[moving], np.linspace(0, 1, count + 1)[1:-1])
+    bin_of = np.searchsorted(edges, signal)
+    columns = [(bin_of == b) & (way == side) for b in range(count) for side in (-1, 1)]
+    return np.column_stack([c for c in columns if c.any()]).astype(float)
+
+
+def _since_reversal(v: Array, position: Count) -> Array:
+    """Sum of abs(v) over the samples since v changed its sign or a run began."""
+    way = np.sign(v)
+    turned = np.ones(v.size, dtype=bool)
+    turned[1:] = (way[1:] != way[:-1]) | (position[1:] == 0)
+    path = np.cumsum(np.abs(v))
+    last = np.maximum.accumulate(np.where(turned, np.arange(v.size), 0))
+    return path - path[last]
+
+
+POSITIONS, VELOCITIES = ("m", "rad"), ("m/s", "rad/s")
+
+
+def clues_of(found: Minimum, channel: Channel) -> list[Clue]:
+    """The regressors of a channel, and the motion that was simulated for its record."""
+    clues = {n: Clue(n, s, _kind(n)) for n, s in channel.regressors.items()}
+    for other in found.channels:
+        if other.record != channel.record or not _same_times(other, channel):
+            continue
+        predicted = other.measured + found.raw[other.rows]
+        if other.unit in VELOCITIES:
+            clues.setdefault(other.signal, Clue(other.signal, predicted, "velocity"))
+        elif other.unit in POSITIONS and other.ordered:
+            clues.setdefault(other.signal, Clue(other.signal, predicted, "position"))
+            rate = "v" if other.signal == "x" else f"the rate of {other.signal}"
+            speed = _rate(predicted, other.t, positions(other))
+            clues.setdefault(rate, Clue(rate, speed, "velocity"))
+    return list(clues.values())
+
+
+def _kind(name: str) -> Kind:
+    """What a regressor is by its name."""
+    stem = name.replace(".", "_").replace("[", "_").split("_")[0]
+    kinds: dict[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleration"}
+    return kinds.get(stem, "")
+
+
+def _same_times(one: Channel, other: Channel) -> bool:
+    return one.t.size == other.t.size and bool(np.array_equal(one.t, other.t))
+
+
+def _rate(x: Array, t: Array, position: Count) -> Array:
+    """Slope of x over time, inside each run."""
+    slope = np.zeros_like(x)
+    starts = np.flatnonzero(position == 0)
+    for first, last in zip(starts, [*starts[1:], x.size], strict=True):
+        if last - first > 1:
+            slope[first:last] = np.gradient(x[first:last], t[first:last])
+    return slope
+
 
 SURE, UNSURE = 1e-6, 0.02
 """p below which the first test needs no second one, and the second one a better one."""

@@ -1,4 +1,12 @@
-"""What a fit is worth in view of its residuals.
+"""How fine a measured signal is: below that, residuals say nothing of a model.
+
+Records that begin slowly with residuals far above the rest: states that nobody knew there.
+
+Bristles are taken as relaxed where a record begins near rest. If it was loaded before, the force is
+wrong until they have slid once, and stiffness and damping make up for it.
+
+
+What a fit is worth in view of its residuals.
 
 A least-squares fit ends at a minimum whatever model it is given. A right model leaves noise that
 has nothing to do with what was applied and how the machine moved; white noise of the size that the
@@ -20,18 +28,74 @@ from typing import final
 import numpy as np
 
 from identification.data.findings import Findings
-from identification.residuals.evaluation import Channel
+from identification.residuals.evaluation import Array, Channel
+from identification.residuals.sampled import moving_start
 from identification.solving.task import Point, Task
-from identification.verdict.beginning import beginnings
-from identification.verdict.clues import clues_of
-from identification.verdict.colour import Colour
-from identification.verdict.independence import Dependence, dependences
-from identification.verdict.minimum import Minimum, minimum
-from identification.verdict.order import positions
-from identification.verdict.resolution import resolution
-from identification.verdict.sandwich import sandwich
-from identification.verdict.whiteness import Whiteness, whiteness
+from identification.verdict.colour import Colour, Whiteness, whiteness
+from identification.verdict.covariance import sandwich
+from identification.verdict.independence import Dependence, clues_of, dependences
+from identification.verdict.minimum import Minimum, minimum, positions
 from symfric.foundation.status import Status
+
+ROUNDING = 1e-6
+"""Share of the range of a signal that simulations and interpolation may be off."""
+BALANCE = 1e-3
+"""The same of a force: filtered and differentiated motions give none that is more exact."""
+FORCES = ("N", "N m")
+
+
+def resolution(measured: Array, unit: str) -> float:
+    """Root mean square of the errors of rounding and of simulation, in the unit of the signal.
+
+    A signal is rounded if its values are multiples of the smallest step between two of them.
+    """
+    values = np.unique(measured)
+    reach = float(values[-1] - values[0])
+    floor = (BALANCE if unit in FORCES else ROUNDING) * max(
+        reach, 1e-3 * float(np.abs(values).max())
+    )
+    steps = np.diff(values)
+    steps = steps[steps > 1e-9 * reach]
+    if not steps.size:
+        return floor
+    count = (values - values[0]) / float(steps.min())
+    rounded = np.abs(count - np.rint(count)).max() < 0.1 and values.size < 0.9 * measured.size
+    return max(floor, float(steps.min()) / np.sqrt(12)) if rounded else floor
+
+
+FIRST = 0.05
+"""Share of a record that is its beginning."""
+FEWEST = 8
+"""Samples below which a beginning is none."""
+LARGER = 4.0
+"""Residuals of a beginning over the others; of Gauss's, coloured or not, 1 in 10 000 have it."""
+
+
+def beginnings(found: Minimum) -> Iterator[str]:
+    """A sentence for each channel whose record begins with what the model does not know.
+
+    Limits: of records in order of time with a velocity among the regressors. A model that is wrong
+    at the beginning for another reason, such as a decay from its largest swing, looks the same.
+    """
+    for channel in found.channels:
+        ratio, count = _ratio(found, channel)
+        if ratio > LARGER:
+            yield (
+                f"The residuals of {found.label(channel)} are {ratio:.2g} times as large in its "
+                f"first {count} samples as after: the record begins loaded, or with other states "
+                "unknown; begin it in sliding, or unloaded."
+            )
+
+
+def _ratio(found: Minimum, channel: Channel) -> tuple[float, int]:
+    """Size of the residuals at the beginning over that of the others, and samples of it."""
+    v, r = channel.regressors.get("v"), found.r[channel.rows]
+    count = int(FIRST * r.size)
+    if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
+        return 0.0, count
+    first, later = (float(np.sqrt(np.mean(part**2))) for part in (r[:count], r[count:]))
+    return first / max(later, 1e-300), count
+
 
 ALARM = 0.02
 """Chance of a false alarm over all tests of a fit."""

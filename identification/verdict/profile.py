@@ -95,9 +95,25 @@ class Profile:
         Args:
             path: image file.
         """
-        from identification.verdict.picture import plot_profile  # noqa: PLC0415 (Matplotlib is slow)
+        from symfric.foundation.panels import panels, save  # noqa: PLC0415 (Matplotlib is slow)
+        from symfric.foundation.style import colour  # noqa: PLC0415
 
-        return plot_profile(self, path)
+        figure, (axis,) = panels(1, width=5.5, height=3.2)
+        axis.plot(self.values, self.rise, "o-", ms=4, lw=1.3, label="profile")
+        axis.axhline(self.limit, color=colour(1), lw=1, ls="--", label="limit of 95 %")
+        axis.plot([self.best], [0.0], "k|", ms=14, label="fit")
+        for end in (self.low, self.high):
+            if end is not None:
+                axis.axvline(end, color=colour(1), lw=0.8, ls=":")
+        if self.logarithmic and self.values.max() > 5 * self.values.min():
+            axis.set_xscale("log")
+        top = max(1.6 * self.limit, 0.0)
+        axis.set_ylim(min(float(self.rise.min()), 0.0) - 0.05 * top, top)
+        axis.set_xlabel(f"{self.name} [{self.unit}]")
+        axis.set_ylabel("rise of the cost, in variances")
+        axis.set_title("\n".join(self.sentences), fontsize="small", wrap=True)
+        axis.legend(fontsize="small")
+        return save(figure, path)
 
 
 def profile(

@@ -11,7 +11,6 @@ from typing import Annotated, Any, final
 import typer
 
 from identification.data.dataset import Dataset
-from identification.first import findings_of
 from identification.fit import Fit
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.inverse import InverseDynamics
@@ -19,6 +18,7 @@ from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
+from identification.starts.start import findings_of
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status

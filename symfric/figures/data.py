@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.parameters import check_names
-from symfric.foundation.prefixes import readable
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.style import DASHES, colour, dash
+from symfric.foundation.units import readable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

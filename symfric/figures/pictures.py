@@ -19,10 +19,9 @@ from symfric.figures.pushing import stiction
 from symfric.figures.sliding import dwell, hysteresis, lag, transition, velocity_step
 from symfric.foundation.panels import blank, dressed, grid, save
 from symfric.foundation.parameters import parameters
-from symfric.foundation.prefixes import readable
 from symfric.foundation.status import SolveError
 from symfric.foundation.style import colour, dash, line
-from symfric.foundation.units import turned
+from symfric.foundation.units import readable, turned
 from symfric.laws import AnyLaw, Law, Population, law_name, steady_force, steady_inputs
 from symfric.laws.base.law import FORCE
 

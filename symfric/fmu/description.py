@@ -7,8 +7,8 @@ from math import isfinite
 from typing import final
 from xml.etree import ElementTree as Xml
 
-from symfric.fmu.units import CELSIUS, exponents
 from symfric.fmu.variables import Entry
+from symfric.foundation.units import CELSIUS, exponents
 
 CATEGORIES = ("logStatusDiscard", "logStatusError")
 """Messages come in any case: there are none but of what failed or was refused."""

@@ -13,9 +13,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.fmu.units import per_second
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import strays
+from symfric.foundation.units import per_second
 from symfric.model import Model
 
 LEAST_RTOL, LARGEST_RTOL = 1e-13, 0.1

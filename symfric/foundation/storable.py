@@ -21,7 +21,7 @@ MODULES = (
     "identification.data.", "identification.fit", "identification.residuals.closed_loop",
     "identification.residuals.inverse", "identification.residuals.points",
     "identification.residuals.shooting", "identification.result.", "identification.signals.filters",
-    "identification.signals.velocity", "identification.unknowns.spec", "identification.verdict.",
+    "identification.unknowns.spec", "identification.verdict.",
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
 MOVED = {
@@ -58,6 +58,11 @@ MOVED = {
     "ocp.text.ranges": "ocp.formulation.bounds",
     "ocp.text.span": "ocp.formulation.phase",
     "ocp.transcription.points": "ocp.transcription.unknowns",
+    "identification.data.loop": "identification.data.record",
+    "identification.result.curve": "identification.result.series",
+    "identification.result.estimate": "identification.result.series",
+    "identification.signals.velocity": "identification.signals.filters",
+    "identification.verdict.whiteness": "identification.verdict.colour",
 }
 """Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")

@@ -1,42 +1,65 @@
-"""Units as text: whether there is such a unit, how it is written here, how large it is in SI.
+"""Units as text: one grammar for what is written, its size in SI, its dimension, its prefixes.
 
 A product of symbols with prefixes and powers, `N s^2/m`, `kg m^2`, `1/(N m)`, `m s^-2`. Other ways
-to write the same are taken: `N*s/m`, `kg·m²`, `m/s/s`, `m/s2`, `N.m`, `Nm`.
+to write the same are taken: `N*s/m`, `kg·m²`, `m/s/s`, `m/s2`, `N.m`, `Nm`. All factors behind a
+slash divide. Newtons stay newtons and radians radians, so that a torque is no energy.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from math import pi
 from re import fullmatch, search, sub
+from typing import final
 from warnings import warn
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+YEAR = 365.25 * 86400.0
+"""Julian year [s]."""
 PREFIXES: Mapping[str, float] = {
     "": 1.0, "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 0.1,
     "h": 100.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
 }  # fmt: skip
 
-PREFIXED: Mapping[str, float] = {
-    **dict.fromkeys("msAKNJWVFCSTH", 1.0), "mol": 1.0, "cd": 1.0, "Pa": 1.0, "Hz": 1.0, "Ohm": 1.0,
-    "Wb": 1.0, "rad": 1.0, "sr": 1.0, "lm": 1.0, "lx": 1.0, "kat": 1.0, "VA": 1.0, "var": 1.0,
-    "g": 1e-3, "L": 1e-3, "l": 1e-3, "bar": 1e5, "cal": 4.184, "Wh": 3600.0, "Ah": 3600.0,
+_COUNTS = (
+    "count", "counts", "inc", "tick", "ticks", "step", "steps", "unit", "units", "LSB", "bit",
+    "px", "pulse", "pulses", "pu", "sample", "AU", "arb",
+)  # fmt: skip
+_OF_SI = (
+    *"msAKNJWVFCSTH", "mol", "cd", "Pa", "Hz", "Ohm", "Wb", "rad", "sr", "lm", "lx", "kat",
+)  # fmt: skip
+PREFIXED: Mapping[str, tuple[float, str]] = {
+    **{symbol: (1.0, symbol) for symbol in _OF_SI},
+    "g": (1e-3, "kg"), "L": (1e-3, "m^3"), "l": (1e-3, "m^3"), "bar": (1e5, "Pa"),
+    "cal": (4.184, "J"), "Wh": (3600.0, "J"), "Ah": (3600.0, "C"), "VA": (1.0, "W"),
+    "var": (1.0, "W"),
 }  # fmt: skip
-"""Symbols that take a prefix, and their size in SI units."""
-
-ALONE: Mapping[str, float] = {
-    "1": 1.0, "%": 0.01, "permille": 1e-3, "ppm": 1e-6, "dB": 1.0, "degC": 1.0, "degF": 5 / 9,
-    "deg": pi / 180, "arcmin": pi / 10800, "arcsec": pi / 648000, "gon": pi / 200,
-    **dict.fromkeys(("rev", "turn", "turns", "rot", "cycle", "cycles"), 2 * pi),
-    "rpm": pi / 30, "rps": 2 * pi,
-    "min": 60.0, "h": 3600.0, "d": 86400.0, "day": 86400.0, "days": 86400.0, "week": 604800.0,
-    **dict.fromkeys(("a", "yr", "year", "years"), 365.25 * 86400.0),
-    "in": 0.0254, "ft": 0.3048, "lb": 0.45359237, "lbf": 4.4482216152605, "kgf": 9.80665,
-    "psi": 6894.757293168, "atm": 101325.0, "mmHg": 133.322387415, "hp": 745.6998715822702,
-    **dict.fromkeys(("count", "counts", "inc", "tick", "ticks", "step", "steps", "unit"), 1.0),
-    **dict.fromkeys(("units", "LSB", "bit", "px", "pulse", "pulses", "pu", "sample"), 1.0),
-    "t": 1000.0, "AU": 1.0, "arb": 1.0,
+"""Symbols that take a prefix -> their size in SI units, and the unit of the SI that is meant."""
+ALONE: Mapping[str, Mapping[str, float]] = {
+    "1": {
+        **dict.fromkeys(_COUNTS, 1.0),
+        "1": 1.0, "%": 0.01, "permille": 1e-3, "ppm": 1e-6, "dB": 1.0,
+    },
+    "rad": {
+        "deg": pi / 180, "arcmin": pi / 10800, "arcsec": pi / 648000, "gon": pi / 200,
+        **dict.fromkeys(("rev", "turn", "turns", "rot", "cycle", "cycles"), 2 * pi),
+    },
+    "rad/s": {"rpm": pi / 30, "rps": 2 * pi},
+    "s": {
+        "min": 60.0, "h": 3600.0, "d": 86400.0, "day": 86400.0, "days": 86400.0, "week": 604800.0,
+        **dict.fromkeys(("a", "yr", "year", "years"), YEAR),
+    },
+    "m": {"in": 0.0254, "ft": 0.3048}, "kg": {"lb": 0.45359237, "t": 1000.0},
+    "N": {"lbf": 4.4482216152605, "kgf": 9.80665}, "W": {"hp": 745.6998715822702},
+    "Pa": {"psi": 6894.757293168, "atm": 101325.0, "mmHg": 133.322387415},
+    "degC": {"degC": 1.0}, "degF": {"degF": 5 / 9},
 }  # fmt: skip
-"""Symbols without prefixes; what counts things is 1."""
-
+"""SI unit -> symbols of it without prefixes, and their size; what counts things is 1."""
+_ALONE = {name: (size, unit) for unit, names in ALONE.items() for name, size in names.items()}
+SPOKEN: Mapping[str, str] = {"u/min": "rpm", "r/min": "rpm"}
+"""Whole units that are no product of symbols."""
 WORDS: Mapping[str, str] = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "minute": "min", "minutes": "min",
@@ -47,7 +70,8 @@ WORDS: Mapping[str, str] = {
     "watt": "W", "watts": "W", "joule": "J", "joules": "J", "pascal": "Pa", "hertz": "Hz",
     "kelvin": "K", "celsius": "degC", "ohm": "Ohm", "ohms": "Ohm", "percent": "%", "mps": "m/s",
     "kph": "km/h", "kmh": "km/h", "kmph": "km/h", "mm2": "mm^2", "inch": "in", "inches": "in",
-    "none": "1", "kg": "kg", "kgs": "kg", "nm": "N m", "hz": "Hz", "pa": "Pa", "kpa": "kPa",
+    "none": "1", "rpm": "rpm", "rps": "rps", "kg": "kg", "kgs": "kg", "nm": "N m",
+    "hz": "Hz", "pa": "Pa", "kpa": "kPa",
     "mpa": "MPa", "kn": "kN", "n": "N", "w": "W", "v": "V", "j": "J", "kgm": "kg m",
 }  # fmt: skip
 """What people write instead, in lower letters, and the unit they mean."""
@@ -59,6 +83,39 @@ _SIGNS = (
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _POWER = r"\^-?\d+(?:\.\d+)?|\^\(-?\d+(?:[./]\d+)?\)|\^[a-z]\b"
 _doubted: set[str] = set()
+
+_ORDER = ("kg", "N", "J", "V", "A", "K", "W", "", "rad", "m", "s")
+"""Symbols in the order in which a product is written; others stand in the place of ""."""
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+DERIVED: Mapping[str, str] = {
+    "N": "kg m/s^2", "J": "kg m^2/s^2", "W": "kg m^2/s^3", "Pa": "kg/(m s^2)", "Hz": "1/s",
+    "V": "kg m^2/(s^3 A)", "C": "s A", "Ohm": "kg m^2/(s^3 A^2)",
+}  # fmt: skip
+"""Units of the SI in its base units."""
+CELSIUS = "degC"
+"""The only unit of FMI that does not count from zero: 273.15 K."""
+
+
+@final
+@dataclass(frozen=True)
+class Unit:
+    """A unit: numbers times `factor` are in the SI unit of these `powers` of symbols."""
+
+    factor: float
+    powers: tuple[tuple[str, float], ...]
+
+    @property
+    def si(self) -> str:
+        """The SI unit as text."""
+
+        def side(sense: int) -> list[str]:
+            found = [(s, sense * power) for s, power in self.powers if sense * power > 0]
+            return [s if power == 1 else f"{s}^{power:g}" for s, power in found]
+
+        above, below = " ".join(side(1)) or "1", side(-1)
+        if not below:
+            return above
+        return f"{above}/{below[0]}" if len(below) == 1 else f"{above}/({' '.join(below)})"
 
 
 def checked(where: str, unit: str, stacklevel: int = 4) -> str:
@@ -111,30 +168,76 @@ def _apart(word: str) -> str:
 
 
 @cache
-def in_si(text: str) -> float | None:
-    """What a number in the unit `text` is multiplied by in SI units; None for what is no unit.
+def parsed(text: str) -> Unit | None:
+    """The unit that `text` means; None for what is no unit.
 
-    Angles are radians, counts are 1, and degrees Celsius are as large as kelvins.
+    Angles are radians, counts are 1, and degrees Celsius are as large as kelvins. A power that is a
+    letter is NaN.
     """
-    found, rest = _quotient(written(text))
-    return found if found is not None and not rest else None
+    plain = written(text)
+    found, rest = _quotient(SPOKEN.get(plain.lower(), plain))
+    if found is None or rest:
+        return None
+    places = {symbol: k for k, symbol in enumerate(_ORDER)}
+    powers = [(s, power) for s, power in found[1].items() if power]
+    powers.sort(key=lambda pair: places.get(pair[0], places[""]))
+    return Unit(found[0], tuple(powers))
 
 
-def _quotient(text: str) -> tuple[float | None, str]:
+def in_si(text: str) -> float | None:
+    """What a number in the unit `text` is multiplied by in SI units; None for what is no unit."""
+    found = parsed(text)
+    return None if found is None else found.factor
+
+
+def exponents(text: str) -> dict[str, int] | None:
+    """Exponents of the base units that `text` is made of; None of what is no product of SI units.
+
+    A unit of another size, such as mm, has none, nor has a power that is no whole number.
+    """
+    unit, found = parsed(text), dict[str, int]()
+    if unit is None or unit.factor != 1.0:
+        return None
+    for symbol, power in unit.powers:
+        base = {symbol: 1} if symbol in BASE else exponents(DERIVED.get(symbol, "?"))
+        if base is None or power != round(power, 0):
+            return None
+        for name, inner in base.items():
+            found[name] = found.get(name, 0) + inner * int(power)
+    return {name: found[name] for name in BASE if found.get(name)}
+
+
+def per_second(unit: str) -> str:
+    """The unit of a rate: m becomes m/s, m/s becomes m/s^2."""
+    numerator, slash, denominator = unit.partition("/")
+    if not slash:
+        return f"{numerator}/s"
+    if denominator == "s":
+        return f"{numerator}/s^2"
+    return f"{numerator}/({denominator.strip('()')} s)"
+
+
+_Size = tuple[float, dict[str, float]]
+"""Factor to SI units, and powers of their symbols."""
+
+
+def _quotient(text: str) -> tuple[_Size | None, str]:
     """The size of a product with slashes, and what follows: a bracket that closes, or nothing."""
-    size, sense, text = 1.0, 1.0, text.strip()
+    size, powers, sense, text = 1.0, dict[str, float](), 1, text.strip()
     while text and text[0] != ")":
         if text[0] == "/":
-            sense, text = -1.0, text[1:].lstrip()
+            sense, text = -1, text[1:].lstrip()
         factor, text = _factor(text)
         if factor is None:
             return None, text
-        size *= factor**sense
+        size *= factor[0] ** sense
+        for symbol, power in factor[1].items():
+            powers[symbol] = powers.get(symbol, 0) + sense * power
         text = text.lstrip()
-    return size, text
+    return (size, powers), text
 
 
-def _factor(text: str) -> tuple[float | None, str]:
+def _factor(text: str) -> tuple[_Size | None, str]:
     """The size of one factor with its power, and what follows."""
     if text.startswith("("):
         size, text = _quotient(text[1:])
@@ -151,23 +254,30 @@ def _factor(text: str) -> tuple[float | None, str]:
     return _raised(size, power[0].lstrip("^").strip("()")), text[power.end() :]
 
 
-def _raised(size: float, power: str) -> float | None:
+def _raised(size: _Size, power: str) -> _Size | None:
     """A size to a power; one that is a letter leaves SI units as they are."""
     if power.isalpha():
-        return 1.0 if size == 1.0 else None
+        return (1.0, dict.fromkeys(size[1], float("nan"))) if size[0] == 1.0 else None
     above, _, below = power.partition("/")
-    return size ** (float(above) / float(below or 1))
+    n = float(above) / float(below or 1)
+    return size[0] ** n, {symbol: n * inner for symbol, inner in size[1].items()}
 
 
-def _symbol(text: str) -> float | None:
-    if text in ALONE:
-        return ALONE[text]
+def _symbol(text: str) -> _Size | None:
     if text[:1].isdigit():
-        return float(text)
-    for symbol, size in PREFIXED.items():
-        if text.endswith(symbol) and text.removesuffix(symbol) in PREFIXES:
-            return size * PREFIXES[text.removesuffix(symbol)]
-    return None
+        return float(text), {}
+    found = _ALONE.get(text)
+    if found is None:
+        for symbol, (size, unit) in PREFIXED.items():
+            if text.endswith(symbol) and text.removesuffix(symbol) in PREFIXES:
+                found = size * PREFIXES[text.removesuffix(symbol)], unit
+                break
+        else:
+            return None
+    size, unit = found
+    if unit == text or unit.isalpha():
+        return size, {unit: 1.0}
+    return size, {} if unit == "1" else dict((parsed(unit) or Unit(1.0, ())).powers)
 
 
 def nearest(text: str) -> str:
@@ -181,3 +291,43 @@ def _meant(word: str) -> str:
     if _symbol(word) is not None:
         return word
     return WORDS.get(word.lower(), word)
+
+
+SHOWN_WITH = (
+    "m", "m/s", "m/s^2", "N", "N m", "N/s", "rad", "rad/s", "rad/s^2", "s", "J", "W", "Pa",
+)  # fmt: skip
+"""Units that `readable` writes with a prefix."""
+
+STEPS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+LEAST, MOST = 0.08, 2e4
+"""Largest magnitudes that are written without a prefix."""
+
+CLOCKS = ((YEAR, "years"), (86400.0, "days"), (3600.0, "h"))
+"""What a long time is told in [s]; from three of them on, for hours from six."""
+
+
+def clock(times: ArrayLike) -> tuple[float, str]:
+    """A factor and the unit in which `times` [s], times the factor, are easily read on an axis."""
+    t = np.asarray(times, dtype=float)
+    span = float(np.ptp(t[np.isfinite(t)])) if np.isfinite(t).any() else 0.0
+    for size, unit in CLOCKS:
+        if span >= (6 if unit == "h" else 3) * size:
+            return 1 / size, unit
+    return 1.0, "s"
+
+
+def readable(unit: str, values: Iterable[ArrayLike]) -> tuple[float, str]:
+    """A factor and the unit in which `values` in `unit`, times the factor, are easily read.
+
+    As they are between 0.08 and 20000, where they all vanish, or where the unit takes no prefix;
+    beyond, their largest magnitude comes to lie between 0.08 and 80.
+    """
+    sizes = [np.abs(np.asarray(v, dtype=float)) for v in values]
+    top = max((float(np.max(s[np.isfinite(s)], initial=0.0)) for s in sizes), default=0.0)
+    if unit not in SHOWN_WITH or top == 0.0 or LEAST <= top < MOST:
+        return 1.0, unit
+    for size, letter in STEPS:
+        if top >= LEAST * size:
+            return 1 / size, letter + unit
+    size, letter = STEPS[-1]
+    return 1 / size, letter + unit

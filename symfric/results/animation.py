@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.foundation.panels import blank, grid
-from symfric.foundation.prefixes import readable
 from symfric.foundation.style import EDGE, colour
+from symfric.foundation.units import readable
 from symfric.model.sketch import Sketch
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
-from symfric.foundation.prefixes import clock, readable
 from symfric.foundation.style import COLOURS, colour, line
+from symfric.foundation.units import (
+    clock,
+    readable,
+)
 from symfric.results.pictures import level
 
 Array = NDArray[np.float64]

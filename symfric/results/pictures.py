@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.panels import save
-from symfric.foundation.prefixes import clock, readable
 from symfric.foundation.style import COLOURS, EDGE, colour, line
+from symfric.foundation.units import clock, readable
 from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION
 from symfric.results.kinds import Group, every, friction_laws, kinds, main
 from symfric.results.signals import Signals

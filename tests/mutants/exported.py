@@ -119,8 +119,8 @@ EXPORTED = (
         " * (1.0 - 1e-9)", "", (f"{T_THIRD}::test_steps_of_a_fixed_length_are_those_of_the_plant",),
     ),
     Mutant(
-        "fmu: a pascal is a newton", "symfric/fmu/units.py",
-        '"Pa": {"kg": 1, "m": -1, "s": -2}', '"Pa": {"kg": 1, "m": 1, "s": -2}', T_UNITS,
+        "fmu: a pascal is a newton", "symfric/foundation/units.py",
+        '"Pa": "kg/(m s^2)"', '"Pa": "kg m/s^2"', T_UNITS,
     ),
     Mutant(
         "fmu: zero degrees are zero kelvin", "symfric/fmu/description.py",

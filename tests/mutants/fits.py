@@ -45,35 +45,35 @@ T_SLIDING = (f"{TESTS}starts/test_pre_sliding.py",)
 
 MEASURED = (
     Mutant(
-        "units behind a slash multiply", DATA + "units.py",
-        "factor *= found[0] ** sense", "factor *= found[0]", T_UNITS,
+        "units behind a slash multiply", "symfric/foundation/units.py",
+        "size *= factor[0] ** sense", "size *= factor[0]", T_UNITS,
     ),
     Mutant(
-        "the arm of a torque has no prefix", DATA + "units.py",
-        'return force[0] * arm[0], {"N": 1, "m": 1}', 'return force[0], {"N": 1, "m": 1}', T_UNITS,
+        "a bracket behind a slash is not turned round", "symfric/foundation/units.py",
+        "powers.get(symbol, 0) + sense * power", "powers.get(symbol, 0) + power", T_UNITS,
     ),
     Mutant(
-        "gaps of a record are bridged", DATA + "resample.py", "GAP = 5.0", "GAP = 5e9", T_DATASET,
+        "gaps of a record are bridged", DATA + "record.py", "GAP = 5.0", "GAP = 5e9", T_DATASET,
     ),
     Mutant(
         "gaps of the second recorder are bridged", DATA + "merge.py",
         "& (t[k + 1] - t[k] <= GAP * second.median_step)", "", T_MERGE,
     ),
     Mutant(
-        "a clock that runs faster is corrected the wrong way", DATA + "delay.py",
+        "a clock that runs faster is corrected the wrong way", DATA + "merge.py",
         "return t - self.shift - self.drift *", "return t - self.shift + self.drift *", T_MERGE,
     ),
     Mutant(
-        "clipping is seen from a fifth of the samples on", DATA + "check_clipping.py",
+        "clipping is seen from a fifth of the samples on", DATA + "check_signals.py",
         "RUN, SHARE = 5, 0.002", "RUN, SHARE = 5, 0.2", T_FAULTS,
     ),
     Mutant(
-        "a step is a spike", DATA + "check_spikes.py",
+        "a step is a spike", DATA + "check_signals.py",
         "(off > limit) & (off > BACK * through)", "off > limit", T_GOOD,
     ),
     Mutant(
-        "an encoder is lost after a thousand equal values", DATA + "check_frozen.py",
-        "RUN = 8", "RUN = 1000", T_FAULTS,
+        "an encoder is lost after a thousand equal values", DATA + "check_signals.py",
+        "FROZEN = 8", "FROZEN = 1000", T_FAULTS,
     ),
     Mutant(
         "the low pass has half its order", SIGNALS + "filters.py",
@@ -89,19 +89,19 @@ MEASURED = (
         "around = ceil(0.5 / (filter.cutoff * step))", "around = 0", T_DIFFERENTIATE,
     ),
     Mutant(
-        "noise of the velocity is that before the low pass", SIGNALS + "velocity.py",
+        "noise of the velocity is that before the low pass", SIGNALS + "filters.py",
         "np.mean(gain**2 * self.noise[inside])", "np.mean(self.noise[inside])", T_VELOCITY,
     ),
     Mutant(
-        "the noisier one of two velocities weighs more", SIGNALS + "velocity.py",
+        "the noisier one of two velocities weighs more", SIGNALS + "filters.py",
         "weight = np.divide(of_x, both", "weight = np.divide(of_v, both", T_VELOCITY,
     ),
     Mutant(
-        "a difference of positions falls short of nothing", SIGNALS + "velocity.py",
+        "a difference of positions falls short of nothing", SIGNALS + "filters.py",
         "lost = 1 - np.sinc(2 * frequency)", "lost = 0 * frequency", T_VELOCITY,
     ),
     Mutant(
-        "Coulomb friction and offset are one column", SIGNALS + "regress.py",
+        "Coulomb friction and offset are one column", SIGNALS + "differentiate.py",
         '"offset": np.ones_like(v)', '"offset": sign', T_REGRESS,
     ),
 )  # fmt: skip
@@ -142,11 +142,11 @@ KINDS = (
         "J[:, count + number] = rates", "J[:, count] = rates", T_INVERSE,
     ),
     Mutant(
-        "bristles of a record that begins in motion are relaxed", RESIDUALS + "imposed.py",
+        "bristles of a record that begins in motion are relaxed", RESIDUALS + "sampled.py",
         "NEAR_REST = 0.05", "NEAR_REST = 5e9", T_IMPOSED,
     ),
     Mutant(
-        "windows overlap by a sample", RESIDUALS + "windows.py",
+        "windows overlap by a sample", RESIDUALS + "initial.py",
         "slice(a, b) for a, b", "slice(a, b + 1) for a, b", T_WINDOWS,
     ),
     Mutant(
@@ -154,7 +154,7 @@ KINDS = (
         'if given == "given" and k == 0:', 'if given == "given":', T_SHOOTING,
     ),
     Mutant(
-        "derivatives by the dead time have the wrong sign", RESIDUALS + "delays.py",
+        "derivatives by the dead time have the wrong sign", RESIDUALS + "shots.py",
         "new = old - theta.symbol", "new = old + theta.symbol", T_SHOOTING,
     ),
     Mutant(
@@ -200,11 +200,11 @@ KINDS = (
 
 MINIMA = (
     Mutant(
-        "noise levels do not count what the fit has taken", SOLVING + "noise.py",
+        "noise levels do not count what the fit has taken", SOLVING + "task.py",
         "max(r.size - shares[signal], 1.0)", "max(r.size, 1.0)", T_STARTS,
     ),
     Mutant(
-        "noise costs half of its logarithm", SOLVING + "noise.py",
+        "noise costs half of its logarithm", SOLVING + "task.py",
         "sum(2 * n * log(task.noise[s])", "sum(n * log(task.noise[s])", T_STARTS,
     ),
     Mutant(
@@ -212,16 +212,16 @@ MINIMA = (
         "(de / self.sigma)[:, None]", "(1 / self.sigma)[:, None]", T_STARTS,
     ),
     Mutant(
-        "outliers weigh as much as all others in Huber's loss", SOLVING + "loss.py",
+        "outliers weigh as much as all others in Huber's loss", SOLVING + "task.py",
         "np.where(z <= 1, z, 2 * root - 1), 1 / root", "z, np.ones_like(z)", T_STARTS,
     ),
     Mutant(
-        "a block of rows forgets those before it", SOLVING + "reduce.py",
+        "a block of rows forgets those before it", SOLVING + "task.py",
         "np.vstack([found, columns[first : first + size]])", "columns[first : first + size]",
         T_STARTS,
     ),
     Mutant(
-        "starts have no seed", SOLVING + "scatter.py",
+        "starts have no seed", SOLVING + "many_starts.py",
         "np.random.default_rng(seed)", "np.random.default_rng()", T_SCATTER,
     ),
     Mutant(
@@ -248,17 +248,17 @@ MINIMA = (
 
 JUDGED = (
     Mutant(
-        "whiteness pays for the unknowns of the model", VERDICT + "whiteness.py",
+        "whiteness pays for the unknowns of the model", VERDICT + "colour.py",
         "float(chdtrc(len(lags), statistic))", "float(chdtrc(max(len(lags) - k, 1), statistic))",
         T_INDEPENDENCE,
     ),
     Mutant(
-        "noise goes round from the end of a record to its start", VERDICT + "sandwich.py",
+        "noise goes round from the end of a record to its start", VERDICT + "covariance.py",
         "points = 1 << (2 * on_grid.shape[0]).bit_length()", "points = on_grid.shape[0]",
         T_SANDWICH,
     ),
     Mutant(
-        "that the colour is an estimate does not count", VERDICT + "sandwich.py",
+        "that the colour is an estimate does not count", VERDICT + "covariance.py",
         "return C, 2 * np.diag(C) ** 2 / found.freedom + spread",
         "return C, 2 * np.diag(C) ** 2 / found.freedom", T_SANDWICH,
     ),
@@ -308,7 +308,7 @@ STORED = (
         T_FITTED,
     ),
     Mutant(
-        "JSON holds numbers that are not finite", RESULT + "coding.py",
+        "JSON holds numbers that are not finite", RESULT + "stored.py",
         "return str(value) if value in (inf, -inf) else value", "return value", T_CODING,
     ),
     Mutant(
@@ -343,7 +343,7 @@ FIRST = (
         "1, w=weight * power)", "1)", T_STRIBECK,
     ),
     Mutant(
-        "what came before a ramp counts to its rate", STARTS + "break_away.py",
+        "what came before a ramp counts to its rate", STARTS + "measured.py",
         "rising[: last[-1] + 1 if last.size else 0] = False", "rising[:0] = False", T_SLIDING,
     ),
 )  # fmt: skip
@@ -354,11 +354,11 @@ COMPARED = (
         "k * float(np.log(n))", "k * float(np.log(n)) / 2", (f"{TESTS}test_select.py",),
     ),
     Mutant(
-        "noise under a robust loss is that of its outliers", SOLVING + "noise.py",
+        "noise under a robust loss is that of its outliers", SOLVING + "task.py",
         "NORMAL * float(np.median(np.abs(r)))", "float(np.std(r))", T_STARTS,
     ),
     Mutant(
-        "the sampled engine takes inputs early", RESIDUALS + "sampled_shots.py",
+        "the sampled engine takes inputs early", RESIDUALS + "shots.py",
         "instants - tau)", "instants + tau)", (f"{TESTS}residuals/test_sampled_shots.py",),
     ),
     Mutant(
@@ -370,7 +370,7 @@ COMPARED = (
         "np.cumsum(power - noise)", "np.cumsum(power)", T_FILTERS,
     ),
     Mutant(
-        "what stands at a bound widens the intervals of others", VERDICT + "sandwich.py",
+        "what stands at a bound widens the intervals of others", VERDICT + "covariance.py",
         "free = ~found.held\n    size", "free = ~found.held | True\n    size", T_SANDWICH,
     ),
     Mutant(

@@ -78,11 +78,11 @@ TOLD = (
         "dash(k if style is None else style)", "dash(k)", foundation("style"),
     ),
     Mutant(
-        "lengths of 0.09 mm are 90 µm", FOUNDATION + "prefixes.py",
+        "lengths of 0.09 mm are 90 µm", FOUNDATION + "units.py",
         "if top >= LEAST * size:", "if top >= size:", foundation("prefixes"),
     ),
     Mutant(
-        "a number and its factor have different prefixes", FOUNDATION + "prefixes.py",
+        "a number and its factor have different prefixes", FOUNDATION + "units.py",
         "if top >= LEAST * size:\n            return 1 / size,",
         "if top >= LEAST * size:\n            return size,", foundation("prefixes"),
     ),

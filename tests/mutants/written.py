@@ -53,13 +53,13 @@ WRITTEN = (
     ),
     Mutant(
         "a prefix under an unknown power is taken for SI", UNITS,
-        "return 1.0 if size == 1.0 else None",
-        "return 1.0", T_UNITS,
+        'float("nan"))) if size[0] == 1.0 else None',
+        'float("nan")))', T_UNITS,
     ),
     Mutant(
         "a bracket that nothing opens is read", UNITS,
-        "return found if found is not None and not rest else None",
-        "return found", T_UNITS,
+        "if found is None or rest:",
+        "if found is None:", T_UNITS,
     ),
     Mutant(
         "degrees Fahrenheit are larger than kelvins", UNITS,
@@ -68,8 +68,8 @@ WRITTEN = (
     ),
     Mutant(
         "half a power is a whole one", UNITS,
-        "(float(above) / float(below or 1))",
-        "float(above)", T_UNITS,
+        "n = float(above) / float(below or 1)",
+        "n = float(above)", T_UNITS,
     ),
     Mutant(
         "a year has too few seconds", UNITS,

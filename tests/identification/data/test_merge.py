@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
-from identification.data.delay import estimated_delay
+from identification.data.merge import estimated_delay
 
 Array = np.ndarray
 Signal = Callable[[Array], Array]

@@ -161,7 +161,11 @@ ROWS = text("").splitlines()
 @pytest.mark.parametrize(
     ("header", "rows", "message"),
     [
-        ("t [s],x [inches],force [N]", None, r"column 'x \[inches\]': expected a unit of m, cm"),
+        (
+            "t [s],x [furlongs],force [N]",
+            None,
+            r"column 'x \[furlongs\]': expected a unit of m, cm",
+        ),
         (
             "t,x [m],force [N]",
             None,

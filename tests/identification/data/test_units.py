@@ -2,7 +2,7 @@ from math import pi
 
 import pytest
 
-from identification.data.units import by_channel, unit
+from identification.data.units import by_channel, is_common, unit
 
 
 @pytest.mark.parametrize(
@@ -39,6 +39,15 @@ from identification.data.units import by_channel, unit
         ("kg m^2", "kg m^2", 1.0),
         ("1/s", "1/s", 1.0),
         ("%", "1", 0.01),
+        ("N/(m/s)", "N s/m", 1.0),
+        ("N/(mm/s)", "N s/m", 1e3),
+        ("rad/(s K)", "rad/(K s)", 1.0),
+        ("Pa", "Pa", 1.0),
+        ("bar", "Pa", 1e5),
+        ("J", "J", 1.0),
+        ("krad", "rad", 1e3),
+        ("u/min", "rad/s", 2 * pi / 60),
+        ("Sec", "s", 1.0),
         ("-", "1", 1.0),
     ],
 )
@@ -49,7 +58,9 @@ def test_unit_becomes_si(text: str, si: str, factor: float) -> None:
     assert found.factor == pytest.approx(factor, rel=1e-14)
 
 
-@pytest.mark.parametrize("text", ["parsec", "counts", "N/", "mmm", "kmin", "x y", "3", "m^m"])
+@pytest.mark.parametrize(
+    "text", ["parsec", "counts", "N/", "mmm", "kmin", "x y", "3", "m^m", "degF", "N (s/m)^d"]
+)
 def test_what_is_no_unit_is_none(text: str) -> None:
     assert unit(text) is None
 
@@ -72,3 +83,13 @@ def test_short_form_reaches_every_canonical_channel() -> None:
 def test_short_form_refuses(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         by_channel("read", text)
+
+
+@pytest.mark.parametrize("text", ["mm", "N", "Nm", "rad/s", "sec", "1/s"])
+def test_units_need_no_brackets(text: str) -> None:
+    assert is_common(text)
+
+
+@pytest.mark.parametrize("text", ["d", "a", "t", "T", "rot", "bar", "counts"])
+def test_what_may_be_a_name_needs_brackets(text: str) -> None:
+    assert not is_common(text)

@@ -7,8 +7,7 @@ import pytest
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
-from identification.residuals.choice import choose, lengths
-from identification.residuals.shooting import Shooting
+from identification.residuals.shooting import Shooting, choose, lengths
 from identification.unknowns.subject import subject
 from symfric import Model
 from symfric.foundation.parameters import Variable

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
-from identification.data.loop import PositionLoop
-from identification.data.record import Record
+from identification.data.record import PositionLoop, Record
 from identification.residuals import stepper
 from identification.residuals.closed_loop import ClosedLoop, Controller, LoopRows
 from identification.solving.descent import descend

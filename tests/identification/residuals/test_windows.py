@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.residuals.windows import cut
+from identification.residuals.initial import cut
 
 T = np.linspace(0.0, 10.0, 1001)
 

@@ -7,7 +7,7 @@ from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.shooting import Shooting
-from identification.result.calls import written
+from identification.result.build import written
 from identification.unknowns.spec import above, linear, log, tied
 from symfric import Linear, LuGre, rabinowicz
 

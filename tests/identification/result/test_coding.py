@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.result.coding import plain, revived
+from identification.result.stored import plain, revived
 from symfric.foundation.status import Status
 
 

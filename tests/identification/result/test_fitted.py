@@ -8,8 +8,8 @@ import pytest
 from fits import TRUTH, make, record
 
 from identification.data.dataset import Dataset
-from identification.result.estimate import Estimate
 from identification.result.fitted import Fitted
+from identification.result.series import Estimate
 from identification.result.text import interval, percent, rounded, text_of
 from symfric.foundation.status import Status
 from symfric.laws import Stribeck

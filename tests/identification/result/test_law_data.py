@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identification.result.law_data import from_data, to_data
+from identification.result.stored import from_data, to_data
 from symfric import ALL_LAWS, GMS, Asymmetric, Coulomb, Element, Law, Stribeck, Sum, Table, Viscous
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param, parameters, with_values

@@ -4,8 +4,7 @@ from numpy.typing import NDArray
 
 from identification.data.record import Record
 from identification.signals.differentiate import differentiate
-from identification.signals.filters import Filter, lowpass
-from identification.signals.velocity import Velocity
+from identification.signals.filters import Filter, Velocity, lowpass
 
 T = np.arange(4001) * 1e-3
 W = 2 * np.pi * 1.5

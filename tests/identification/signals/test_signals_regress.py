@@ -6,9 +6,8 @@ import pytest
 from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.data.synthetic import synthetic_drive_data
-from identification.signals.differentiate import differentiate
+from identification.signals.differentiate import LinearFit, differentiate, linear_regression
 from identification.signals.filters import Filter
-from identification.signals.regress import LinearFit, linear_regression
 from symfric.laws import Coulomb
 
 PUBLISHED = {

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from identification.data.record import Record
 from identification.data.synthetic import synthetic_drive_data
-from identification.signals.differentiate import derivatives, differentiate
-from identification.signals.filters import Filter, lowpass
-from identification.signals.regress import linear_regression
-from identification.signals.velocity import Velocity
+from identification.signals.differentiate import derivatives, differentiate, linear_regression
+from identification.signals.filters import Filter, Velocity, lowpass
 from symfric import law_from_text
 from symfric.foundation.parameters import with_values
 

@@ -7,7 +7,7 @@ import pytest
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.shooting import Shooting
-from identification.solving.easier import descend_by_way
+from identification.solving.descent import descend_by_way
 from symfric import Model, simulate
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status

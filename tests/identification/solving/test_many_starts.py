@@ -12,12 +12,9 @@ from scipy.stats import norm
 
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.solving.descent import descend
-from identification.solving.loss import THRESHOLD, shaped
 from identification.solving.many_starts import best_of, is_white, many_starts
-from identification.solving.noise import objective
-from identification.solving.reduce import triangle
-from identification.solving.task import Point, Task, task
-from identification.unknowns.unknown import Unknown
+from identification.solving.task import THRESHOLD, Point, Task, objective, shaped, task, triangle
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
 from symfric.foundation.status import SolveError, Status
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from identification.solving.scatter import REACH, scattered
-from identification.unknowns.unknown import Unknown
+from identification.solving.many_starts import REACH, scattered
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns, unknowns_of
 
 UNKNOWNS = [

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.starts.break_away import break_away
-from identification.starts.hysteresis import hysteresis, turning_points
 from identification.starts.maxwell_slip import fit_elements, stretches
-from identification.starts.measured import Measured
+from identification.starts.measured import Measured, break_away, hysteresis, turning_points
 
 T = 0.015 * np.arange(1000)
 X = 8e-6 * np.sin(0.63 * T) + 5e-6 * np.sin(2.3 * T) + 15e-6 * np.sin(0.9 * T)

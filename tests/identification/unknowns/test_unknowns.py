@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
 
 

@@ -7,10 +7,9 @@ import pytest
 from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
 
-from identification.unknowns.unknown import Unknown
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import Covariance, covariance_of
-from identification.verdict.levels import Levels
+from identification.verdict.covariance import Covariance, Levels, covariance_of
 from identification.verdict.minimum import Minimum
 
 N = 400

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from linear_fits import ar1, coulomb, fitted, motion
 
+from identification.verdict.colour import whiteness
 from identification.verdict.judge import ALARM, judged
-from identification.verdict.order import positions
-from identification.verdict.whiteness import whiteness
+from identification.verdict.minimum import positions
 
 TRUTH = [2.0, 3.0, 1.0, 0.5]
 

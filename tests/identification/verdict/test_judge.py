@@ -7,8 +7,8 @@ import pytest
 from linear_fits import STEP, Decay, ar1, coulomb, fitted, motion, solved
 
 from identification.data.findings import Finding, Findings
-from identification.solving.loss import THRESHOLD
-from identification.unknowns.unknown import Unknown
+from identification.solving.task import THRESHOLD
+from identification.unknowns.spec import Unknown
 from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge, judged
 from identification.verdict.minimum import minimum

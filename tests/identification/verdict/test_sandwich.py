@@ -7,8 +7,8 @@ import pytest
 from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
 
-from identification.verdict.order import places, positions
-from identification.verdict.sandwich import sandwich
+from identification.verdict.covariance import sandwich
+from identification.verdict.minimum import places, positions
 
 
 def test_white_noise_gives_the_textbook_covariance() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from symfric.foundation.prefixes import clock, readable
+from symfric.foundation.units import clock, readable
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,7 @@ def test_other_ways_to_write_a_unit_are_taken(text: str, same: str) -> None:
         ("km/h", 1 / 3.6), ("N/mm^2", 1e6), ("m/s/ms", 1e3), ("1/min", 1 / 60), ("mol/L", 1e3),
         ("mN m", 1e-3), ("10 N", 10.0), ("1e-3 m", 1e-3), ("ms", 1e-3), ("min", 60.0),
         ("mm^(1/2)", sqrt(1e-3)), ("mm^(2/1)", 1e-6),
+        ("u/min", pi / 30),
     ],
 )  # fmt: skip
 def test_sizes_are_those_of_the_prefixes(text: str, size: float) -> None:

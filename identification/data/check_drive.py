@@ -1,0 +1,329 @@
+"""Checks of force against motion: sign, delay, excitation, standstill, drift, hum."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from identification.data.findings import Array, Finding, View, count_of
+from identification.data.rough import Rough, explained_when_late, one_way, rough_model, with_column
+
+SURE = 5.0
+"""Standard errors that make a statement."""
+LITTLE, MUCH = 0.5, 0.8
+"""Shares of the force that the rough model explains: of a wrong and of a right pair of columns."""
+NOTHING = 0.05
+"""Share of the force below which it has no part in the motion."""
+
+
+def of_direction(view: View, model: Rough | None) -> Iterator[Finding]:
+    """A drive whose friction puts power in, and pairs of columns that make sense the other way."""
+    if model is None:
+        return
+    names = view.name("force"), view.name("x")
+    swapped = rough_model(view, exchanged=True)
+    if (
+        swapped is not None
+        and model.explained < LITTLE
+        and swapped.explained > MUCH
+        and swapped.explained > model.explained + 0.4
+    ):
+        yield view.finding(
+            "swapped",
+            names[0],
+            f"{names[0]} moves as a position and {names[1]} as a force (a rough drive explains "
+            f"{swapped.explained:.0%} of it that way, {model.explained:.0%} as it is): the columns "
+            "are exchanged.",
+            "error",
+        )
+        return
+    both = not one_way(model)
+    _, level, viscous, *_ = model.values
+    moved = np.sum(np.abs(model.v[model.moving]))
+    put_in = level * moved + viscous * np.sum(model.v**2)
+    sure = max(-model.sure(1) if level < 0 else 0.0, -model.sure(2) if viscous < 0 else 0.0)
+    if both and put_in < 0 and sure > SURE and model.explained > LITTLE:
+        against = " and accelerates against it" if model.sure(0) < -SURE else ""
+        yield view.finding(
+            "sign",
+            names[0],
+            f"{names[0]} brakes the motion that it drives{against}: the sign of {names[0]} or of "
+            f"{names[1]} is wrong: data.scaled({{'{names[0]}': -1}}).",
+            "error",
+        )
+    elif both and model.clean and model.explained < NOTHING and model.independent > 100:
+        yield view.finding(
+            "unrelated",
+            names[0],
+            f"A rough drive explains {max(model.explained, 0.0):.0%} of {names[0]}: it has nothing "
+            f"to do with the motion of {names[1]}, or there is more at work than one mass.",
+            "error" if _white(view) else "warning",
+        )
+    if both and model.sure(0) < -SURE and put_in > 0 and model.explained > LITTLE:
+        yield view.finding(
+            "sign",
+            names[0],
+            f"{names[0]} accelerates against the motion (a rough mass is {model.values[0]:.3g} +- "
+            f"{model.errors[0]:.1g}): it is late, or something else drives, too.",
+            "warning",
+        )
+
+
+def _white(view: View) -> bool:
+    """Whether the force is noise: neighbours have nothing to do with each other."""
+    force = view.signal("force")
+    return force is not None and abs(float(np.corrcoef(force[1:], force[:-1])[0, 1])) < 0.2
+
+
+LARGE = 0.12
+"""Drift over the robust spread of the force that is told."""
+DRIFTS = 4.5
+LAGS = (-20, -10, -5, -3, -2, -1, 1, 2, 3, 5, 10, 20)
+"""Delays that are tried, in samples, before those between the neighbours of the best one."""
+BETTER = 0.88
+"""Unexplained part that a delay leaves, over that without it, from which on it is told ..."""
+WORSE = 1.05
+"""... where the same lead leaves more."""
+
+
+def of_drift(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
+    """A force that follows the time beside what a rough drive needs."""
+    if model is None or not model.clean or model.explained < 0.5:
+        return
+    if free is None or one_way(model):
+        return
+    rise, sure = float(free.values[-1]), free.sure(-1)
+    spread = float(np.ptp(np.quantile(model.force, (0.25, 0.75))))
+    if abs(rise) > LARGE * spread and abs(sure) > DRIFTS:
+        name = view.name("force")
+        yield view.finding(
+            "drift",
+            name,
+            f"{name} drifts by {rise:.3g} {view.record.units[name]} from the first to the last "
+            "sample against what a rough drive needs: a sensor without a fixed zero, or a drive "
+            "that warms.",
+            "warning",
+        )
+
+
+def of_dead_time(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
+    """A force that explains the motion better when it is moved in time."""
+    if model is None or not model.clean or model.explained < 0.5 or abs(model.sure(0)) < 5:
+        return
+    if free is None:
+        return
+    now = max(1 - free.explained, 1e-9)
+
+    def unexplained(lag: int) -> float:
+        return (1 - explained_when_late(free, lag * model.step)) / now
+
+    left = {lag: unexplained(lag) for lag in LAGS}
+    best = min(left, key=lambda lag: left[lag])
+    if left[best] < BETTER and left[-best] > WORSE and abs(best) > 1:
+        k = LAGS.index(best)
+        best = min(range(LAGS[max(k - 1, 0)], LAGS[min(k + 1, len(LAGS) - 1)] + 1), key=unexplained)
+        name = view.name("force")
+        word = "late" if best > 0 else "early"
+        yield view.finding(
+            "delay",
+            name,
+            f"{name} seems to be {word} by about {abs(best) * model.step:.3g} s ({abs(best)} "
+            f"samples) against {view.name('x')}: estimate dead_time, or use data.delayed("
+            f"{{'{name}': {-best * model.step:.3g}}}).",
+            "warning",
+        )
+
+
+UNSURE = 3.0
+"""Rough mass over its standard error below which the accelerations are too small."""
+SPREAD = 1.7
+"""Speed that 90 % of the way stay below, over that which 10 % do: less is one speed."""
+MOST = 0.97
+"""Share of the time at rest beyond which hardly anything moved."""
+
+
+def of_excitation(view: View, model: Rough | None) -> Iterator[Finding]:
+    """Too small accelerations, one speed only, hardly any motion."""
+    if model is None or not model.clean:
+        if model is not None:
+            yield view.finding(
+                "excitation",
+                view.name("x"),
+                f"The accelerations do not stand above the noise of {view.name('x')}: a mass "
+                "cannot be told from these data.",
+                "warning",
+            )
+        return
+    if abs(model.sure(0)) < UNSURE:
+        unit = "kg m^2" if view.record.units[view.name("x")] == "rad" else "kg"
+        yield view.finding(
+            "excitation",
+            view.name("x"),
+            f"The accelerations are too small to tell a mass: a rough one is {model.values[0]:.2g} "
+            f"+- {model.errors[0]:.1g} {unit}; give it as fixed.",
+            "warning",
+        )
+    moving = model.moving
+    if moving.mean() < 1 - MOST:
+        yield view.finding(
+            "excitation",
+            view.name("x"),
+            f"The drive moves in {moving.mean():.1%} of the time only.",
+            "warning",
+        )
+    speed = np.abs(model.v[moving])
+    if speed.size > 20:
+        low, high = np.quantile(speed, (0.1, 0.9))
+        if high < SPREAD * low:
+            yield view.finding(
+                "speeds",
+                view.name("x"),
+                f"Most of the motion is at one speed, {low:.3g} to {high:.3g} "
+                f"{view.record.units[view.name('x')]}/s: how friction depends on velocity cannot "
+                "be told.",
+                "warning",
+            )
+
+
+MOVED = 6.0
+"""Range of the position over its noise (standard deviation) below which nothing moved."""
+COUNTS = 4
+"""Counts of an encoder below which nothing moved."""
+WHITE = 0.3
+"""Correlation of neighbours below which a position is noise."""
+ONE_WAY = 0.005
+"""Share of the way in the other direction up to which the drive moves one way."""
+
+
+def of_motion(view: View, model: Rough | None) -> Iterator[Finding]:
+    """Signals that hold no motion."""
+    x, force = view.signal("x"), view.signal("force")
+    if x is not None and view.record.t is not None and x.size >= 20:
+        yield from _still(view, x)
+    if force is not None and force.size >= 20 and np.ptp(force) == 0:
+        nothing = float(force[0]) == 0
+        yield view.finding(
+            "constant",
+            view.name("force"),
+            f"{view.name('force')} is {force[0]:g} {view.record.units[view.name('force')]} "
+            "throughout: "
+            + (
+                "motion without a drive tells friction over mass only."
+                if nothing
+                else "nothing was measured there."
+            ),
+            "warning" if nothing else "error",
+        )
+    if model is not None and model.clean:
+        yield from _one_way(view, model)
+
+
+def _still(view: View, x: Array) -> Iterator[Finding]:
+    name, unit = view.name("x"), view.record.units[view.name("x")]
+    steps = np.diff(x)
+    if np.ptp(x) == 0 or np.ptp(x) < COUNTS * count_of(x):
+        yield view.finding(
+            "standstill", name, f"{name} never changes by more than {np.ptp(x):.3g} {unit}: "
+            "nothing moved.", "error",
+        )  # fmt: skip
+        return
+    centred = x - x.mean()
+    lag = float(centred[1:] @ centred[:-1] / (centred @ centred))
+    noise = float(np.std(steps)) / np.sqrt(2)
+    if lag < WHITE:
+        yield view.finding(
+            "noise", name, f"{name} is noise of {noise:.3g} {unit}: neighbouring samples have "
+            "nothing to do with each other, and no body moves like that.", "error",
+        )  # fmt: skip
+    elif np.ptp(np.quantile(x, (0.02, 0.98))) < MOVED * _white_part(x):
+        yield view.finding(
+            "standstill", name, f"{name} moves by {np.ptp(np.quantile(x, (0.02, 0.98))):.3g} {unit}"
+            " only, which its noise does, too.", "error",
+        )  # fmt: skip
+
+
+def _white_part(x: Array) -> float:
+    """Standard deviation of the white part of the position."""
+    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
+
+
+def _one_way(view: View, model: Rough) -> Iterator[Finding]:
+    if one_way(model, ONE_WAY):
+        direction = "forwards" if model.v.sum() > 0 else "backwards"
+        yield view.finding(
+            "one-way",
+            view.name("x"),
+            f"The drive moves {direction} only: friction cannot be told from a constant force, "
+            "nor from gravity.",
+            "warning",
+        )
+
+
+LINE = 0.45
+"""Share of what is left that lies in one line of its spectrum: a hum."""
+LOUD = 0.02
+"""Its amplitude over the spread of the force from which on it is told."""
+PERIODS, CLEAR, ANSWER = 8, 20.0, 0.01
+"""A line of the velocity: periods in the record, power over that beside it, share of all power."""
+HARMONICS = (1, 2)
+"""Of an excitation, that friction may leave in the force."""
+UNEQUAL, DIFFERS = 0.04, 6.0
+"""Difference of the mass between both directions, relative, and in standard errors."""
+
+
+def of_residue(view: View, free: Rough | None) -> Iterator[Finding]:
+    """A periodic force beside the drive; a mass that differs by the direction."""
+    if free is None or not free.clean or free.explained < 0.5:
+        return
+    yield from _hum(view, free)
+    if not one_way(free) and abs(free.sure(0)) > DIFFERS:
+        yield from _unequal(view, free)
+
+
+def _hum(view: View, free: Rough) -> Iterator[Finding]:
+    limit = 5 * float(np.median(np.abs(free.residual)))
+    left, window = np.clip(free.residual, -limit, limit), np.hanning(free.residual.size)
+    power = np.abs(np.fft.rfft(left * window)) ** 2
+    k = int(np.argmax(power[2:])) + 2
+    share = float(power[max(k - 2, 0) : k + 3].sum() / (power.sum() + 1e-300))
+    size = 2 * float(np.sqrt(power[k])) / float(window.sum())
+    loud = size > LOUD * float(np.ptp(np.quantile(free.force, (0.25, 0.75))))
+    if share > LINE and loud and not any(_answered(free, round(k / n)) for n in HARMONICS):
+        name = view.name("force")
+        yield view.finding(
+            "hum",
+            name,
+            f"{name} hums: beside what a rough drive needs there is a sine of {size:.2g} "
+            f"{view.record.units[name]} and {k / left.size / free.step:.3g} Hz, {share:.0%} of "
+            "what is left: the mains, or a motion that the position does not show.",
+            "warning",
+        )
+
+
+def _answered(free: Rough, k: int) -> bool:
+    """Whether the velocity has a line of its own at bin k: an excitation, no hum.
+
+    Not asked of less than `PERIODS` periods, where a line cannot be told from a move; so a slow
+    excitation that only bends bristles can still be called a hum.
+    """
+    if k < PERIODS:
+        return False
+    power = np.abs(np.fft.rfft((free.v - free.v.mean()) * np.hanning(free.v.size))) ** 2
+    line = power[k - 2 : k + 3]
+    beside = np.concatenate([power[k // 2 : k - 3], power[k + 4 : 2 * k]])
+    out = float(line.max()) > CLEAR * float(np.median(beside))
+    return out and float(line.sum()) > ANSWER * float(power.sum())
+
+
+def _unequal(view: View, free: Rough) -> Iterator[Finding]:
+    value, error = with_column(free, free.a * np.sign(free.v) * free.moving)
+    ratio = value / free.values[0]
+    if abs(ratio) > UNEQUAL and abs(value) > DIFFERS * error:
+        name = view.name("force")
+        yield view.finding(
+            "unequal",
+            name,
+            f"{name} asks for a mass {2 * abs(ratio):.0%} larger "
+            f"{'forwards' if ratio > 0 else 'backwards'}: its gain differs by its sign, or it is "
+            "clipped or filtered on one side.",
+            "warning",
+        )
