@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
+from symfric.figures.regularisation import scaled
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.sticking import Sticking
@@ -36,8 +37,6 @@ LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), Rat
 """Velocities that say how high friction is, and no width."""
 OF_BRISTLES = 0.45, 0.5
 """Powers of the velocities of laws with states, tried in this order."""
-DIGITS = 12
-"""Of scaled parameters: what is behind is rounding."""
 
 
 @final
@@ -66,9 +65,8 @@ class Softness:
         if not self.powers:
             return self.law
         known = parameters(self.law)
-        scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
-        scaled = {n: _within(known[n], x) for n, x in scaled.items()}
-        law = with_values(self.law, {n: float(f"{x:.{DIGITS}g}") for n, x in scaled.items()})
+        values = scaled(self.law, self.powers, s)
+        law = with_values(self.law, {n: _within(known[n], x) for n, x in values.items()})
         return peaked(law, self.mu_s, self.load)
 
 

@@ -74,8 +74,7 @@ class Regularisation:
     def values(self, s: float) -> dict[str, float]:
         """Their values at the factor `s`."""
         known = parameters(self.law)
-        scaled = {n: float(known[n].value) * s ** _power(known[n]) for n in self.names}
-        return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
+        return scaled(self.law, {n: _power(known[n]) for n in self.names}, s)
 
     def at(self, s: float) -> Law:
         """The law at the factor `s`."""
@@ -140,6 +139,12 @@ def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
     if not names:
         raise ValueError(f"{where}: parameter: expected the names of one or more, got none")
     return Regularisation(law, names)
+
+
+def scaled(law: Law, powers: Mapping[str, float], s: float) -> dict[str, float]:
+    """The values of parameters (name -> power of s) of `law` at the factor `s`."""
+    known = parameters(law)
+    return {n: float(f"{float(known[n].value) * s**p:.{DIGITS}g}") for n, p in powers.items()}
 
 
 def _power(p: Parameter) -> float:
