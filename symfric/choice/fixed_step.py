@@ -36,7 +36,7 @@ CHUNK = 1000
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What fixed steps are to follow: names of positions, their values over times, their sizes."""
+    """Motion that fixed steps must follow: names of positions, values over times, sizes."""
 
     names: tuple[str, ...]
     t: Array
@@ -89,7 +89,7 @@ def _holds(
     step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
     share: float,
 ) -> bool:  # fmt: skip
-    """Whether the motion in steps of `h` is finite and follows."""
+    """Test for a motion in steps of `h` that is finite and follows."""
     count = ceil(machine.t_end / h - 1e-9)
     names = [v.name for v in block.states]
     rows = [names.index(name) for name in motion.names]

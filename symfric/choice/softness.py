@@ -1,4 +1,4 @@
-"""How soft a law may be: its widths and bristles scaled together, until it keeps a wanted error.
+"""Softness of a law: widths and bristles scaled together until it keeps a wanted error.
 
     static laws      widths and velocities s
     bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities s^p
@@ -42,7 +42,7 @@ OF_BRISTLES = 0.45, 0.5
 @final
 @dataclass(frozen=True, eq=False)
 class Softness:
-    """What makes `law` smooth, scaled together by a factor s.
+    """Parameters that make `law` smooth, scaled together by a factor s.
 
     Attributes:
         powers: parameter -> power of s.
@@ -78,7 +78,7 @@ def _within(p: Parameter, value: float) -> float:
 def softness(
     law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
 ) -> Softness:
-    """What may be scaled of `law`; nothing of one that rests exactly or has no widths.
+    """The scalable parameters of `law`; none of one that rests exactly or has no widths.
 
     Args:
         law, friction, load: what it describes, and under which load.
@@ -257,7 +257,7 @@ def _apart(one: Rung, other: Rung) -> float:
 
 
 def _kept(rungs: list[Rung], wanted: float) -> bool:
-    """Whether two runs in a row keep the error."""
+    """Test for two runs in a row that keep the error."""
     return len(rungs) > 1 and max(rung.error for rung in rungs[-2:]) <= wanted
 
 
@@ -274,6 +274,6 @@ def _stride(rungs: list[Rung], wanted: float) -> float:
 
 
 def _settled(rungs: list[Rung]) -> bool:
-    """Whether the last four errors are the same, or grow."""
+    """Test for four last errors that are the same, or grow."""
     last = [rung.error for rung in rungs[-4:]]
     return len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]

@@ -21,7 +21,7 @@ from symfric.scenes.base import contact
 from symfric.scenes.drive import Drive
 
 REST = 1e6
-"""How long the contacts have rested before a motion [s], so that all of them are old."""
+"""Time of rest before a motion [s], so that all contacts are old."""
 
 
 def slid(
@@ -146,7 +146,7 @@ class Run(Protocol):
 
 
 class Slide(Protocol):
-    """What makes the curve of a motion; `jumps` are the times [s] at which the velocity jumps."""
+    """Function that makes the curve of a motion; the velocity jumps at the times `jumps` [s]."""
 
     def __call__(
         self, case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()

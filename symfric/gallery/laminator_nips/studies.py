@@ -58,12 +58,12 @@ def at_once(v: Array, force: Array) -> tuple[SteadyStateLuGre, Mapping[str, floa
     data = Dataset.of(v=v, F=force, units={"v": "m/s", "F": "N"}, points=True, name="means")
     fit = Fit(Points(), SteadyStateLuGre(), data, free=["delta"]).solve(throw=False)
     found = {name: fit.parameters[name] for name in NAMES}
-    told = {
+    half = {
         name: (e.high - e.low) / 2
         for name, e in found.items()
         if e.low is not None and e.high is not None
     }
-    return SteadyStateLuGre(**{name: e.value for name, e in found.items()}), told
+    return SteadyStateLuGre(**{name: e.value for name, e in found.items()}), half
 
 
 def in_steps(v: Array, force: Array) -> SteadyStateLuGre | None:
@@ -101,7 +101,9 @@ def draw_errors(axes: list[Axes], v: Array, force: Array, law: SteadyStateLuGre)
     axes[-1].set_xlabel("velocity [m/s]")
 
 
-def told(laws: Mapping[str, SteadyStateLuGre], half: Mapping[str, float]) -> dict[str, float]:
+def parameters_of(
+    laws: Mapping[str, SteadyStateLuGre], half: Mapping[str, float]
+) -> dict[str, float]:
     """Parameters of laws side by side, and half the 95 % intervals."""
     numbers = {
         f"{name} {way} [{unit}]": float(getattr(law, name))
@@ -207,7 +209,7 @@ def fig_5_3_pilot_study(quick: bool) -> Drawn:
     numbers = {
         f"error of the curve, {way}, 8 % in the thesis [%]": 100 * error(law, v, force)
         for way, law in laws.items()
-    } | told(laws, half)
+    } | parameters_of(laws, half)
     claims = {"50 speeds of nine tests are 450": v.size * 9 == 450}
     if not quick:
         spread = scatter("pilot")
@@ -327,7 +329,7 @@ def fig_5_8_stable_region(quick: bool) -> Drawn:
     numbers = {
         "error of the curve [%]": 100 * error(found, v, force),
         "largest error [%]": 100 * float(left.max()),
-    } | told(laws, half)
+    } | parameters_of(laws, half)
     far = rms(curve(found, v) - curve(printed, v)) / float(force.mean())
     claims = {"the curve is the same within 2 %": far < 0.02}
     if not quick:
@@ -336,7 +338,7 @@ def fig_5_8_stable_region(quick: bool) -> Drawn:
 
 
 def over_noises(numbers: dict[str, float]) -> dict[str, bool]:
-    """What all noises give."""
+    """Claims over all noises; adds their ranges to `numbers`."""
     laws, printed = refitted("main", stable=True), PRINTED["main"]
     of = shares(laws, "main")
     errors, off = list[float](), list[float]()
