@@ -4,7 +4,7 @@
     own error  largest difference from the finest run of the same law: of the integrator alone
 
 A law that models something else than dry friction, such as a bristle that rings, keeps no small
-error however dry it is made. It is timed where its own error is the accuracy that was asked for.
+error however dry it is made. It is timed where its own error is the wanted accuracy.
 
 Runs of one law may cost counted work: no clock decides what is found. Work is attempts of a step
 times the CasADi instructions of one. An attempt of a machine with events counts `EVENTS`
@@ -70,7 +70,7 @@ class Budget:
         return max(LEAST_WHOLE, RUNS * self.work // self.instructions)
 
     def left(self, share: float = 1.0) -> bool:
-        """Whether less than this share of everything is used up."""
+        """Test for less than this share of the budget used up."""
         return sum(self.attempts) < share * self.whole
 
     def model(self, s: float) -> Model:
@@ -105,7 +105,7 @@ class Budget:
 
 
 def counted(machine: Machine, model: Model, rtol: float) -> tuple[int, str]:
-    """What an attempt counts at this tolerance, and the method."""
+    """Instructions of an attempt at this tolerance, and the method."""
     instructions, method = machine.instructions(model, rtol)
     return max(1, instructions) + (EVENTS if model.events else 0), method
 
@@ -123,7 +123,7 @@ AS_NEAR = 2.0
 FINER = 3
 """Times the attempts of a coarse run that a fine one takes, about."""
 EFFORT = "see effort"
-"""What is said where more of it is asked for."""
+"""Hint where a larger budget may help."""
 ON_THE_WAY = 0.6
 """Share of the budget for the way to dry friction; the rest is for the run at equal error."""
 
@@ -131,7 +131,7 @@ ON_THE_WAY = 0.6
 @final
 @dataclass(frozen=True)
 class Asked:
-    """Errors that are asked for, and tolerances for them.
+    """Wanted errors, and tolerances for them.
 
     Attributes:
         accuracy: largest error relative to the motion, of law and integrator together.

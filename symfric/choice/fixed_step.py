@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from symfric.choice.machine import Machine
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_model import plant_block
-from symfric.integrator.equations.inputs import Hold, Input, Sampled
+from symfric.figures.motion import sampled
+from symfric.integrator.equations.inputs import Input
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ CHUNK = 1000
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What fixed steps are to follow: names of positions, their values over times, their sizes."""
+    """Motion that fixed steps must follow: names of positions, values over times, sizes."""
 
     names: tuple[str, ...]
     t: Array
@@ -88,7 +89,7 @@ def _holds(
     step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
     share: float,
 ) -> bool:  # fmt: skip
-    """Whether the motion in steps of `h` is finite and follows."""
+    """Test for a motion in steps of `h` that is finite and follows."""
     count = ceil(machine.t_end / h - 1e-9)
     names = [v.name for v in block.states]
     rows = [names.index(name) for name in motion.names]
@@ -111,19 +112,5 @@ def _holds(
 
 def _inputs(block: Block, given: Mapping[str, Input], t: Array) -> Array:
     """The inputs at the times `t`, shape (inputs, times); start values where none are given."""
-    rows = [_at(given.get(v.name, float(v.start)), t) for v in block.inputs]  # pyright: ignore[reportArgumentType]
+    rows = [sampled(given.get(v.name, float(v.start)), t) for v in block.inputs]  # pyright: ignore[reportArgumentType]
     return np.array(rows).reshape(len(rows), t.size)
-
-
-def _at(value: Input, t: Array) -> Array:
-    if isinstance(value, Sampled):
-        known: Array = np.array(value.t, dtype=np.float64)
-        values: Array = np.array(value.values, dtype=np.float64)
-        if isinstance(value, Hold):
-            return values[np.clip(np.searchsorted(known, t, "right") - 1, 0, None)]
-        return np.interp(t, known, values)
-    if callable(value):
-        now = ca.SX.sym("t")
-        u = ca.Function("u", [now], [ca.SX(value(now))])
-        return u(t[None, :]).full().ravel()
-    return np.full(t.size, float(value))

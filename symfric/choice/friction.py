@@ -96,7 +96,7 @@ FALL: dict[type[Law], str] = {
     PoppStelter: "d",
     MakkarDixon: "gamma_3",
 }
-"""What the Stribeck velocity, or its inverse, is called where it is not v_s."""
+"""Names of the Stribeck velocity, or of its inverse, other than v_s."""
 NO_FALL = (VelocityBased, StickSlip)
 """Laws whose v_s is the width of the transition."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from symfric.choice.friction import Friction, alike, friction_of
 from symfric.choice.softness import OF_BRISTLES, Softness, softness
-from symfric.figures.regularisation import Bed, Measure, Sample, sample
+from symfric.figures.regularisation import Bed, Measure, Sample, driven, sample
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.status import OverloadWarning, SolveError, Status
@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 
 
 OVERLOAD = "drier bristles creep too slowly for their v_eps or for the rounding of velocities"
-"""What is said of runs whose friction passes its level."""
+"""Reason for runs whose friction passes its level."""
 FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError)
-"""What a law, or a function of the user that makes a machine of it, may raise."""
+"""Errors that a law, or a function of the user that makes a machine of it, may raise."""
 
 
 @final
@@ -56,7 +56,7 @@ class Machine:
     times: Array | None = None
 
     def bed(self, model: Model) -> Bed:
-        """Where runs of `model` are compared."""
+        """The bed in which runs of `model` are compared."""
         return Bed(
             self.name, lambda _: model, self.t_end, self.of, u=self.u, backend="vm",
             times=self.times,
@@ -68,7 +68,10 @@ class Machine:
         Raises:
             ValueError: the machine refuses it, or gives neither scene nor model.
         """
-        return _model(self, law, self.make(law))
+        made = self.make(law)
+        if isinstance(made, Scene):
+            return made.model()
+        return checks.kind(f"{self.name}({type(law).__name__})", made, Model, "a scene or a Model")
 
     def run(self, model: Model, law: Law, rtol: float, most: int) -> Sample:
         """One run; `most` attempts are allowed.
@@ -116,36 +119,19 @@ def machine_of(
         make, kind, name = scene, scene, scene.__name__
     elif callable(scene):
         make, places = scene, None
-        first = _probed(where, make, probe)
+        first = make(probe)
+        if not isinstance(first, Scene | Model):
+            called = f"{where}: scene({type(probe).__name__})"
+            raise checks.refused(called, "a scene or a Model", first)
         kind, name = type(first), first.name if isinstance(first, Model) else type(first).__name__
     else:
         raise checks.refused(where, "a scene such as Rabinowicz, or a function law -> Model", scene)
-    given = dict(u or {})
-    if issubclass(kind, Scene):
-        t_end = kind.t_end if t_end is None else t_end
-        given = {n: own.function for n, own in kind.inputs.items()} | given
-    if t_end is None:
-        raise ValueError(f"{where}: t_end: expected the end of the motion [s], got none")
-    end = checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
+    end, given = driven(where, kind, t_end, u)
     return Machine(name, make, places, end, of, given)
 
 
 def _in_scene(scene: Scene, law: Law) -> Scene:
     return replace(scene, law=law)
-
-
-def _probed(where: str, make: Callable[[Law], object], probe: Law) -> Scene | Model:
-    made = make(probe)
-    if not isinstance(made, Scene | Model):
-        raise checks.refused(f"{where}: scene({type(probe).__name__})", "a scene or a Model", made)
-    return made
-
-
-def _model(machine: Machine, law: Law, made: object) -> Model:
-    if isinstance(made, Scene):
-        return made.model()
-    where = f"{machine.name}({type(law).__name__})"
-    return checks.kind(where, made, Model, "a scene or a Model")
 
 
 @final

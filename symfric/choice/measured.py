@@ -48,7 +48,7 @@ ROUNDS, PATIENCE = 5, 0.2
 @final
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is asked of every law.
+    """Requirements on every law.
 
     Attributes:
         frictions: place -> friction that they are to describe, "" for any.
@@ -206,7 +206,7 @@ def _judged(task: Task, rungs: Ladder, runs: Budget) -> AtEqualError:
 
 
 def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
-    """Whether a far tighter run keeps the accuracy, too: stiff bristles may fail in rounding."""
+    """Test for a far tighter run that keeps the accuracy: stiff bristles may fail in rounding."""
     tighter = max(TIGHTER * at.rtol, FINEST)
     if not runs.held.law.states or tighter >= at.rtol:
         return True

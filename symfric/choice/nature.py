@@ -1,4 +1,4 @@
-"""What a law is, without running it: what it shows, smoothness, parameters, cost in C."""
+"""Properties of a law without running it: phenomena, smoothness, parameters, cost in C."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -66,7 +66,7 @@ def _word(text: str, of_code: dict[str, str]) -> str:
 
 
 def lacking(needs: Iterable[str], codes: Iterable[str]) -> list[str]:
-    """Those of the words `needs` that a law with these phenomena does not show."""
+    """The words of `needs` that a law with these phenomena does not show."""
     shown = set(codes)
     return [word for word in needs if NEEDS[word][0] not in shown]
 
@@ -140,7 +140,7 @@ def forms(law: Law) -> tuple[Law, ...]:
 
 
 def is_smooth(row_class: str) -> bool:
-    """Whether exact second derivatives exist: what optimal control asks for."""
+    """Test for exact second derivatives, which optimal control needs."""
     return row_class in ("C2", "C∞")
 
 

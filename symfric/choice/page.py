@@ -137,7 +137,7 @@ def _others(rows: Sequence[Row]) -> str:
 
 
 def _meaning() -> str:
-    """What columns and codes mean."""
+    """Meaning of columns and codes."""
     columns = html.bullets(f"{name}: {why}" for name, why in COLUMNS)
     codes = "; ".join(f"{code}: {word} ({why})" for word, (code, why) in NEEDS.items())
     return f"<h2>What the columns mean</h2>\n{columns}\n{html.paragraph(f'Shows: {codes}.')}"

@@ -1,4 +1,4 @@
-"""What was measured of the laws, and where they stand."""
+"""Measurements of laws, and their ranks."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -35,7 +35,7 @@ class Row:
         values: what to give the law: all parameters that it does not come with, of several places
             that rub those of the first.
         rtol, method, attempts, instructions: of the run at equal error: relative tolerance, method,
-            attempts of a step, CasADi instructions that one counts (`budget.counted`). Equal are
+            attempts of a step, CasADi instructions that one counts (`climb.counted`). Equal are
             errors from the reference where the law is ranked, and its own where it is not.
         time_s: processor time of that run [s] in CasADi's virtual machine, the shortest of several.
         fixed_step: largest step [s] at which the plant in fixed steps of backward Euler stays
@@ -132,13 +132,13 @@ def best_of(rows: Sequence[Row]) -> Row:
 
 
 def place(row: Row) -> tuple[int, float, float, str]:
-    """What rows are ordered by: errors to a digit, work to the last."""
+    """Key by which rows are ordered: errors to a digit, work to the last."""
     error = float(f"{row.error:.0e}") if isfinite(row.error) else inf
     return ORDER.index(row.standing), 0.0 if row.ranked else error, row.work or inf, row.law
 
 
 def _tied(head: Row, row: Row) -> bool:
-    """Whether `row` is as good as the first of its rank."""
+    """Test for a `row` as good as the first of its rank."""
     return place(head)[:2] == place(row)[:2] and row.work <= ALIKE * head.work
 
 
@@ -182,7 +182,7 @@ class Ranking:
 
     @property
     def interrupted(self) -> bool:
-        """Whether somebody stopped it before all laws were measured."""
+        """True if an interrupt came before all laws were measured."""
         return bool(self.unmeasured)
 
     @property
@@ -202,6 +202,6 @@ class Ranking:
 
     @property
     def title(self) -> str:
-        """What was asked, in a line."""
+        """The question in a line."""
         asked = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
         return f"{self.machine}: {asked}, {self.accuracy:g} off at most"

@@ -1,4 +1,4 @@
-"""What laws are compared with: exact dry friction, the sharpest law there is, a run, or data."""
+"""References of errors: exact dry friction, the sharpest law there is, a run, or data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

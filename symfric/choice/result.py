@@ -25,7 +25,7 @@ class Choice(Ranking):
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """What to take and why, for simulation, optimal control and a controller."""
+        """Recommended laws and reasons, for simulation, optimal control and a controller."""
         return verdict(self.rows, self.needs, self.accuracy, self.control)
 
     @property

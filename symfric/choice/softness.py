@@ -1,4 +1,4 @@
-"""How soft a law may be: its widths and bristles scaled together, until it keeps a wanted error.
+"""Softness of a law: widths and bristles scaled together until it keeps a wanted error.
 
     static laws      widths and velocities s
     bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities s^p
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
+from symfric.figures.regularisation import scaled
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.sticking import Sticking
@@ -36,14 +37,12 @@ LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), Rat
 """Velocities that say how high friction is, and no width."""
 OF_BRISTLES = 0.45, 0.5
 """Powers of the velocities of laws with states, tried in this order."""
-DIGITS = 12
-"""Of scaled parameters: what is behind is rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Softness:
-    """What makes `law` smooth, scaled together by a factor s.
+    """Parameters that make `law` smooth, scaled together by a factor s.
 
     Attributes:
         powers: parameter -> power of s.
@@ -66,9 +65,8 @@ class Softness:
         if not self.powers:
             return self.law
         known = parameters(self.law)
-        scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
-        scaled = {n: _within(known[n], x) for n, x in scaled.items()}
-        law = with_values(self.law, {n: float(f"{x:.{DIGITS}g}") for n, x in scaled.items()})
+        values = scaled(self.law, self.powers, s)
+        law = with_values(self.law, {n: _within(known[n], x) for n, x in values.items()})
         return peaked(law, self.mu_s, self.load)
 
 
@@ -80,7 +78,7 @@ def _within(p: Parameter, value: float) -> float:
 def softness(
     law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
 ) -> Softness:
-    """What may be scaled of `law`; nothing of one that rests exactly or has no widths.
+    """The scalable parameters of `law`; none of one that rests exactly or has no widths.
 
     Args:
         law, friction, load: what it describes, and under which load.
@@ -259,7 +257,7 @@ def _apart(one: Rung, other: Rung) -> float:
 
 
 def _kept(rungs: list[Rung], wanted: float) -> bool:
-    """Whether two runs in a row keep the error."""
+    """Test for two runs in a row that keep the error."""
     return len(rungs) > 1 and max(rung.error for rung in rungs[-2:]) <= wanted
 
 
@@ -276,6 +274,6 @@ def _stride(rungs: list[Rung], wanted: float) -> float:
 
 
 def _settled(rungs: list[Rung]) -> bool:
-    """Whether the last four errors are the same, or grow."""
+    """Test for four last errors that are the same, or grow."""
     last = [rung.error for rung in rungs[-4:]]
     return len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]

@@ -88,7 +88,7 @@ def _fixed(ranked: Sequence[Row], control: float) -> str:
 
 
 def _in_c(row: Row, counted: bool) -> float:
-    """What a step of the law costs in C."""
+    """Cost of a step of the law in C."""
     return row.core if counted else float(row.c_operations or 0)
 
 
@@ -97,7 +97,7 @@ def _states(row: Row) -> str:
 
 
 def _others(rows: Sequence[Row]) -> str:
-    """How many fell out, by the reason."""
+    """Number of laws left out, by the reason."""
     what = {
         LACKING: "for what they show",
         INACCURATE: "that do not keep the accuracy",

@@ -158,7 +158,7 @@ Result = TypeVar("Result")
 def _able(
     laws: Mapping[str, AnyLaw], make: Callable[[AnyLaw], Result]
 ) -> tuple[dict[str, Result], str]:
-    """What `make` makes of each law that can, and a note which were left out and why.
+    """Results of `make` for each law that can, and a note which were left out and why.
 
     Raises:
         ValueError, SolveError: those of the first law, where none can.
@@ -179,7 +179,7 @@ def _able(
 
 
 def _reason(text: str) -> str:
-    """What was expected, without who was asked and what there is instead."""
+    """The expectation alone of an error message."""
     start = text.find("expected ")
     return text[max(start, 0) :].split("; ")[0].split(", got ")[0]
 

@@ -1,4 +1,4 @@
-"""What a behaviour figure holds: curves of named columns with units."""
+"""Data of a behaviour figure: curves of named columns with units."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -44,7 +44,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """How a legend names the curve: its law and, where there are several, its case."""
+        """Legend entry of the curve: its law and, where there are several, its case."""
         return f"{self.law}, {self.case}" if self.case else self.law
 
     def __getitem__(self, column: str) -> Array:
@@ -89,7 +89,7 @@ class FigureData(Showing):
         return Shown(f"figure '{self.name}': {self.title}", (), Table(header, rows))
 
     def thumbnail(self) -> "Figure":
-        """What `plot` draws, small."""
+        """The picture of `plot`, small."""
         return self.plot()
 
     def __getitem__(self, name: str) -> Curve:
@@ -157,7 +157,7 @@ def _range(values: Array) -> str:
 
 
 def clear(curves: Sequence[Curve], *, loops: bool = False) -> tuple[list[Curve], str]:
-    """Those of `curves` that can be told apart in one picture, and a word about the others.
+    """Curves that differ visibly in one picture, and a word about the others.
 
     Where laws are compared these are no references; of three laws and more the first and the last
     case, and of `loops` within loops, which lie on each other, the first.

@@ -23,7 +23,7 @@ from symfric.laws import (
 from symfric.laws.base.law import check_law
 
 GIVEN = ("v", "N", "F_e", "dv")
-"""What a block that is slid or pushed offers a law."""
+"""Inputs that a block that is slid or pushed gives a law."""
 
 
 def parts(law: AnyLaw) -> list[type[AnyLaw]]:
@@ -152,7 +152,7 @@ def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
 
 
 def _peak(F: Array) -> int:
-    """Where `F` first falls, or ends."""
+    """Index at which `F` first falls, or ends."""
     falls = np.flatnonzero((np.diff(F) <= 0) & (F[:-1] > 0))
     return int(falls[0]) if falls.size else F.size - 1
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from symfric.figures.data import Array, Curve
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
-from symfric.integrator import Linear, simulate
+from symfric.integrator import Hold, Linear, simulate
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import AnyLaw, Law, Population, law_name
 from symfric.model import Event, Model, Output
@@ -21,7 +21,7 @@ from symfric.scenes.base import contact
 from symfric.scenes.drive import Drive
 
 REST = 1e6
-"""How long the contacts have rested before a motion [s], so that all of them are old."""
+"""Time of rest before a motion [s], so that all contacts are old."""
 
 
 def slid(
@@ -75,7 +75,7 @@ def shoved(
     """
     h = 0.2 * sqrt(mass / law.stiffness)
     t = np.arange(0.0, t_end + h, h)
-    load = _signal(force, t)
+    load = sampled(force, t)
     contacts, held = law.advance(law.begin(), 0.0, REST, N)
     x = v = 0.0
     rows = np.zeros((t.size, 3))
@@ -91,14 +91,17 @@ def shoved(
     return Steps(t, columns)
 
 
-def _signal(force: Input, t: Array) -> Array:
-    """The driving force [N] at the times `t` [s]."""
-    if isinstance(force, Linear):
-        return np.interp(t, np.asarray(force.t), np.asarray(force.values))
-    if callable(force):
+def sampled(value: Input, t: Array) -> Array:
+    """An input at the times `t` [s], shape (n,)."""
+    if isinstance(value, Hold):
+        known = np.searchsorted(np.asarray(value.t), t, "right") - 1
+        return np.asarray(value.values, float)[np.clip(known, 0, None)]
+    if isinstance(value, Linear):
+        return np.interp(t, np.asarray(value.t), np.asarray(value.values))
+    if callable(value):
         symbol = ca.SX.sym("t")
-        return ca.Function("F_e", [symbol], [force(symbol)])(t).full().ravel()
-    return np.full(t.shape, checks.number("figure: force", force))
+        return ca.Function("u", [symbol], [ca.SX(value(symbol))])(t[None, :]).full().ravel()
+    return np.full(t.shape, checks.number("figure: force", value))
 
 
 UNITS = {"t": "s", "x": "m", "v": "m/s", "F": "N"}
@@ -143,7 +146,7 @@ class Run(Protocol):
 
 
 class Slide(Protocol):
-    """What makes the curve of a motion; `jumps` are the times [s] at which the velocity jumps."""
+    """Function that makes the curve of a motion; the velocity jumps at the times `jumps` [s]."""
 
     def __call__(
         self, case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()

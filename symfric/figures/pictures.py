@@ -210,7 +210,7 @@ def decades(law: AnyLaw, N: float) -> tuple[float, float]:
 
 
 def _turns(law: AnyLaw) -> bool:
-    """Whether the parameters of a law say that its contact turns."""
+    """Test for a law of a turning contact, by the units of its parameters."""
     return any(p.unit.startswith("rad/s") for p in parameters(law).values())
 
 

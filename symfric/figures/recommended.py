@@ -58,7 +58,7 @@ class Recommendation(Showing):
         values: the parameters that were set.
         error: of a run of `law` at `rtol`, measured: the largest difference from dry friction
             relative to the motion, and what the reference may be off.
-        wanted: error that was asked for.
+        wanted: the given error.
         uncertain: the part of `error` that is the reference's.
         order: in which the error falls with the width where it was chosen; NaN where nothing
             depends on it.
@@ -84,7 +84,7 @@ class Recommendation(Showing):
     curve: FigureData
 
     def __str__(self) -> str:
-        """What was found, in a sentence."""
+        """The result in a sentence."""
         found = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
         return (
             f"{type(self.law).__name__}: {found} is off {self.reference} by {self.error:.2g} "
@@ -92,7 +92,7 @@ class Recommendation(Showing):
         )
 
     def shown(self) -> Shown:
-        """What was found, in a sentence."""
+        """The result in a sentence."""
         return Shown("recommended", tuple(wrap(str(self), WIDTH)))
 
     def thumbnail(self) -> "Figure":
@@ -213,7 +213,7 @@ class _Search:
                 self.give_up(f"it does not tend to {self.about}: do their levels differ?")
 
     def remaining(self) -> float:
-        """What the last run is off the limit, from how the last four follow each other.
+        """Distance of the last run from the limit, from how the last four follow each other.
 
         With differences d and D before, and D/d = 4^q, the sum of all that follow is d / (4^q - 1).
         """
@@ -285,7 +285,7 @@ class _Search:
         return ", ".join(f"{name} = {value:.3g}" for name, value in self.knob.values(s).items())
 
     def recommendation(self, run: Sample, error: float, order: float) -> Recommendation:
-        """What is handed back."""
+        """The result, with the curve."""
         return Recommendation(
             self.knob.at(run.s), run.values, error, self.wanted, self.uncertain, order, self.about,
             self.rtol, run.steps, run.attempts, run.time_s, self.curve(),

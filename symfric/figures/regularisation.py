@@ -1,4 +1,4 @@
-"""What makes a law smooth, and how far it thereby is from dry friction.
+"""Parameters that make a law smooth, and its distance from dry friction.
 
 A smooth law has a width, such as v_t, below which it creeps instead of resting; bristles have a
 stiffness. As all widths of a law shrink with a factor s (stiffnesses grow with 1/s) its motion
@@ -74,8 +74,7 @@ class Regularisation:
     def values(self, s: float) -> dict[str, float]:
         """Their values at the factor `s`."""
         known = parameters(self.law)
-        scaled = {n: float(known[n].value) * s ** _power(known[n]) for n in self.names}
-        return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
+        return scaled(self.law, {n: _power(known[n]) for n in self.names}, s)
 
     def at(self, s: float) -> Law:
         """The law at the factor `s`."""
@@ -91,7 +90,7 @@ class Regularisation:
 def regularisation(
     where: str, law: Law, parameter: str | Iterable[str] | None = None
 ) -> Regularisation:
-    """What makes `law` smooth: `parameter`, or what its roles say.
+    """The parameters that make `law` smooth: `parameter`, or those of certain roles.
 
     Those are the stiffnesses of bristles, their damping and the paths they remember, transition
     velocities called v_t and smoothing widths [m/s]; of a law without these its only velocity.
@@ -142,6 +141,12 @@ def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
     return Regularisation(law, names)
 
 
+def scaled(law: Law, powers: Mapping[str, float], s: float) -> dict[str, float]:
+    """The values of parameters (name -> power of s) of `law` at the factor `s`."""
+    known = parameters(law)
+    return {n: float(f"{float(known[n].value) * s**p:.{DIGITS}g}") for n, p in powers.items()}
+
+
 def _power(p: Parameter) -> float:
     """Power of s with which the parameter is scaled."""
     if p.role == "damping":
@@ -152,7 +157,7 @@ def _power(p: Parameter) -> float:
 @final
 @dataclass(frozen=True, eq=False)
 class Bed:
-    """Where laws are compared: a machine that takes any of them, and what is looked at.
+    """A machine that takes any law, and the signals by which laws are compared.
 
     Attributes:
         name: of the machine.
@@ -216,31 +221,40 @@ def bed_of(
     """
     if of is not None and not callable(of):
         of = checks.names(f"{where}: of", of)
-    known = scene if isinstance(scene, type) else type(scene)
-    if issubclass(known, Scene):
-        end = _end(where, known.t_end if t_end is None else t_end)
-        u = {name: given.function for name, given in known.inputs.items()} | dict(u or {})
-        if isinstance(scene, Scene):
-            return Bed(known.__name__, lambda law: replace(scene, law=law).model(), end, of, u=u)
-        return Bed(known.__name__, lambda law: known(law).model(), end, of, u=u)
-    if not callable(scene):
+    kind = scene if isinstance(scene, type) else type(scene)
+    if not callable(scene) and not isinstance(scene, Scene):
         raise checks.refused(
             f"{where}: scene", "a scene such as FourMass, or a function law -> Model", scene
         )
-    if t_end is None:
-        raise ValueError(f"{where}: t_end: expected the end of the motion [s], got none")
+    end, u = driven(where, kind, t_end, u)
+    if isinstance(scene, Scene):
+        return Bed(kind.__name__, lambda law: replace(scene, law=law).model(), end, of, u=u)
+    if issubclass(kind, Scene):
+        return Bed(kind.__name__, lambda law: kind(law).model(), end, of, u=u)
     build = scene
-    name = getattr(build, "__name__", type(build).__name__)
 
     def model(law: Law) -> Model:
         made: object = build(law)
         return checks.kind(f"{where}: scene({type(law).__name__})", made, Model, "a Model")
 
-    return Bed(name, model, _end(where, t_end), of, u=u)
+    return Bed(getattr(build, "__name__", kind.__name__), model, end, of, u=u)
 
 
-def _end(where: str, t_end: object) -> float:
-    return checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
+def driven(
+    where: str, kind: type, t_end: float | None, u: Mapping[str, Input] | None
+) -> tuple[float, Mapping[str, Input]]:
+    """End [s] and inputs of a motion: those given, else those of the class `kind` of scenes.
+
+    Raises:
+        ValueError: no end where nothing says one, or one that is not positive.
+    """
+    given = dict(u or {})
+    if issubclass(kind, Scene):
+        t_end = kind.t_end if t_end is None else t_end
+        given = {name: own.function for name, own in kind.inputs.items()} | given
+    if t_end is None:
+        raise ValueError(f"{where}: t_end: expected the end of the motion [s], got none")
+    return checks.number(f"{where}: t_end", t_end, unit="s", above=0.0), given
 
 
 def sample(
@@ -278,7 +292,7 @@ def sample(
 
 
 def looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
-    """What errors are measured on, shape (signals, times), and relative to what."""
+    """Signals on which errors are measured, shape (signals, times), and their sizes."""
     if callable(bed.of):
         rows = checks.array(f"{bed.name}: of", bed.of(run), ndim=None, nan=True).reshape(-1, 1)
         size = np.abs(rows)[:, 0]

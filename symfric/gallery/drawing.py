@@ -1,4 +1,4 @@
-"""What the pictures of the gallery share: looks of laws, references and sweeps; legends below."""
+"""Looks of laws, references and sweeps in all pictures of the gallery; legends below panels."""
 
 from collections.abc import Mapping
 from typing import Any

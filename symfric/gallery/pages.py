@@ -57,7 +57,7 @@ def written(text: str) -> str:
 
 
 def anchor(record: Mapping[str, Any]) -> str:
-    """Where a plate stands on the page."""
+    """Anchor of a plate on the page."""
     return str(record["name"]).replace("/", "-").replace("_", "-")
 
 

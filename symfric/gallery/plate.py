@@ -82,14 +82,14 @@ class Plate(Showing):
     def shown(self) -> Shown:
         """Figure, what is compared, how far we are, and the numbers."""
         rows = tuple((name, f"{value:.6g}") for name, value in self.numbers.items())
-        told = (
+        texts = (
             self.paper,
             f"compared: {self.compared}",
             f"how far: {self.how_far}; {self.measure}",
             *(f"{kind}: {text}" for kind, text in self.verdicts.items()),
             *(f"checked: {'; '.join(self.checked)}" for _ in self.checked[:1]),
         )
-        lines = tuple(line for text in told for line in wrap(text, 98, subsequent_indent="  "))
+        lines = tuple(line for text in texts for line in wrap(text, 98, subsequent_indent="  "))
         table = Table(("number", "value"), rows, numbers=(1,), rest="... {n} more")
         return Shown(f"{self.figure}: {self.title}", lines, table)
 
@@ -232,7 +232,7 @@ def paper_of(folder: str) -> str:
 
 
 def note_of(folder: str) -> str:
-    """What was invented for all figures of a paper: what follows in the folder's docstring."""
+    """Inventions for all figures of a paper: the rest of the folder's docstring."""
     _, _, rest = cleandoc(import_module(folder).__doc__ or "").partition("\n\n")
     return " ".join(rest.split())
 
@@ -284,19 +284,19 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def beginning(known: list[str], start: str) -> list[str]:
-    """Those that begin with `start`; fig_7 is fig_07."""
+    """Names that begin with `start`; fig_7 is fig_07."""
     full = re.sub(r"fig_(\d)(?=_[^\d]|$)", r"fig_0\1", start)
     return [name for name in known if name == start or begins(name, start) or begins(name, full)]
 
 
 def begins(name: str, start: str) -> bool:
-    """Whether `start` is the first words of a plate's name; fig_1 does not begin fig_10."""
+    """Test for `start` as the first words of a plate's name; fig_1 does not begin fig_10."""
     stem = name.rpartition("/")[2]
     return any(f"{one}/".startswith((f"{start}_", f"{start}/")) for one in (name, stem))
 
 
 def about(name: str) -> dict[str, str]:
-    """What the docstrings say of a plate, without computing it: paper, figure, title, sections."""
+    """Texts of a plate, without computing it: paper, figure, title, sections."""
     folder, said = scripts()[name].rpartition(".")[0], sections(script(name).__doc__ or "")
     figure = figure_of(name.rpartition("/")[2])
     return {"paper": paper_of(folder), "note": note_of(folder), "figure": figure} | said

@@ -27,7 +27,7 @@ Record = dict[str, Any]
 @final
 @dataclass(frozen=True, eq=False)
 class Gallery:
-    """What came of a rendering.
+    """Outcome of a rendering.
 
     Attributes:
         folder: where pictures, numbers and `index.html` are.
@@ -45,7 +45,7 @@ class Gallery:
 
     @property
     def left(self) -> int:
-        """How many plates an interrupt left undone."""
+        """Number of plates that an interrupt left undone."""
         return len(self.asked) - len(self.records) - len(self.failures)
 
 
@@ -123,7 +123,7 @@ def _repeated(tell: Callable[[], None], every: float = 0.5) -> Generator[None]:
 
 
 def place(folder: Path, name: str, ending: str) -> Path:
-    """Where the file of a plate is."""
+    """Path of a file of a plate."""
     return folder / f"{name}{ending}"
 
 
@@ -166,7 +166,7 @@ def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
     for name in names:
         try:
             draw(name, Path(folder), quick)
-        except Exception as error:  # noqa: BLE001  (whatever it is, it is told beside the others)
+        except Exception as error:  # noqa: BLE001  (one failure must not stop the others)
             failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
     return failures
 

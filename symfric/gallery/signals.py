@@ -1,4 +1,4 @@
-"""What the figures of the gallery ask of runs."""
+"""Quantities of runs and signals that the figures of the gallery compare."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

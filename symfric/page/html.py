@@ -48,7 +48,7 @@ def code(text: str) -> str:
 
 
 def details(summary: str, *parts: str) -> str:
-    """What is shown on request."""
+    """A part that opens on request."""
     inside = "".join(parts)
     return f"<details><summary>{escape(summary)}</summary>{inside}</details>" if inside else ""
 

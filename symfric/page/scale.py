@@ -36,7 +36,7 @@ class Axis:
     whole: bool = False
 
     def at(self, values: Array) -> Array:
-        """Where `values` stand between low (0) and high (1)."""
+        """Positions of `values` between low (0) and high (1)."""
         if self.logarithmic:
             return np.log(values / self.low) / np.log(self.high / self.low)
         return (values - self.low) / (self.high - self.low)

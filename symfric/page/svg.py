@@ -136,7 +136,7 @@ class Level(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Band(Mark):
-    """What lies between two heights."""
+    """The area between two heights."""
 
     low: float
     high: float

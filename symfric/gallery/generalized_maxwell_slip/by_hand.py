@@ -110,7 +110,7 @@ LAWS: dict[str, tuple[Begin, Step]] = {
     "Leuven": (lambda side, s: ALPHA * s * side, leuven),
     "GMS": (lambda side, s: np.stack([ALPHA * s * side, ALPHA * 0 + side]), gms),
 }
-"""How each begins in the direction `side`, 0 at rest, and its step."""
+"""Law -> initial state in the direction `side`, 0 at rest, and step."""
 
 
 def opening(path: Sequence[float], t_end: float, step: Step, steps: int = 4000) -> float:

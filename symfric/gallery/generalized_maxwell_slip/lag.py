@@ -44,7 +44,7 @@ def explained(X: np.ndarray, rate: np.ndarray) -> tuple[float, float]:
 
 
 def faster(model: GenericAsperity) -> dict[str, float]:
-    """What explains the rate of the force where the velocity changes eight times as fast."""
+    """Shares of dF/dt that powers of |v| explain where the velocity changes eight times as fast."""
     _, v, force, rate, s = slid(model, 2.0, 4)
     powers = {"C/|v|": 0.0, "|v|^(-1/2)": 0.5, "a constant h": 1.0}
     return {

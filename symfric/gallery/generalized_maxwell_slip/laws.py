@@ -47,7 +47,7 @@ PERIOD, DUTY = 1e-5, 0.6
 PATH = tuple(1e-6 * x for x in (0.0, 1.5, 0.2, 1.1, 0.6, 1.1, 0.2, 1.5, 0.0))
 """Turning points of the path of figure 4 [m]: a loop in a loop, up to 1.5 um; our reading."""
 SIGNALS = Scales(static=F_S, kinetic=F_C, elastic=F_C, stretch=1.5e-6, velocity=1e-4)
-"""What the figures of `symfric.figures` take their amplitudes from."""
+"""Magnitudes from which the figures of `symfric.figures` take their amplitudes."""
 
 _SLIDERS = tuple(Slider(k, alpha * F_S) for k, alpha in ELEMENTS)
 _TABLE_1 = Prescribed.presets["lampaert_table_1"].friction["law"]
@@ -116,7 +116,7 @@ def law_grid(
 
 
 def key(axis: Axes, cases: Sequence[str]) -> None:
-    """What the line styles mean, in a panel of its own."""
+    """Legend of the line styles, in a panel of its own."""
     axis.set_axis_off()
     handles = [
         Line2D([], [], color=EDGE, ls=dash, linewidth=1.2, label=case)

@@ -26,7 +26,7 @@ def elements_again(curve: Curve) -> dict[str, float]:
 
 
 def alternative(numbers: dict[str, float]) -> dict[str, bool]:
-    """How Leuven with the state equation of section 4 misses the inner loop of figure 5."""
+    """Claim that Leuven with the state equation of section 4 misses the inner loop of figure 5."""
     missed: list[float] = []
     for delta in (1.0, 2.0, by_hand.DELTA_L):
         step = partial(by_hand.leuven, alternative=True, delta=delta)

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 WIRES = [(Z, ratio) for Z in (10.0, 30.0, 100.0, 300.0) for ratio in (0.0, 0.05, 0.2, 0.5)]
 """Z [N s/m], such as 0.2 kg on 500 N/m up to 1 kg on 90 kN/m, and damping ratio."""
 SPAN = 400.0
-"""How long a sled that does not stop is followed [sqrt(m/k)]; the second half counts."""
+"""Time for which a sled that does not stop is followed [sqrt(m/k)]; the second half counts."""
 
 
 @cache

@@ -15,6 +15,7 @@ from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, Line
 from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
+from symfric.gallery.signals import rms
 
 Array = NDArray[np.float64]
 
@@ -57,12 +58,12 @@ def at_once(v: Array, force: Array) -> tuple[SteadyStateLuGre, Mapping[str, floa
     data = Dataset.of(v=v, F=force, units={"v": "m/s", "F": "N"}, points=True, name="means")
     fit = Fit(Points(), SteadyStateLuGre(), data, free=["delta"]).solve(throw=False)
     found = {name: fit.parameters[name] for name in NAMES}
-    told = {
+    half = {
         name: (e.high - e.low) / 2
         for name, e in found.items()
         if e.low is not None and e.high is not None
     }
-    return SteadyStateLuGre(**{name: e.value for name, e in found.items()}), told
+    return SteadyStateLuGre(**{name: e.value for name, e in found.items()}), half
 
 
 def in_steps(v: Array, force: Array) -> SteadyStateLuGre | None:
@@ -73,7 +74,7 @@ def in_steps(v: Array, force: Array) -> SteadyStateLuGre | None:
 
 def error(law: SteadyStateLuGre, v: Array, force: Array) -> float:
     """Root mean square of equation 4.3, over the mean force."""
-    return float(np.sqrt(np.mean((force - curve(law, v)) ** 2)) / force.mean())
+    return rms(force - curve(law, v)) / float(force.mean())
 
 
 def draw_curves(
@@ -100,7 +101,9 @@ def draw_errors(axes: list[Axes], v: Array, force: Array, law: SteadyStateLuGre)
     axes[-1].set_xlabel("velocity [m/s]")
 
 
-def told(laws: Mapping[str, SteadyStateLuGre], half: Mapping[str, float]) -> dict[str, float]:
+def parameters_of(
+    laws: Mapping[str, SteadyStateLuGre], half: Mapping[str, float]
+) -> dict[str, float]:
     """Parameters of laws side by side, and half the 95 % intervals."""
     numbers = {
         f"{name} {way} [{unit}]": float(getattr(law, name))
@@ -206,7 +209,7 @@ def fig_5_3_pilot_study(quick: bool) -> Drawn:
     numbers = {
         f"error of the curve, {way}, 8 % in the thesis [%]": 100 * error(law, v, force)
         for way, law in laws.items()
-    } | told(laws, half)
+    } | parameters_of(laws, half)
     claims = {"50 speeds of nine tests are 450": v.size * 9 == 450}
     if not quick:
         spread = scatter("pilot")
@@ -225,8 +228,8 @@ def fig_5_3_pilot_study(quick: bool) -> Drawn:
                 lowest < 0.5 * float(printed.F_S) and highest > 100 * float(printed.F_S)
             ),
         }
-    far = np.sqrt(np.mean((curve(once, v) - curve(printed, v)) ** 2))
-    return figure, float(far / force.mean()), numbers, claims
+    far = rms(curve(once, v) - curve(printed, v)) / float(force.mean())
+    return figure, far, numbers, claims
 
 
 MACHINE = 650 / 60e3
@@ -283,7 +286,6 @@ def fig_5_5_main_study(quick: bool) -> Drawn:
     shares = standard_errors(exact, v, noise)
     for name, share in shares.items():
         numbers[f"least standard error of {name}, noise of the means 1 % [%]"] = 100 * share
-    far = np.sqrt(np.mean((curve(found[0], v) - curve(printed, v)) ** 2))
     claims = {
         "the points do not know sigma_2": shares["sigma_2"] > 1,
         "nor how low F_C is": shares["F_C"] > 0.1,
@@ -294,7 +296,8 @@ def fig_5_5_main_study(quick: bool) -> Drawn:
         claims["at 650 mm/min the curves of 60 noises lie between 2.3 and 3.7 N"] = (
             2.3 < min(beyond) < 2.5 < 3.5 < max(beyond) < 3.7
         )
-    return figure, float(far / force.mean()), numbers, claims
+    far = rms(curve(found[0], v) - curve(printed, v)) / float(force.mean())
+    return figure, far, numbers, claims
 
 
 @plate("1", within=0.012)
@@ -326,24 +329,23 @@ def fig_5_8_stable_region(quick: bool) -> Drawn:
     numbers = {
         "error of the curve [%]": 100 * error(found, v, force),
         "largest error [%]": 100 * float(left.max()),
-    } | told(laws, half)
-    far = np.sqrt(np.mean((curve(found, v) - curve(printed, v)) ** 2))
-    claims = {"the curve is the same within 2 %": far < 0.02 * force.mean()}
+    } | parameters_of(laws, half)
+    far = rms(curve(found, v) - curve(printed, v)) / float(force.mean())
+    claims = {"the curve is the same within 2 %": far < 0.02}
     if not quick:
         claims |= over_noises(numbers)
-    return figure, float(far / force.mean()), numbers, claims
+    return figure, far, numbers, claims
 
 
 def over_noises(numbers: dict[str, float]) -> dict[str, bool]:
-    """What all noises give."""
+    """Claims over all noises; adds their ranges to `numbers`."""
     laws, printed = refitted("main", stable=True), PRINTED["main"]
     of = shares(laws, "main")
     errors, off = list[float](), list[float]()
     for seed, law in enumerate(laws):
         v, force = measured("main", seed, stable=True)
         errors.append(error(law, v, force))
-        away = curve(law, v) - curve(printed, v)
-        off.append(float(np.sqrt(np.mean(away**2)) / force.mean()))
+        off.append(rms(curve(law, v) - curve(printed, v)) / float(force.mean()))
     parts = {
         "F_C below 1 % of the printed one": float(np.mean(of["F_C"] < 0.01)),
         "sigma_2 below 1 % of it": float(np.mean(of["sigma_2"] < 0.01)),

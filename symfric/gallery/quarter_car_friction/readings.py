@@ -25,7 +25,7 @@ def residuals(run: Trajectory) -> dict[str, float]:
 
 
 def start(run: Trajectory) -> dict[str, float]:
-    """What figure 7 and sections 5 and 7.2 say of the first ramp."""
+    """Numbers of figure 7 and sections 5 and 7.2 on the first ramp."""
     x = np.interp([0.5, 1.5], run.t, run["x_rel"])
     return {
         "the body starts, 0.5 s in figure 7 [s]": float(run.t[np.argmax(run["X_b"] > 1e-4)]),
@@ -35,16 +35,16 @@ def start(run: Trajectory) -> dict[str, float]:
 
 
 PLAY = rig.BREAK_AWAY * (1 / rig.K_S + 1 / rig.K_T)
-"""How far from where the paper has it the body may rest [m]."""
+"""Largest distance of the body at rest from its place in the paper [m]."""
 
 
 def overshoot(run: Trajectory) -> float:
-    """How far the body falls below its last place [m]."""
+    """Depth to which the body falls below its last place [m]."""
     return 0.035 - float(run["X_b"][run.t > rig.STAGES["C"][0]].min())
 
 
 def bodies(numbers: dict[str, float]) -> dict[str, bool]:
-    """What holds of all readings of the friction; adds the ranges to `numbers`."""
+    """Claims on the body in all readings of the friction; adds the ranges to `numbers`."""
     runs = [rig.read(k) for k in range(len(rig.READINGS))]
     rests = [
         abs(float(np.interp(end, run.t, run["X_b"])) - height)
@@ -84,7 +84,7 @@ def areas_and_speeds(run: Trajectory) -> tuple[list[float], list[float]]:
 
 
 def loops(numbers: dict[str, float]) -> dict[str, bool]:
-    """What holds of all readings of the friction; adds the ranges to `numbers`."""
+    """Claims on the loops in all readings of the friction; adds the ranges to `numbers`."""
     both = np.array([areas_and_speeds(rig.read(k)) for k in range(len(rig.READINGS))])
     ratios, speeds = (both[:, :, 2] / both[:, :, 1]).T
     numbers |= {

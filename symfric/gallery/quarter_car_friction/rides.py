@@ -135,7 +135,7 @@ def fig_11_body(quick: bool) -> Drawn:
 
 
 def said(numbers: dict[str, float]) -> dict[str, bool]:
-    """What the run, and the numbers of the paper by themselves, say."""
+    """Claims on the run, and on the numbers of the paper by themselves."""
     over = [value for name, value in numbers.items() if name.startswith("overshoot")]
     return {
         "friction halves the overshoot, weakly viscous friction makes it larger": (

@@ -166,7 +166,7 @@ def fig_03_belt_velocity(quick: bool) -> Drawn:
 
 
 PEAKED = ("Bengisu", "Velocity-based", "Awrejcewicz", "Stick-slip")
-"""Who passes the static level again in stopping."""
+"""Laws that pass their static level again in stopping."""
 
 
 @plate("1", within=(0.043, 0.049))

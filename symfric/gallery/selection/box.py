@@ -28,7 +28,7 @@ FLOOR, HINGE, WIDTH = 0.02, 0.002, 1e-3
 
 
 def balance(phi: ca.SX, v: ca.SX, w: ca.SX, unknown: ca.SX) -> ca.SX:
-    """What must vanish, (4, 1): Newton for the box, moments of the pendulum, two normal forces.
+    """Residuals, shape (4, 1): Newton for the box, moments of the pendulum, two normal forces.
 
     `unknown` are the accelerations of box [m/s^2] and pendulum [rad/s^2], the force of the floor
     and that of the hinge [N].
@@ -133,7 +133,7 @@ def last_swing(name: str, what: str, t_end: float, at: Machine = DRAWN) -> float
 
 
 def end_of_motion(what: str, numbers: dict[str, float], t_end: float) -> dict[str, bool]:
-    """What holds of `signal` in the last two seconds on all machines; adds the ranges to `numbers`.
+    """Claims on `signal` in the last two seconds on all machines; adds the ranges to `numbers`.
 
     At reduced size the box still moves, and there is nothing to say of the end.
     """
@@ -198,7 +198,7 @@ def _fixed_hinge(what: str, numbers: dict[str, float]) -> dict[str, bool]:
 
 
 def departures(what: str, unit: str, names: tuple[str, ...], t_end: float) -> dict[str, float]:
-    """How far the laws are from dry friction, over the run and over its last two seconds."""
+    """Distances of the laws from dry friction, over the run and over its last two seconds."""
     numbers = {f"swing in the last 2 s, {EXACT} [{unit}]": last_swing(EXACT, what, t_end)}
     for name in forms(names):
         away = off(name, what, t_end)
@@ -209,7 +209,7 @@ def departures(what: str, unit: str, names: tuple[str, ...], t_end: float) -> di
 
 
 def positions(numbers: dict[str, float]) -> dict[str, bool]:
-    """What holds of every form of every law on all machines; adds the ranges to `numbers`."""
+    """Claims on every form of every law on all machines; adds the ranges to `numbers`."""
     most: list[float] = []
     ratios: list[float] = []
     factors: list[float] = []

@@ -35,7 +35,7 @@ ORIGINAL: dict[str, Law] = {
 BEHIND: dict[str, Any] = {**REFERENCE, "linewidth": 2.4}
 DOTTED: dict[str, Any] = {"color": "k", "linestyle": ":", "linewidth": 0.9}
 QUICK = ("Smooth", "Karnopp", "LuGre")
-"""Who stands for all at reduced size."""
+"""Laws that represent all at reduced size."""
 SLIDING = ("Smooth", "Threlfall", "Dahl")
 """Laws without a static level."""
 BRISTLES = ("LuGre", "Elasto-plastic", "Stick-slip", "Gonthier")
@@ -142,7 +142,7 @@ OURS = ("Velocity-based.v_s", "Velocity-based.v_d", "Gonthier.v_s", "Gonthier.v_
 
 
 def agree(*tables: str) -> dict[str, bool]:
-    """Whether the figures are computed with the numbers of these tables."""
+    """Claims that the figures are computed with the numbers of these tables."""
     found: dict[str, bool] = {}
     for table in tables:
         if table in PRINTED_S:

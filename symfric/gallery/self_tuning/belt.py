@@ -80,7 +80,7 @@ def creeps(one: Law) -> float:
 
 
 def creeping(one: Trajectory, v: float) -> bool:
-    """Whether the block passes this creep with a force of mu_d N."""
+    """Test for a force of mu_d N wherever the block creeps at the velocity `v` [m/s]."""
     near = np.abs(one["v_rel"] + v) < 0.02 * v
     level = MU["mu_d"] * BLOCK["m"] * BLOCK["g"]
     return bool(near.any()) and np.allclose(-one["friction"][near], level, rtol=0.02)

@@ -87,7 +87,7 @@ def on_curve(law: Law, v: np.ndarray) -> np.ndarray:
 
 
 def tail(law: Law) -> float:
-    """How far the force at 10 v_t is above its limit, relative to it."""
+    """Excess of the force at 10 v_t over its limit, relative to the limit."""
     return float(on_curve(law, np.array([10 * V_T]))[0] / MU["mu_d"] - 1)
 
 

@@ -38,7 +38,7 @@ def draw_sweep(curves: Mapping[str, Array], v: Array, title: str, parts: Iterabl
 
 
 def refuted(statements: Mapping[str, bool]) -> tuple[int, dict[str, bool]]:
-    """How many of the paper's statements do not hold, and the claim that all do."""
+    """Number of the paper's statements that do not hold, and the claim that all do."""
     wrong = len(statements) - sum(statements.values())
     return wrong, {"none of the paper's statements is refuted": wrong == 0}
 
@@ -213,7 +213,7 @@ def outside(v: np.ndarray, E: float) -> np.ndarray:
 
 
 def crossings(F: np.ndarray) -> int:
-    """How often a curve changes its sign."""
+    """Number of changes of sign of a curve."""
     return int(np.count_nonzero(np.diff(np.sign(F[np.abs(F) > 1e-12]))))
 
 

@@ -188,7 +188,7 @@ def fig_13_jitter(quick: bool) -> Drawn:
 def jitter(
     rough: dict[str, float], smooth: dict[str, float], numbers: dict[str, float]
 ) -> dict[str, bool]:
-    """Who jitters in which steps, and why."""
+    """Claims on which law jitters in which steps; adds the numbers behind them."""
     any_B = [variation(stepped(LAWS[0], PEAK / B, 4.0)["x1''"]) for B in B_RANGE]
     numbers["the same, any B from 0.1 to 1 s/mm, at most [1]"] = most = max(any_B) / smooth[TUNED]
     wide = variation(stepped(LAWS[1], V_T, 4.0)["x1''"]) / smooth[LAWS[1]]

@@ -122,7 +122,7 @@ Array = NDArray[np.float64]
 
 
 def solve(machine: Machine, times: Array) -> dict[str, Array]:
-    """What the machine shows at `times` [s], to ten digits."""
+    """Signals of the machine at `times` [s], to ten digits."""
     dae = {"x": machine.y, "z": machine.unknown, "ode": machine.rates, "alg": machine.balance}
     options = {"reltol": 1e-10, "abstol": 1e-11, "max_num_steps": 200_000}
     run = ca.integrator("run", "idas", dae, float(times[0]), list(times), options)
@@ -131,7 +131,7 @@ def solve(machine: Machine, times: Array) -> dict[str, Array]:
 
 
 def fixed_steps(machine: Machine, h: float, t_end: float) -> dict[str, Array]:
-    """What the machine shows every `h` [s], by the classical method of Runge and Kutta, order 4."""
+    """Signals of the machine every `h` [s], by the classical method of Runge and Kutta, order 4."""
     unknown, ode = (
         _unknown(machine),
         ca.Function("f", [machine.y, machine.unknown], [machine.rates]),
