@@ -336,8 +336,7 @@ def _along(
         try:
             following = next(path, None)
         except FAILURES as error:
-            said = f"{said} Friction was not sharpened further: {_reason(error)}."
-            following = None
+            said, following = f"{said} Friction was not sharpened further: {_reason(error)}.", None
         if following is None:
             break
         reached = following

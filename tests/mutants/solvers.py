@@ -176,7 +176,7 @@ RESULTS = (
     ),
     Mutant(
         "what fails among modes is raised", "ocp/strategies.py",
-        'said = f"Modes were not found: {_why(error)}."', "raise", T_FALLBACK,
+        'said = f"Modes were not found: {_reason(error)}."', "raise", T_FALLBACK,
     ),
     Mutant(
         "rests keep one margin whatever was asked for", "ocp/friction/arcs.py",
