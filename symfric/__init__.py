@@ -150,38 +150,7 @@ if TYPE_CHECKING:
     from symfric.scenes import contact as contact
     from symfric.scenes import drive as drive
     from symfric.scenes import rabinowicz as rabinowicz
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.choice": "Choice select",
-            "symfric.figures": "FigureData Recommendation compare figure recommended",
-            "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
-            "symfric.foundation.printing": "for_print",
-            "symfric.foundation.status": "EnergyWarning OverloadWarning SolveError Status",
-            "symfric.integrator": """
-                Ensemble Hold Linear Plant Statistics Trajectory flow load_ensemble load_run
-                rate_of simulate simulate_many stepper
-            """,
-            "symfric.laws": """
-                ALL_LAWS BAM GMS POPULATIONS Ambrosio Andersson Armstrong Asymmetric
-                Awrejcewicz BengisuAkay Benson Berger Bittencourt BlimanSorine
-                BoucWen Bristle2D BrittleSelfTuning BrownMcPhee Capstan Coulomb Dahl
-                DuanSingh ElastoPlastic Element ExactCoulomb Exudyn GenericAsperity
-                Gonthier HaessigFriedland Hollars Karnopp Lagged Law LeineSwitch
-                Leuven LoadDependent LoadNormalised Lorentzian LuGre LuGreNormalised LuGrePassive
-                MakkarDixon MaxwellSlip ModifiedThrelfall PlanarSlip PoppStelter
-                Population PowerLawViscous QuarterCarGeneral QuarterCarSimple
-                RandomBristles RateAndState RuiWang SelfTuning SimscapeBreakaway
-                Slider SpatialSlip Specker StaticLaw SteadyStateLuGre Step5
-                StickSlip Stribeck Sum Table TemperatureDependent Threlfall Tustin
-                VelocityBased Viscous Wojewoda any_from_text law_from_text law_name
-            """,
-            "symfric.model": "Contact Event Model Monitor Output",
-            "symfric.multibody": "Mechanism read_urdf",
-            "symfric.results.report": "report",
-            "symfric.scenes": "contact drive rabinowicz",
-        },
-    )
+
+hand_out(__name__)
 
 __version__ = "0.1.0"

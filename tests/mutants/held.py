@@ -157,4 +157,4 @@ HELD = (
         "normal forces may depend on friction by any function", HOLDING,
         "if ca.depends_on(slopes, F):", "if False:", T_HOLDING,
     ),
-)
+)  # fmt: skip
