@@ -1,5 +1,7 @@
 """Model predictive controllers made of problems."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite

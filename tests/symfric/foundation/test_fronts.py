@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import inspect
 import pickle
 import subprocess
 import sys
@@ -40,6 +41,21 @@ def test_a_package_shows_the_names_that_checkers_see_and_no_other(path: Path) ->
         assert getattr(package, name) is getattr(importlib.import_module(place), name), name
     assert [name for name in dir(package) if not name.startswith("__")] == sorted(seen)
     assert sorted(package.__all__) == sorted(seen)
+
+
+def test_signatures_name_types_as_the_source_does() -> None:
+    """Not `ArrayLike` in the seven classes that it is made of."""
+    seen = 0
+    for path in FRONTS:
+        package = importlib.import_module(".".join(path.parent.relative_to(ROOT).parts))
+        for public in (getattr(package, name) for name in package.__all__):
+            own = vars(public).values() if inspect.isclass(public) else ()
+            for call in (public, *filter(inspect.isfunction, own)):
+                error = inspect.isclass(call) and issubclass(call, BaseException)
+                if (inspect.isfunction(call) or inspect.isclass(call)) and not error:
+                    seen += 1
+                    assert "numpy._typing" not in str(inspect.signature(call)), call
+    assert seen > 500
 
 
 @pytest.mark.parametrize("call", ["import symfric", "import symfric_command, symfric.cli"])
