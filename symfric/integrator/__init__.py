@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Hold as Hold
     from symfric.integrator.equations.inputs import Input as Input
     from symfric.integrator.equations.inputs import Linear as Linear
-    from symfric.integrator.equations.rates import rate_of as rate_of
+    from symfric.integrator.equations.inputs import rate_of as rate_of
     from symfric.integrator.flow import flow as flow
     from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate

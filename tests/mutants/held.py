@@ -49,7 +49,7 @@ HELD = (
         T_INSTRUCTIONS,
     ),
     Mutant(
-        "rows of compiled loops may be short", "symfric/integrator/compiled/rows.py",
+        "rows of compiled loops may be short", "symfric/integrator/compiled/columns.py",
         "if flat.shape[1] != size:", "if False:",
         ("tests/symfric/integrator/compiled/test_columns.py",),
     ),

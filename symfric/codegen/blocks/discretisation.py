@@ -1,11 +1,9 @@
 """How the steps of blocks are made, in the words and formulas of a data sheet."""
 
 from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
-from symfric.integrator.methods.backward_euler import BackwardEuler
-from symfric.integrator.methods.exponential import Exponential
+from symfric.integrator.methods.explicit import Exponential
+from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.radau import Radau
-from symfric.integrator.methods.rosenbrock import Rosenbrock
 
 HELD = "Inputs are held over the step h."
 
