@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 
 from symfric.codegen import Block, law_block
-from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.from_law import in_turning, step_variable
+from symfric.codegen.blocks.variables import arranged
 from symfric.compensation import stages
 from symfric.compensation.parts import Parts
 from symfric.compensation.settings import Compensation, chosen_settings, formula

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
-from symfric.codegen.running.compiler import FLAGS
-from symfric.codegen.running.runner import bound
-from symfric.codegen.writing.layout import prefix
-from symfric.emitter.c99 import REALS
+from symfric.codegen.compiler import FLAGS
+from symfric.codegen.layout import TEMPLATES, called, filled, prefix
+from symfric.codegen.runner import bound
+from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.files import write_text
@@ -22,20 +22,6 @@ Array = NDArray[np.float64]
 
 COMPILED: dict[tuple[str, str, str], Any] = {}
 """Of this process: fingerprint of a block, type and compiler -> its function of members."""
-
-GLUE = """#include "{name}.h"
-
-void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out,
-             unsigned int *status);
-
-void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out,
-             unsigned int *status)
-{{
-    for (long i = 0; i < count; i++) {{
-        {call};
-    }}
-}}
-"""
 
 
 @final
@@ -90,7 +76,8 @@ class Members:
         with TemporaryDirectory(prefix="symfric-") as folder:
             generate(self.block, folder, real=real, kit=False)
             glue, library = Path(folder) / "members.c", Path(folder) / "members.so"
-            write_text(glue, GLUE.format(name=name, real=kind.name, call=self._call(name)))
+            call = self._call(kind)
+            write_text(glue, filled(TEMPLATES / "members.c", name=name, real=kind.name, call=call))
             sources = [str(Path(folder) / f"{name}.c"), str(glue)]
             compiler.run(*FLAGS, "-shared", "-fPIC", *sources, "-o", str(library), "-lm")
             try:
@@ -100,26 +87,19 @@ class Members:
         found.restype = None
         return found
 
-    def _call(self, name: str) -> str:
-        sizes = {
-            "state": self.state.shape[1],
-            "param": self.param.shape[1],
-            "in": self.input.shape[1],
-            "out": self.output.shape[1],
-        }
-        own = {
+    def _call(self, real: Real) -> str:
+        """The statements of a step of member i."""
+        name = prefix(self.block, real)
+        arrays = {"state": self.state, "param": self.param, "in": self.input, "out": self.output}
+        sizes = {group: array.shape[1] for group, array in arrays.items()}
+        pointers = {
             group: f"({'const ' * (group in ('param', 'in'))}{name}_{group}_t *)({group} + {n} * i)"
             for group, n in sizes.items()
-            if n
         }
-        idle = "".join(f"(void){group}; " for group in sizes if group not in own)
-        if not self.block.is_function:
-            return f"{idle}status[i] |= {name}_step({', '.join(own.values())})"
-        given = [f"in[{sizes['in']} * i + {k}]" for k in range(sizes["in"])]
-        if "param" in own:
-            given.append(own["param"])
-        given.append("&status[i]")
-        return f"{idle}out[i] = {name}({', '.join(given)})"
+        inputs = [f"in[{sizes['in']} * i + {k}]" for k in range(sizes["in"])]
+        call = called(self.block, real, True, pointers, inputs, "&status[i]")
+        idle = "".join(f"(void){group}; " for group, n in sizes.items() if not n)
+        return f"{idle}{'out[i] =' if self.block.is_function else 'status[i] |='} {call}"
 
     def _in_vm(self) -> Any:
         # CasADi's columns are the rows of the arrays

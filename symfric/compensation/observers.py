@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from symfric.codegen import Block, law_block
-from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.from_law import in_turning, step_variable
 from symfric.codegen.blocks.held_step import held_step
+from symfric.codegen.blocks.variables import arranged
 from symfric.compensation import stages
 from symfric.compensation.compensator import without_end
 from symfric.compensation.parts import Parts

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.running.compiler import link_program
-from symfric.codegen.running.runner import program, run_c, run_vm
-from symfric.codegen.writing.layout import prefix
+from symfric.codegen.compiler import link_program
+from symfric.codegen.layout import prefix
+from symfric.codegen.runner import program, run_c, run_vm
 from symfric.embedded.cores import CORES, Core
 from symfric.embedded.inputs import day
 from symfric.embedded.qemu import Said, Target, built, said

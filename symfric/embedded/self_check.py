@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from symfric.codegen.kit.generate import Generated
-from symfric.codegen.writing.layout import prefix
+from symfric.codegen.generated import Generated
+from symfric.codegen.layout import prefix
 from symfric.embedded.cores import CORES
 from symfric.embedded.firmware import TEST
 from symfric.embedded.qemu import Target

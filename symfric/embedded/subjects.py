@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.writing.header import header
-from symfric.codegen.writing.layout import prefix
-from symfric.codegen.writing.source import source
+from symfric.codegen.header import header
+from symfric.codegen.layout import prefix
+from symfric.codegen.routines import source
 from symfric.emitter.c99 import REALS
 from symfric.foundation.files import write_text
 
