@@ -1,5 +1,12 @@
-"""From C to an image for a core, and what it says when QEMU runs it."""
+"""Cortex-M cores, the tools that compile and run code for them, and programs under QEMU.
 
+The main program calls a block step by step and says by semihosting what each step cost and gave:
+numbers as words of eight hexadecimal digits, one a line, behind a line with their name. Steps are
+timed by SysTick, which under QEMU's -icount counts instructions and nothing else. Start-up code,
+linker script and main programs are files in `sources`.
+"""
+
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,15 +16,123 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.embedded.cores import CLOCK, Core
-from symfric.embedded.firmware import LINKER, MAIN, STARTUP
+from symfric.codegen.layout import filled
 from symfric.embedded.subjects import Subject, literals
-from symfric.embedded.tools import Tools
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import ProgramError, finished
 
+
+@final
+@dataclass(frozen=True)
+class Core:
+    """A Cortex-M core.
+
+    Attributes:
+        name: in short.
+        title: in full, with its floating point unit.
+        options: of gcc.
+        machine: QEMU's board whose core runs this code.
+    """
+
+    name: str
+    title: str
+    options: tuple[str, ...]
+    machine: str
+
+
+_SOFT = "-mfloat-abi=soft"
+_HARD = "-mfloat-abi=hard"
+
+CORES = {
+    core.name: core
+    for core in (
+        Core("m0plus", "Cortex-M0+, no FPU", ("-mcpu=cortex-m0plus", _SOFT), "mps2-an385"),
+        Core("m3", "Cortex-M3, no FPU", ("-mcpu=cortex-m3", _SOFT), "mps2-an385"),
+        Core(
+            "m4f",
+            "Cortex-M4F, FPU of float",
+            ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", _HARD),
+            "mps2-an386",
+        ),
+        Core(
+            "m7",
+            "Cortex-M7, FPU of double",
+            ("-mcpu=cortex-m7", "-mfpu=fpv5-d16", _HARD),
+            "mps2-an500",
+        ),
+    )
+}
+"""By name. Code for the M0+ runs on QEMU's M3: ARMv6-M is a part of ARMv7-M, instruction by
+instruction, so that the counts are the same; QEMU's one board with an M0 has 16 kB of RAM."""
+
+CLOCK = 25e6
+"""Of SysTick on the boards [Hz]."""
+
+
+GCC, QEMU, NEWLIB = "arm-none-eabi-gcc", "qemu-system-arm", "newlib for arm-none-eabi"
+
+PACKAGES = {
+    GCC: "gcc-arm-none-eabi",
+    NEWLIB: "libnewlib-arm-none-eabi",
+    QEMU: "qemu-system-arm",
+}
+"""Tool -> package of Debian and Ubuntu."""
+
+LIBRARY_PATIENCE = 10.0
+"""Seconds in which a compiler says where its library is."""
+
+
+@final
+@dataclass(frozen=True)
+class Tools:
+    """The cross compiler, and the path of the emulator."""
+
+    gcc: Compiler
+    qemu: str
+
+
+@final
+@dataclass(frozen=True)
+class Absent:
+    """Names of the tools that are missing."""
+
+    names: tuple[str, ...]
+
+    @property
+    def advice(self) -> str:
+        """What is absent and how to get it, in a sentence."""
+        packages = " ".join(PACKAGES[name] for name in self.names)
+        return (
+            f"{', '.join(self.names)} not found; on Debian and Ubuntu: "
+            f"apt-get install --no-install-recommends {packages}"
+        )
+
+
+def find_tools() -> Tools | Absent:
+    """The tools in PATH, or which of them are not there."""
+    gcc, qemu = shutil.which(GCC), shutil.which(QEMU)
+    if gcc is not None and qemu is not None and _has_library(gcc):
+        return Tools(Compiler((gcc,)), qemu)
+    missing = [name for name, path in ((GCC, gcc), (QEMU, qemu)) if path is None]
+    if gcc is None or not _has_library(gcc):
+        missing.insert(1 if gcc is None else 0, NEWLIB)
+    return Absent(tuple(missing))
+
+
+def _has_library(gcc: str) -> bool:
+    """Whether the compiler finds the mathematical library: asked, it says a path, not a name."""
+    try:
+        said = finished((gcc, "-print-file-name=libm.a"), limit=LIBRARY_PATIENCE).output.strip()
+    except ProgramError:
+        return False
+    return said not in (b"", b"libm.a")
+
+
 Array = NDArray[np.float64]
+
+SOURCES = Path(__file__).with_name("sources")
+"""Folder of the C and the linker script round the code that is measured."""
 
 FLAGS = ("-mthumb", "-std=gnu99", "-ffunction-sections", "-fdata-sections", "-ffp-contract=off")
 """For every core."""
@@ -66,16 +181,15 @@ class Target:
         Raises:
             CompileError: the compiler refuses it.
         """
-        for name, text in (("startup.c", STARTUP), ("memory.ld", LINKER), ("target.c", main)):
-            write_text(folder / name, text)
+        write_text(folder / "target.c", main)
         gcc, options = self.tools.gcc, (*self.core.options, *FLAGS, *self.flags, *flags)
         names = ("block", *(f"more_{k}" for k in range(1, len(sources))), "startup", "target")
         objects = [str(folder / f"{name}.o") for name in names]
-        files = (*sources, folder / "startup.c", folder / "target.c")
+        files = (*sources, SOURCES / "startup.c", folder / "target.c")
         for source, item in zip(files, objects, strict=True):
             gcc.run(*options, f"-I{folder}", "-c", str(source), "-o", item)
         image = folder / "image.elf"
-        linking = ("-nostartfiles", f"-T{folder / 'memory.ld'}", "-Wl,--gc-sections")
+        linking = ("-nostartfiles", f"-T{SOURCES / 'memory.ld'}", "-Wl,--gc-sections")
         gcc.run(*options, *linking, "--specs=nosys.specs", *objects, "-lm", "-o", str(image))
         return image
 
@@ -109,16 +223,16 @@ def built(subject: Subject, real: str, inputs: Array, columns: int, target: Targ
         CompileError: the compiler refuses it.
     """
     rows = [f"{{{literals(row, real) or '0'}}}" for row in inputs]
-    parts = {
-        "real": real,
-        "steps": str(len(inputs)),
-        "inputs": str(max(inputs.shape[1], 1)),
-        "columns": str(columns),
-        "values": ",\n".join(rows),
-    }
-    return target.linked(
-        subject.source.parent, MAIN.substitute(parts | dict(subject.parts)), (subject.source,)
+    main = filled(
+        SOURCES / "measured.c",
+        real=real,
+        steps=len(inputs),
+        inputs=max(inputs.shape[1], 1),
+        columns=columns,
+        values=",\n".join(rows),
+        **subject.parts,
     )
+    return target.linked(subject.source.parent, main, (subject.source,))
 
 
 def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
