@@ -1,7 +1,13 @@
-"""The force of a law as a sum of terms, each with a scale."""
+"""A compensating force in the making: the terms of a law, and the stages that the force passes.
 
-from collections.abc import Mapping
+A stage adds its states, inputs and parameters to the parts of the block, and returns the force or
+velocity that it lets through; it is in the C only where it is chosen.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import inf
 from typing import final
 
 import casadi as ca
@@ -9,8 +15,9 @@ import numpy as np
 
 from symfric.codegen import Block
 from symfric.foundation.numeric import is_symbolic
-from symfric.foundation.parameters import parameters, with_values
+from symfric.foundation.parameters import Variable, parameters, with_values
 from symfric.laws import GMS, Law
+from symfric.laws.base import smooth
 from symfric.laws.composed.wrap import Wrapper
 from symfric.laws.dynamic.lugre import Bristle
 from symfric.model import Variables
@@ -207,3 +214,159 @@ def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
     fixed = np.array([float(v.start) for v in others[len(block.inputs) :]])
     points = [np.append(scale * random.uniform(0.01, 2.0, scale.size), fixed) for _ in range(8)]
     return all(float(look(point)) == 0.0 for point in points)
+
+
+@final
+class Parts:
+    """The variables of a block that stages have brought so far.
+
+    Attributes:
+        states, inputs, parameters: as in `Block`.
+        next: the states after the step.
+    """
+
+    def __init__(
+        self, states: Variables = (), inputs: Variables = (), parameters: Variables = ()
+    ) -> None:
+        self.states, self.inputs, self.parameters = [*states], [*inputs], [*parameters]
+        self.next: list[ca.SX] = []
+
+    def state(self, name: str, unit: str, doc: str, nominal: float = 1.0) -> ca.SX:
+        """Add a state; the caller appends its next value to `next`."""
+        variable = Variable(self._free(name), unit, nominal=nominal, doc=doc)
+        self.states.append(variable)
+        return variable.symbol
+
+    def given(
+        self,
+        name: str,
+        unit: str,
+        doc: str,
+        nominal: float = 1.0,
+        lower: float = -inf,
+        upper: float = inf,
+    ) -> ca.SX:
+        """The input of that name, added if there is none."""
+        for known in self.inputs:
+            if known.name == name:
+                return known.symbol
+        variable = Variable(name, unit, nominal=nominal, doc=doc, lower=lower, upper=upper)
+        self.inputs.append(variable)
+        return variable.symbol
+
+    def parameter(self, name: str, start: float, unit: str, doc: str, lower: float = 0.0) -> ca.SX:
+        """Add a parameter; one whose name a law has gets a number."""
+        variable = Variable(
+            self._free(name), unit, start=start, nominal=abs(start) or 1.0, lower=lower, doc=doc
+        )
+        self.parameters.append(variable)
+        return variable.symbol
+
+    def _free(self, name: str) -> str:
+        taken = {v.name for v in (*self.states, *self.inputs, *self.parameters)}
+        return next(n for n in (name, *(f"{name}_{k}" for k in range(2, 100))) if n not in taken)
+
+
+def blended(parts: Parts, wanted: ca.SX, v: ca.SX, v_blend: float) -> ca.SX:
+    """The desired velocity near zero of the measured one, beyond 2 v_blend the measured one, C2."""
+    width = parts.parameter(
+        "v_blend", v_blend, "m/s", "up to here the desired velocity, beyond twice it the measured",
+        lower=1e-12,
+    )  # fmt: skip
+    share = smooth.step5(ca.fabs(v) / width - 1)
+    # each exactly at its end, whatever the other is
+    return ca.SX(share * v + (1 - share) * wanted)
+
+
+def beyond_dead_zone(parts: Parts, v: ca.SX, dead_zone: float) -> ca.SX:
+    """The velocity less what lies within +-dead_zone, continuous: 0 inside."""
+    width = parts.parameter("v_dead", dead_zone, "m/s", "velocities up to here count as rest")
+    return ca.SX(v - smooth.clip(v, -width, width))
+
+
+def built_up(
+    parts: Parts, v: ca.SX, h: ca.SX | float, distance: float, table: Sequence[tuple[float, float]]
+) -> ca.SX:
+    """The share b in [-1, 1] of sliding friction that has built up, its mean over the step.
+
+    b+ = b + 2 v h / distance, held within +-1: linear in the way since the reversal, and by the
+    table, if there is one, bent. What a shorter way back leaves stays, as in a Maxwell element.
+    """
+    way = parts.parameter(
+        "d_build", distance, "m", "way after a reversal until friction has built up", lower=1e-15
+    )
+    b = parts.state("built", "1", "share of friction that has built up, -1 to 1")
+    end = ca.SX(smooth.clip(b + 2 * v * h / way, -1.0, 1.0))
+    mean = (b + end) / 2
+    if table:
+        mean = 2 * _interpolated(table, (1 + mean) / 2) - 1
+    parts.next.append(end)
+    return mean
+
+
+def _interpolated(table: Sequence[tuple[float, float]], s: ca.SX) -> ca.SX:
+    """Straight lines through the points."""
+    f = ca.SX(table[0][1])
+    for (a, low), (b, high) in pairwise(table):
+        f += (high - low) * smooth.clip((s - a) / (b - a), 0.0, 1.0)
+    return f
+
+
+def freed(
+    parts: Parts, wanted: ca.SX, v: ca.SX, h: ca.SX | float, force: float, time: float, rest: float
+) -> ca.SX:
+    """A further force that grows while the desired velocity moves and the axis does not.
+
+    Its share q in [-1, 1] goes with the pace 1/t_stick towards sign(v_ref) while |v| is below
+    v_stick and |v_ref| beyond 2 v_stick, and towards 0 where |v| is beyond 2 v_stick or |v_ref|
+    below v_stick, with straight lines in between.
+    """
+    most = parts.parameter("F_stick", force, "N", "further force while the axis sticks")
+    pace = parts.parameter(
+        "t_stick", time, "s", "time over which that force comes and goes", lower=1e-9
+    )
+    slow = parts.parameter(
+        "v_stick", rest, "m/s", "slower than this is rest, twice as fast is motion", lower=1e-12
+    )
+    q = parts.state("stuck", "1", "share of the further force, -1 to 1")
+    rests = smooth.clip(2 - ca.fabs(v) / slow, 0.0, 1.0)
+    moves = smooth.clip(ca.fabs(wanted) / slow - 1, 0.0, 1.0)
+    goal = ca.sign(wanted) * moves * rests
+    end = q + smooth.clip(goal - q, -h / pace, h / pace)
+    parts.next.append(ca.SX(end))
+    return ca.SX(most * end)
+
+
+def dithered(parts: Parts, h: ca.SX | float, force: float, frequency: float) -> ca.SX:
+    """A sine of a force and frequency of its own."""
+    amplitude = parts.parameter("F_dither", force, "N", "amplitude of the dither")
+    pace = parts.parameter("f_dither", frequency, "Hz", "frequency of the dither")
+    phase = parts.state("phase", "1", "turns of the dither, 0 to 1")
+    end = smooth.fraction(phase + pace * h)
+    parts.next.append(ca.SX(end))
+    return ca.SX(amplitude * ca.sin(2 * ca.pi * end))
+
+
+def ramped(parts: Parts, F: ca.SX, h: ca.SX | float, time: float) -> ca.SX:
+    """F in and out without a bump: over t_ramp, C1, while `enable` is above and below 1/2."""
+    on = parts.given("enable", "1", "above 0.5: on", lower=0.0, upper=1.0)
+    duration = parts.parameter("t_ramp", time, "s", "time of fading in or out", lower=1e-9)
+    e = parts.state("faded_in", "1", "0: off, 1: on")
+    end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
+    parts.next.append(end)
+    return F * smooth.step3(end)
+
+
+def limited(parts: Parts, F: ca.SX, limit: float) -> ca.SX:
+    """F within +-F_max."""
+    most = parts.parameter("F_max", limit, "N", "largest force that is added")
+    return ca.SX(smooth.clip(F, -most, most))
+
+
+def slowed(parts: Parts, F: ca.SX, h: ca.SX | float, slew: float) -> ca.SX:
+    """F that changes by no more than F_rate h a step."""
+    rate = parts.parameter("F_rate", slew, "N/s", "fastest change of the force")
+    last = parts.state("F_last", "N", "force of the step before")
+    end = ca.SX(last + smooth.clip(F - last, -rate * h, rate * h))
+    parts.next.append(end)
+    return end
