@@ -102,35 +102,12 @@ FLOORS: dict[str, set[str]] = {
         "symfric.emitter",
         "symfric.integrator",
     },
-    "symfric.codegen.writing": {
-        "symfric.foundation",
-        "symfric.emitter",
-        "symfric.codegen.blocks",
-    },
-    "symfric.codegen.running": {
-        "symfric.foundation",
-        "symfric.emitter",
-        "symfric.codegen.blocks",
-        "symfric.codegen.writing",
-    },
-    "symfric.codegen.kit": {
+    "symfric.codegen": {
         "symfric.foundation",
         "symfric.laws",
-        "symfric.emitter",
-        "symfric.codegen.blocks",
-        "symfric.codegen.writing",
-        "symfric.codegen.running",
-    },
-    "symfric.codegen.proof": {
-        "symfric.foundation",
         "symfric.model",
         "symfric.emitter",
-        "symfric.codegen.blocks",
-        "symfric.codegen.writing",
-        "symfric.codegen.running",
-        "symfric.codegen.kit",
     },
-    "symfric.codegen": {"symfric.foundation"},
     "symfric.compensation": {
         "symfric.foundation",
         "symfric.laws",

@@ -15,7 +15,7 @@ import casadi as ca
 from ocp.mpc.design import Control, Design
 from ocp.mpc.gauss_newton import ARMIJO, PLAIN, ROUNDING, CycleStatus
 from ocp.mpc.interior_point import AWAY, BACK, CLOSE
-from symfric.codegen.writing.text import folded
+from symfric.codegen.layout import folded
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph

@@ -12,7 +12,7 @@ from ocp.mpc.design import Design
 from ocp.mpc.interior_point import Given
 from ocp.mpc.session import InC, InVm
 from ocp.mpc.source import header, source
-from symfric.codegen.running.compiler import compile_object, needed_symbols
+from symfric.codegen.compiler import compile_object, needed_symbols
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler

@@ -2,10 +2,10 @@
 
 from mutants.mutant import Mutant
 
-STAGES = "symfric/compensation/stages.py"
-TERMS = "symfric/compensation/terms.py"
+STAGES = "symfric/compensation/force.py"
+TERMS = "symfric/compensation/force.py"
 OBSERVERS = "symfric/compensation/observers.py"
-LOOP, CASCADE = "symfric/compensation/loop.py", "symfric/compensation/cascade.py"
+LOOP, CASCADE = "symfric/compensation/loop.py", "symfric/compensation/loop.py"
 BLOCK = "symfric/compensation/compensator.py"
 T_MEMBERS = ("tests/symfric/compensation/test_loop_by_hand.py",)
 T_CASCADE = ("tests/symfric/compensation/test_cascade.py",)

@@ -226,7 +226,7 @@ EMIT = (
         "if not self.logical[i]:\n", "if True:\n", T_EMITTER,
     ),
     Mutant(
-        "a parameter that spares a function stays variable", "symfric/codegen/blocks/folding.py",
+        "a parameter that spares a function stays variable", "symfric/codegen/blocks/variables.py",
         ">= least", ">= 0", ("tests/symfric/codegen/blocks/test_folding.py",),
     ),
     Mutant(

@@ -10,7 +10,7 @@ from robots import random_robot, rod
 from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Leuven, LuGre, law_from_text
 from symfric.codegen import Block, generate, law_block, verify
 from symfric.codegen.blocks.inverse_dynamics import gravity_block, inverse_dynamics_block
-from symfric.codegen.writing.header import header
+from symfric.codegen.header import header
 from symfric.emitter.c99 import FLOAT
 from symfric.multibody import (
     GROUND,
