@@ -49,7 +49,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
-from symfric.codegen.writing.text import folded
+from symfric.codegen.layout import folded
 
 from ocp.mpc.design import Control, CycleStatus, Design
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
