@@ -10,14 +10,5 @@ if TYPE_CHECKING:
     from symfric.choice.ranking import Row as Row
     from symfric.choice.result import Choice as Choice
     from symfric.choice.select import select as select
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.choice.friction": "Friction",
-            "symfric.choice.nature": "NEEDS",
-            "symfric.choice.result": "Choice",
-            "symfric.choice.ranking": "Row",
-            "symfric.choice.select": "select",
-        },
-    )
+
+hand_out(__name__)

@@ -8,7 +8,7 @@ from symfric.choice.nature import NEEDS
 from symfric.choice.pictures import plot_choice
 from symfric.choice.ranking import Ranking, Row
 from symfric.choice.text import GROUPS, interrupted, number, verdict
-from symfric.foundation.panels import data_uri
+from symfric.foundation.shown import data_uri
 from symfric.page import html
 
 COLUMNS = (

@@ -29,16 +29,5 @@ if TYPE_CHECKING:
     from symfric.figures.steady import sweep_b as sweep_b
     from symfric.figures.steady import sweep_c as sweep_c
     from symfric.figures.steady import sweep_e as sweep_e
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.figures.catalogue": "FIGURES compare figure",
-            "symfric.figures.data": "Curve FigureData",
-            "symfric.figures.magnitudes": "Scales phenomena scales",
-            "symfric.figures.pushing": "break_away drift push stiction",
-            "symfric.figures.recommended": "Recommendation recommended",
-            "symfric.figures.sliding": "dwell hysteresis lag transition velocity_step",
-            "symfric.figures.steady": "profile steady_state sweep_b sweep_c sweep_e",
-        },
-    )
+
+hand_out(__name__)

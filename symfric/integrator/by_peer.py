@@ -1,5 +1,7 @@
 """Simulate a model with an integrator of others, as a second opinion."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Mapping
 from time import perf_counter

@@ -1,5 +1,7 @@
 """A plant: a model that goes from sample to sample with its inputs held."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any, final
 
@@ -179,7 +181,7 @@ class Plant:
         self._seen = False
         return self._x.copy()
 
-    def copy(self) -> "Plant":
+    def copy(self) -> Plant:
         """A plant in the same state that goes its own way."""
         plants = self._plants.copy()
         other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
@@ -187,7 +189,7 @@ class Plant:
         other._own, other._places = self._own, list(self._places)
         return other
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Plant":
+    def __deepcopy__(self, memo: dict[int, Any]) -> Plant:
         return self.copy()
 
     @property

@@ -1,5 +1,7 @@
 """Simulate a model: one call for every method and engine."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -89,39 +89,5 @@ if TYPE_CHECKING:
     from symfric.laws.static.table import Table as Table
     from symfric.laws.steady import steady_force as steady_force
     from symfric.laws.steady import steady_inputs as steady_inputs
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.laws.base.law": "Facts Input Law PHENOMENA State StaticLaw",
-            "symfric.laws.catalogue": "ALL_LAWS POPULATIONS any_from_text law_from_text law_name",
-            "symfric.laws.composed.compose": "Asymmetric LoadDependent Sum",
-            "symfric.laws.composed.isotropic": "PlanarSlip SpatialSlip",
-            "symfric.laws.composed.populations": "AnyLaw GenericAsperity Population RandomBristles",
-            "symfric.laws.composed.wrap": "Lagged LoadNormalised TemperatureDependent",
-            "symfric.laws.dynamic.dahl": "BlimanSorine BoucWen Dahl",
-            "symfric.laws.dynamic.dwell": "Armstrong Gonthier RateAndState",
-            "symfric.laws.dynamic.exact_coulomb": "ExactCoulomb",
-            "symfric.laws.dynamic.lugre": "ElastoPlastic LuGre LuGreNormalised LuGrePassive",
-            "symfric.laws.dynamic.maxwell_slip": "Element GMS Leuven MaxwellSlip Slider",
-            "symfric.laws.dynamic.stick_slip": "Bristle2D HaessigFriedland StickSlip",
-            "symfric.laws.static.applied_force": "Awrejcewicz Karnopp LeineSwitch Wojewoda",
-            "symfric.laws.static.coulomb": "Coulomb PowerLawViscous Viscous",
-            "symfric.laws.static.exponential": """
-                Andersson Benson Berger DuanSingh SteadyStateLuGre Stribeck Tustin
-            """,
-            "symfric.laws.static.joints": "BAM Bittencourt Capstan",
-            "symfric.laws.static.piecewise": """
-                Ambrosio BengisuAkay Exudyn Hollars ModifiedThrelfall Step5
-                Threlfall VelocityBased
-            """,
-            "symfric.laws.static.quarter_car": "QuarterCarGeneral QuarterCarSimple",
-            "symfric.laws.static.self_tuning": "BrittleSelfTuning RuiWang SelfTuning",
-            "symfric.laws.static.smooth_peak": """
-                BrownMcPhee Lorentzian MakkarDixon PoppStelter SimscapeBreakaway
-                Specker
-            """,
-            "symfric.laws.static.table": "Table",
-            "symfric.laws.steady": "steady_force steady_inputs",
-        },
-    )
+
+hand_out(__name__)

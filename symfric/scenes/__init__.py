@@ -33,20 +33,5 @@ if TYPE_CHECKING:
     from symfric.scenes.spatial import Arm as Arm
     from symfric.scenes.spatial import FourMass as FourMass
     from symfric.scenes.spatial import Robot as Robot
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.scenes.base": "GivenInput Scene contact friction_states other_law",
-            "symfric.scenes.catalogue": "ALL_SCENES MECHANISMS",
-            "symfric.scenes.drive": "Drive drive",
-            "symfric.scenes.linkages": "DoublePendulum FourBar Pendulum PendulumBox",
-            "symfric.scenes.mechanism": "MechanismScene",
-            "symfric.scenes.presets": "Numbers Preset",
-            "symfric.scenes.rabinowicz": "CoupledBlocks Rabinowicz rabinowicz",
-            "symfric.scenes.rigs": "Prescribed QuarterCar",
-            "symfric.scenes.rotating": "Clutch DrillString Nip",
-            "symfric.scenes.slider_crank": "SliderCrank",
-            "symfric.scenes.spatial": "Arm FourMass Robot",
-        },
-    )
+
+hand_out(__name__)

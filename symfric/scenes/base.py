@@ -12,7 +12,13 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
+from symfric.foundation.parameters import (
+    Parametric,
+    Variable,
+    parameters,
+    symbolise,
+    with_values,
+)
 from symfric.foundation.shown import WIDTH
 from symfric.foundation.symbols import strays, symbols_of
 from symfric.foundation.units import turned
@@ -243,7 +249,12 @@ def contact(
 
 
 def divides_by_load(law: Law) -> bool:
-    """Whether a law is not finite without a normal force."""
+    """Test for a law that is not finite without a normal force.
+
+    Symbols have the default values of their parameters.
+    """
+    known = parameters(law).items()
+    law = with_values(law, {name: p.default for name, p in known if is_symbolic(p.value)})
     v, z = ca.SX(1.0), ca.SX([state.nominal for state in law.states])
     try:
         found = ca.veccat(law.force(v, 0.0, z), law.rate(v, 0.0, z))

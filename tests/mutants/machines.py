@@ -9,7 +9,7 @@ BLOCKS = "symfric/scenes/rabinowicz.py"
 DRILL = "symfric/scenes/rotating.py"
 NIP = "symfric/scenes/rotating.py"
 GIVEN = "symfric/scenes/rigs.py"
-RATES = "symfric/integrator/equations/rates.py"
+RATES = "symfric/integrator/equations/inputs.py"
 T_PRESETS = ("tests/symfric/scenes/test_presets.py",)
 T_CLUTCH = ("tests/symfric/scenes/test_clutch.py",)
 

@@ -30,7 +30,7 @@ from mutants.told import TOLD
 from mutants.written import WRITTEN
 
 STEP = "symfric/integrator/step/attempt.py"
-WATCH = "symfric/integrator/step/watch.py"
+WATCH = "symfric/integrator/step/attempt.py"
 EVENTS = "symfric/integrator/running/events.py"
 SEARCH = "symfric/integrator/running/search.py"
 CROSSINGS = "symfric/integrator/running/crossings.py"
@@ -236,8 +236,8 @@ EMIT = (
     ),
 )  # fmt: skip
 
-PIVOTS = "symfric/integrator/equations/pivots.py"
-SUITED = "symfric/integrator/methods/suited.py"
+PIVOTS = "symfric/integrator/equations/matrices.py"
+SUITED = "symfric/integrator/methods/method.py"
 T_SUITED = ("tests/symfric/integrator/methods/test_suited.py",)
 T_IMPLICIT = ("tests/symfric/integrator/equations/test_implicit.py",)
 
@@ -260,12 +260,12 @@ DIFFERENTIAL_ALGEBRAIC = (
     ),
     Mutant(
         "dependent equations are added instead of subtracted",
-        "symfric/integrator/equations/implicit.py", "at_rest[i] - sum(", "at_rest[i] + sum(",
+        "symfric/integrator/equations/system.py", "at_rest[i] - sum(", "at_rest[i] + sum(",
         T_IMPLICIT,
     ),
     Mutant(
         "charges jump where start values become consistent",
-        "symfric/integrator/equations/rank.py", "basis[pivots] = -B", "basis[pivots] = B",
+        "symfric/integrator/equations/matrices.py", "basis[pivots] = -B", "basis[pivots] = B",
         T_IMPLICIT,
     ),
     Mutant(
@@ -282,7 +282,7 @@ DIFFERENTIAL_ALGEBRAIC = (
 
 MEMORY = "symfric/foundation/memory.py"
 BUILT = "symfric/integrator/running/built.py"
-KEPT = "symfric/integrator/compiled/cache.py"
+KEPT = "symfric/integrator/compiled/compiler.py"
 COMPILED = "symfric/integrator/compiled/compiler.py"
 T_BUILT = ("tests/symfric/integrator/running/test_built.py",)
 T_KEPT = ("tests/symfric/integrator/compiled/test_cache.py",)
@@ -377,7 +377,7 @@ LEFT_OUT = (
         "return b < a and c < b and", "return", T_EVENTS,
     ),
     Mutant(
-        "pulses of inputs are leapt over", "symfric/integrator/equations/onsets.py",
+        "pulses of inputs are leapt over", "symfric/integrator/equations/expressions.py",
         "if abs(level[i] - last) >= LEVELS:", "if abs(level[i] - last) >= 99:",
         ("tests/symfric/integrator/equations/test_onsets.py",),
     ),

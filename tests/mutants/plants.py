@@ -3,7 +3,7 @@
 from mutants.mutant import Mutant
 
 FOLLOWING = "symfric/integrator/equations/following.py"
-CONSTANTS = "symfric/integrator/equations/constants.py"
+CONSTANTS = "symfric/integrator/equations/expressions.py"
 PLANT, LOOPS = "symfric/integrator/plant.py", "symfric/integrator/running/plants.py"
 EVENTFUL = "symfric/integrator/running/eventful_plants.py"
 LANES = "symfric/integrator/many/plants.py"

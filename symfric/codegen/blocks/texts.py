@@ -9,11 +9,9 @@ from typing import final
 
 from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
 from symfric.foundation.parameters import Option, Parametric, options
-from symfric.integrator.methods.backward_euler import BackwardEuler
-from symfric.integrator.methods.exponential import Exponential
+from symfric.integrator.methods.explicit import Exponential
+from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.radau import Radau
-from symfric.integrator.methods.rosenbrock import Rosenbrock
 
 TELLING = (
     r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"

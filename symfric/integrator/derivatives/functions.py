@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.lanes import lanes_source
 from symfric.integrator.derivatives.seeds import Seeds
-from symfric.integrator.equations.branches import branchless
-from symfric.integrator.equations.quotients import divided_once
+from symfric.integrator.equations.expressions import branchless, divided_once
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import build_dense_step

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.compiled.rows import NAME
+from symfric.integrator.compiled.columns import NAME
 from symfric.integrator.many.vectors import lanes_header, vector_source
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.equations.quotients import divided_once
+from symfric.integrator.equations.expressions import divided_once
 from symfric.integrator.step.layout import Record
 from symfric.model.parts import Event
 

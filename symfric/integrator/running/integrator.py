@@ -18,14 +18,13 @@ from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.following import Following, corrected, following
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.lu import Order
+from symfric.integrator.equations.matrices import Order
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.suited import suited
+from symfric.integrator.methods.method import Method, suited
 from symfric.integrator.running.crossings import Crossings, crossings
 from symfric.integrator.running.engine import BATCH, CompiledEngine, Engine, VmEngine
 from symfric.integrator.running.loop import Work, loop_source
-from symfric.integrator.step.written import written
+from symfric.integrator.step.attempt import written
 from symfric.model import Model
 from symfric.model.kinds import in_results
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import evaluate
 from symfric.foundation.status import Status
+from symfric.integrator.equations.expressions import pace
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.onsets import pace
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.events import Eventful

@@ -5,6 +5,8 @@ from, and compared with, what they produce. One contact is an expression like a 
 population runs in NumPy, all contacts at once, and as generated C, in a loop.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import ceil

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, Model, Variable, drive, simulate, simulate_many
-from symfric.integrator.equations.onsets import DEPTH, changes, levels, onsets, pace
+from symfric.integrator.equations.expressions import DEPTH, changes, levels, onsets, pace
 from symfric.laws import Karnopp
 
 Function = Callable[[ca.SX], ca.SX]

@@ -1,19 +1,6 @@
-"""The quadratic program of an iteration, by a primal-dual interior point.
+"""A reference in NumPy for the C of controllers: the quadratic program of an iteration.
 
-A hard row keeps v >= 0; a soft one may be violated by s >= 0 at the price rho s + sigma s^2 / 2:
-
-    v - t + s = 0,   t z = mu,   s y = mu,   z + y = rho + sigma s
-
-Newton's method with t, s and y eliminated leaves a weight w and a slope e for each row,
-
-    z_new = z + w (o - D d),   w = 1 / (t / z + f),   e = -(z + w o),
-    o = mu / z - v - s + f a,   a = rho + sigma s - z - mu / s,   f = 1 / (sigma + y / s)
-
-with f = 0 in a hard row, for the recursion over the intervals. Mehrotra's predictor and corrector
-share its matrices. A program whose free minimum keeps all rows needs none of this.
-
-Sources: Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim.
-    2(4), 1992; Frison and Diehl, HPIPM, IFAC 2020 (soft rows).
+The loops of `ocp/mpc/cycle.c`, operation by operation, so that both give the same bits.
 """
 
 from dataclasses import dataclass
@@ -23,28 +10,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.mpc.design import CycleData, Prices
 from ocp.mpc.horizon import Horizon
 from ocp.mpc.kernels import Kernels
+from ocp.mpc.source import AWAY, BACK, CLOSE
 from symfric.foundation.numeric import evaluate_all
 
 Array = NDArray[np.float64]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Given:
-    """Data of the whole horizon in one cycle.
-
-    Attributes:
-        R: references, shape (N+1, number of them).
-        t: times [s], shape (N+1,).
-        p, b: parameters, and bounds of the rows of an interval and of the end.
-    """
-
-    R: Array
-    t: Array
-    p: Array
-    b: Array
 
 
 @final
@@ -132,14 +104,14 @@ class Sweeps:
         self._forward = kernels.forward.mapaccum("forward", n)
         self._adjoint = kernels.adjoint.mapaccum("adjoint", n)
 
-    def linear(self, X: Array, U: Array, given: Given) -> tuple[Array, Array]:
+    def linear(self, X: Array, U: Array, given: CycleData) -> tuple[Array, Array]:
         """L of all intervals, and of the end, at states X (N+1, nx) and inputs U (N, nu)."""
         (L,) = called(self._linear, *self._arguments(X, U, given))
         if self.kernels.end_linear is None:
             return L, np.zeros(0)
         return L, called(self.kernels.end_linear, *self._at_end(X, given))[0][0]
 
-    def value(self, X: Array, U: Array, given: Given) -> tuple[Array, Array, Array]:
+    def value(self, X: Array, U: Array, given: CycleData) -> tuple[Array, Array, Array]:
         """Defects (N, nx), all rows v, and the costs of intervals and end."""
         (E,) = called(self._value, *self._arguments(X, U, given))
         c, v, cost = E[:, : self.nx], E[:, self.nx : -1].ravel(), E[:, -1]
@@ -148,11 +120,11 @@ class Sweeps:
         end = called(self.kernels.end_value, *self._at_end(X, given))[0][0]
         return c, np.append(v, end[:-1]), np.append(cost, end[-1])
 
-    def _arguments(self, X: Array, U: Array, given: Given) -> tuple[Array, ...]:
+    def _arguments(self, X: Array, U: Array, given: CycleData) -> tuple[Array, ...]:
         R = given.R
         return X[:-1], U, X[1:], R[:-1], R[1:], given.p, given.t[:-1], given.b
 
-    def _at_end(self, X: Array, given: Given) -> tuple[Array, ...]:
+    def _at_end(self, X: Array, given: CycleData) -> tuple[Array, ...]:
         return X[-1], given.R[-1], given.p, given.t[-1:], given.b
 
     def defects_of(self, L: Array) -> Array:
@@ -195,7 +167,7 @@ class Sweeps:
             rows, costs = np.append(rows, last[:-2]), np.vstack([costs, last[-2:]])
         return Move(np.vstack([np.zeros((1, self.nx)), d]), M[:, : self.nu], rows, costs)
 
-    def curvature(self, X: Array, U: Array, multipliers: Array, given: Given) -> Array:
+    def curvature(self, X: Array, U: Array, multipliers: Array, given: CycleData) -> Array:
         """E of all intervals: upper triangles of the curvature of multipliers' F, columns."""
         (E,) = called(self._curvature, multipliers, X[:-1], U, given.R[:-1], given.p)
         return E
@@ -213,31 +185,6 @@ class Sweeps:
         """Those of the intervals, shape (N, rows), and those of the end."""
         count = self.horizon.count * self.rows
         return rows[:count].reshape(self.horizon.count, self.rows), rows[count:]
-
-
-Array = NDArray[np.float64]
-
-BACK = 0.995
-"""Share of the way to the boundary."""
-CLOSE = 1e-7
-"""mu, in units of the curvature, at which a program is solved."""
-AWAY = 0.1
-"""Least distance from the bounds at which the interior point starts, in units of the signals."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Prices:
-    """rho and sigma of all rows, zeros in hard ones, and which are soft."""
-
-    rho: Array
-    sigma: Array
-    soft: NDArray[np.bool_]
-
-    def of(self, v: Array) -> float:
-        """Cost of the violations of soft rows."""
-        s = np.maximum(-v, 0.0)
-        return total(self.rho * s + 0.5 * (self.sigma * (s * s)))
 
 
 @final
@@ -271,6 +218,12 @@ class Point:
 def total(values: Array) -> float:
     """The sum from left to right, as C has it."""
     return float(np.cumsum(values)[-1]) if values.size else 0.0
+
+
+def price_of(prices: Prices, v: Array) -> float:
+    """Cost of the violations of soft rows."""
+    s = np.maximum(-v, 0.0)
+    return total(prices.rho * s + 0.5 * (prices.sigma * (s * s)))
 
 
 def solve_program(

@@ -1,99 +1,17 @@
-"""Sequential quadratic programs over the horizon, and how far their result is from optimal.
+"""A reference in NumPy for the C of controllers: cycles with the same bits."""
 
-    1. linearise at the plan (X, U); residual <= tolerance: done
-    2. change and multipliers by the quadratic program (`interior_point`)
-    3. a step of 1, 1/2, 1/4, ... of it by the merit  cost + prices + nu |defects|_1
-
-The Hessian is that of Gauss and Newton in the first two iterations of a cycle. Near rest, friction
-bends more than the cost does, and these converge slowly; from the third one on the curvature of the
-equations, weighted with their multipliers, is taken along wherever Riccati's recursion then finds
-no negative pivot.
-
-The residual is that of the conditions of Karush, Kuhn and Tucker at the plan that is handed out,
-whose multipliers of the equations make the gradients in the states zero: the largest of
-
- * gradients in the inputs, per nominal and own curvature of the cost in an input: an input would
-   move by no more than that share of its nominal;
- * defects of the equations per nominal of the state;
- * violations of rows in units of their signals; products of rows and multipliers, by the larger
-   of multiplier and that curvature. A soft row may be violated instead where its multiplier is the
-   price: what it is off, relative to the price, times the violation.
-
-Source of the merit's weight: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36).
-"""
-
-from dataclasses import dataclass
-from enum import IntEnum
-from math import isfinite
+from dataclasses import dataclass, replace
+from math import inf, isfinite
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
+from receding_program import Move, Sweeps, price_of, solve_program, total
 
-from ocp.mpc.interior_point import Given, Move, Prices, Sweeps, solve_program, total
+from ocp.mpc.design import CycleData, CycleStatus, Design, Plan, Prices, Settings
+from ocp.mpc.source import ARMIJO, PLAIN, ROUNDING
 
 Array = NDArray[np.float64]
-
-PLAIN = 2
-"""Iterations without curvature of the equations, which has no meaning yet far from the optimum."""
-ARMIJO = 1e-4
-ROUNDING = 1e-12
-"""Of the merit, relative: what a step may lose by it."""
-
-
-class CycleStatus(IntEnum):
-    """End of a cycle; the numbers are those of the C."""
-
-    CONVERGED = 0
-    NOT_CONVERGED = 1
-    BAD_INPUT = 2
-    FAILED = 3
-
-    @property
-    def sentence(self) -> str:
-        """Meaning, and what to try."""
-        return {
-            0: "converged",
-            1: "not converged: the residual is above the tolerance after the last iteration; allow "
-            "more of them, or let steps resolve the transition velocity",
-            2: "bad input: a number is not finite; the plan of the last cycle goes on",
-            3: "failed: numbers were not finite; the plan of the last cycle goes on, the next one "
-            "starts afresh",
-        }[int(self)]
-
-
-@final
-@dataclass(frozen=True)
-class Settings:
-    """Limits of the work in one cycle.
-
-    Attributes:
-        tolerance: residual at which a plan is optimal.
-        iterations: quadratic programs at most; 1 is the real-time iteration.
-        program: iterations of the interior point in each at most.
-        halvings: of a step, at most.
-    """
-
-    tolerance: float = 1e-3
-    iterations: int = 20
-    program: int = 40
-    halvings: int = 6
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """States (N+1, nx), inputs (N, nu), and multipliers of all rows."""
-
-    X: Array
-    U: Array
-    z: Array
-
-    def shifted(self, sweeps: Sweeps) -> "Plan":
-        """One interval later; the last one is repeated."""
-        inner, last = sweeps.split(self.z)
-        z = np.append(_later(inner).ravel(), last)
-        return Plan(_later(self.X), _later(self.U), z)
 
 
 @final
@@ -115,11 +33,18 @@ class Report:
     program: int
 
 
+def shifted(plan: Plan, sweeps: Sweeps) -> Plan:
+    """One interval later; the last one is repeated."""
+    inner, last = sweeps.split(plan.z)
+    z = np.append(_later(inner).ravel(), last)
+    return Plan(_later(plan.X), _later(plan.U), z)
+
+
 def _later(rows: Array) -> Array:
     return np.vstack([rows[1:], rows[-1:]])
 
 
-def _curved(sweeps: Sweeps, plan: Plan, given: Given, L: Array, end: Array) -> Array:
+def _curved(sweeps: Sweeps, plan: Plan, given: CycleData, L: Array, end: Array) -> Array:
     """L with the curvature of the equations, where the Hessian stays positive over the horizon."""
     _, multipliers = sweeps.adjoint(L, end, plan.z)
     E = sweeps.curvature(plan.X, plan.U, multipliers, given)
@@ -150,7 +75,7 @@ def residual_of(
 
 
 def improved(
-    sweeps: Sweeps, plan: Plan, given: Given, prices: Prices, settings: Settings
+    sweeps: Sweeps, plan: Plan, given: CycleData, prices: Prices, settings: Settings
 ) -> tuple[Plan, Report]:
     """The plan after at most `settings.iterations` quadratic programs, and how it went."""
     unit, merit = sweeps.horizon.curvature, Merit(sweeps, given, prices)
@@ -181,11 +106,11 @@ def _step(merit: "Merit", plan: Plan, move: Move, nu: float, halvings: int) -> t
     """Step length along a change, and the weight of the defects, which never falls."""
     c, v, cost = merit.sweeps.value(plan.X, plan.U, merit.given)
     prices, gap = merit.prices, merit.gap(c)
-    slope = total(move.costs[:, 0]) + (prices.of(v + move.D) - prices.of(v))
+    slope = total(move.costs[:, 0]) + (price_of(prices, v + move.D) - price_of(prices, v))
     if gap > 0.0:
         nu = max(nu, (slope + 0.5 * max(0.0, total(move.costs[:, 1]))) / (0.5 * gap))
     fall = slope - nu * gap
-    before = total(cost) + prices.of(v) + nu * gap
+    before = total(cost) + price_of(prices, v) + nu * gap
     alpha = 1.0
     for _ in range(halvings):
         after = merit(plan.X + alpha * move.X, plan.U + alpha * move.U, nu)
@@ -201,7 +126,7 @@ class Merit:
     """Cost, prices of soft rows and weighted defects of a plan."""
 
     sweeps: Sweeps
-    given: Given
+    given: CycleData
     prices: Prices
 
     def gap(self, c: Array) -> float:
@@ -211,4 +136,61 @@ class Merit:
     def __call__(self, X: Array, U: Array, nu: float) -> float:
         """Of states and inputs, with weight nu of the defects."""
         c, v, cost = self.sweeps.value(X, U, self.given)
-        return total(cost) + self.prices.of(v) + nu * self.gap(c)
+        return total(cost) + price_of(self.prices, v) + nu * self.gap(c)
+
+
+@final
+class NumpyCycles:
+    """The loops in NumPy, the kernels in CasADi's virtual machine."""
+
+    def __init__(self, design: Design) -> None:
+        self._design = design
+        self._sweeps = Sweeps(design.horizon, design.kernels)
+        self.forget()
+
+    def forget(self) -> None:
+        """Start afresh, from a plan that rests."""
+        design = self._design
+        n = design.horizon.count
+        self._warm = False
+        self._plan = Plan(
+            np.tile(design.x0, (n + 1, 1)),
+            np.tile(design.u0, (n, 1)),
+            np.zeros(design.prices.soft.size),
+        )
+
+    @property
+    def plan(self) -> Plan:
+        """A copy of the plan."""
+        return Plan(self._plan.X.copy(), self._plan.U.copy(), self._plan.z.copy())
+
+    def cycle(
+        self, measured: Array, given: CycleData, tolerance: float, iterations: int
+    ) -> tuple[Array, Report]:
+        """One cycle, as the C goes through it."""
+        design = self._design
+        if self._warm:
+            self._plan = shifted(self._plan, self._sweeps)
+        numbers = (measured, given.R, given.t, given.p, given.b, np.array([tolerance]))
+        if not all(np.isfinite(n).all() for n in numbers):
+            report = Report(CycleStatus.BAD_INPUT, inf, 0.0, 0, 0)
+            return self._shown(given), report
+        X = self._plan.X.copy()
+        X[0, list(design.measured)] = measured
+        if not self._warm:
+            X[1:] = X[0]
+        self._plan = Plan(X, self._plan.U, self._plan.z)
+        u = self._shown(given)
+        with np.errstate(all="ignore"):
+            settings = replace(design.settings, tolerance=tolerance, iterations=iterations)
+            plan, report = improved(self._sweeps, self._plan, given, design.prices, settings)
+        self._plan, self._warm = plan, report.status is not CycleStatus.FAILED
+        if self._warm:
+            u = self._shown(given)
+        else:
+            self.forget()
+        return u, report
+
+    def _shown(self, given: CycleData) -> Array:
+        plan = self._plan
+        return np.array([c.of(plan.X, plan.U, given.b) for c in self._design.controls])
