@@ -52,6 +52,7 @@ import casadi as ca
 from symfric.codegen.layout import folded
 
 from ocp.mpc.design import Control, CycleStatus, Design
+from symfric.codegen.layout import folded
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph

@@ -27,8 +27,7 @@ from symfric.codegen.layout import (
     prefix,
 )
 from symfric.emitter.arrays import emit_rolled
-from symfric.emitter.c99 import TRANSCENDENTAL, Real, macro
-from symfric.emitter.vanishing import representable
+from symfric.emitter.c99 import TRANSCENDENTAL, Real, macro, representable
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
 

@@ -2,8 +2,7 @@
 
 import casadi as ca
 
-from symfric.emitter.c99 import DOUBLE, FLOAT
-from symfric.emitter.vanishing import LEAST, representable
+from symfric.emitter.c99 import DOUBLE, FLOAT, LEAST, representable
 from symfric.foundation.graph import graph
 
 
