@@ -49,7 +49,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
-from symfric.codegen.layout import folded
 
 from ocp.mpc.design import Control, CycleStatus, Design
 from symfric.codegen.layout import folded
