@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
 from ocp.checking.verification import Miss, Verification
-from ocp.formulation.bounds import (
+from ocp.formulation.phase import (
     FREE,
     Box,
+    Row,
     fixed,
 )
-from ocp.formulation.phase import Row
 from ocp.formulation.problem import Problem
-from ocp.result.solution import Solution
+from ocp.solving.solution import Solution
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 from symfric.foundation.symbols import stacked

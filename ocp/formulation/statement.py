@@ -12,9 +12,18 @@ from typing import Any, TypeVar, final
 
 import casadi as ca
 
-from ocp.formulation.bounds import Box, Free, Range, as_box, is_range
 from ocp.formulation.expressions import Cost
-from ocp.formulation.phase import Chain, PathCondition, Phase, Ranges
+from ocp.formulation.phase import (
+    Box,
+    Chain,
+    Free,
+    PathCondition,
+    Phase,
+    Range,
+    Ranges,
+    as_box,
+    is_range,
+)
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
 from symfric.model import Model

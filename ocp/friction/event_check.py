@@ -28,7 +28,7 @@ from ocp.checking.verify import at_nodes, between_nodes, cost_of, joined, period
 from ocp.formulation.problem import Problem
 from ocp.friction.contact_modes import Instant, Machine, Modes, decided
 from ocp.friction.exact_motion import Given, Inputs, Piece, SetValued
-from ocp.result.solution import Solution
+from ocp.solving.solution import Solution
 from symfric import Hold, Trajectory, simulate
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status

@@ -15,15 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.result.motion import Motion, motion_of
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Fatrop, Ipopt, Sqp
-from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
-from ocp.solvers.prepared import Prepared
+from ocp.solving.methods import Fatrop, Ipopt, Sqp
+from ocp.solving.motion import Motion, motion_of
+from ocp.solving.outcome import Iterate, Outcome, Report, in_stage
+from ocp.solving.prepared import Prepared
+from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, start_of
-from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place
-from ocp.transcription.schemes import Radau, Scheme
+from ocp.transcription.schemes import Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import (

@@ -6,7 +6,7 @@ from math import isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.bounds import (
+from ocp.formulation.phase import (
     Box,
     Free,
 )

@@ -9,15 +9,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Free, Span
 from ocp.formulation.problem import Problem
 from ocp.transcription.assembly import Assembled
 from ocp.transcription.blocks import Array, Indices, Piece
 from ocp.transcription.closed_loops import Closing
-from ocp.transcription.grid import check_meshes
 from ocp.transcription.program import Places, Program, Stages, stages_of
-from ocp.transcription.schemes import Scheme
+from ocp.transcription.schemes import Scheme, check_meshes
 from ocp.transcription.unknowns import Layout, Points, SpanPoints
 from symfric.foundation.parameters import check_names
 

@@ -2,12 +2,11 @@ import numpy as np
 import pytest
 from phases import fastest_move, there_and_back, unit_move
 
-from ocp.formulation.bounds import FREE, Free
-from ocp.solvers.methods import Ipopt
+from ocp.formulation.phase import FREE, Free
+from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import solve_on, solve_once, when
-from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place
-from ocp.transcription.schemes import Legendre, Radau
+from ocp.transcription.schemes import Legendre, Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 
 

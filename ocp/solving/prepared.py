@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, outside, worst_of
-from ocp.solvers.watch import (
+from ocp.solving.outcome import Iterate, Outcome, Report, SolverStatistics, outside, worst_of
+from ocp.solving.watch import (
     OVERDETERMINED,
     At,
     Halt,
