@@ -20,8 +20,9 @@ from ocp.friction.smooth_models import has_jumps, own_level, speeds_at
 from ocp.original_law import STEPS, OriginalLaw
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import Stored
-from ocp.solving.one_solve import Clock, Solver
+from ocp.solving.one_solve import Solver
 from ocp.solving.outcome import Report
+from ocp.solving.prepared import Clock
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes

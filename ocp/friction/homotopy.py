@@ -39,10 +39,9 @@ from ocp.solving.motion import (
     Stored,
     stored_spans,
 )
-from ocp.solving.one_solve import Clock, Solver, solution_of
+from ocp.solving.one_solve import Solver, solution_of, starts_around
 from ocp.solving.outcome import Iterate, Outcome, Report, SolverStatistics
-from ocp.solving.prepared import Prepared
-from ocp.solving.random_starts import starts_around
+from ocp.solving.prepared import Clock, Prepared
 from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start, resample, start_of
 from ocp.transcription.schemes import Scheme, make_meshes

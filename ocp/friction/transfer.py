@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ocp.formulation.phase import Free, Span
 from ocp.formulation.problem import Problem
+from ocp.formulation.statement import further_states
 from ocp.friction.mode_models import SIDES, excess, holding, mode_model, rubbing, with_outputs
 from ocp.friction.sequence import Arc, Leg, Track, cut, read, with_rests
 from ocp.solving.motion import Motion
@@ -128,17 +129,7 @@ def arc_model(
 def _with_clock(model: Model) -> tuple[Model, ca.SX]:
     """`model` with the time that is left as a state, and its symbol."""
     left = Variable(LEFT, "s", nominal=0.1)
-    rate, changes = ca.SX(-1.0), dict[str, Any](x=(*model.x, left))
-    mechanics = model.holonomic
-    if mechanics is None:
-        rates = ca.SX(0, 1) if model.ode is None else model.ode
-        return replace(model, **changes, ode=ca.vertcat(rates, rate)), left.symbol
-    inner = mechanics.inner
-    if inner is not None:
-        inner = replace(inner, groups=(*inner.groups, left.symbol))
-    mechanics = replace(mechanics, rates=ca.vertcat(mechanics.rates, rate), inner=inner)
-    changes |= {"ode": None, "alg": ca.SX(0, 1)}  # made of `holonomic` once more
-    return replace(model, **changes, holonomic=mechanics), left.symbol
+    return replace(model, **further_states(model, (left,), ca.SX(-1.0))), left.symbol
 
 
 Array = NDArray[np.float64]

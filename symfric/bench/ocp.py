@@ -22,7 +22,7 @@ from ocp.formulation.problem import Problem
 from ocp.friction.event_check import set_valued
 from ocp.problems import READY, Ready
 from ocp.solve import solve
-from ocp.solving.random_starts import perturbed
+from ocp.solving.one_solve import perturbed
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, initial_points
 from ocp.transcription.schemes import Radau, make_meshes

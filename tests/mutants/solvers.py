@@ -159,11 +159,11 @@ RESULTS = (
         T_POINTS,
     ),
     Mutant(
-        "perturbations grow with their waves", "ocp/solving/random_starts.py",
+        "perturbations grow with their waves", "ocp/solving/one_solve.py",
         "* size / np.sqrt(WAVES)", "* size", T_POINTS,
     ),
     Mutant(
-        "times of places start anew in each phase", ONE,
+        "times of places start anew in each phase", "ocp/transcription/transcription.py",
         "{begin + place.fraction", "{place.fraction", T_ONE,
     ),
     Mutant(

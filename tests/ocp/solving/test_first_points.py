@@ -8,8 +8,7 @@ from phases import UNIT, there_and_back, unit_move
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.solving.one_solve import solve_once
-from ocp.solving.random_starts import perturbed
+from ocp.solving.one_solve import perturbed, solve_once
 from ocp.solving.starts import Guess, initial_points, resample, start_of
 from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
