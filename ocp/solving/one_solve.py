@@ -1,7 +1,7 @@
 """One solve: a problem on meshes, a solver and a start make a solution, as it is.
 
-Nothing is refined, sharpened or verified here; `ocp.solve` does these by calling this. Random starts
-near a given one keep its ends, and take other ways between them.
+Nothing is refined, sharpened or verified here; `ocp.solve` does these by calling this. Random
+starts near a given one keep its ends, and take other ways between them.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -215,7 +215,7 @@ def narrow_widths(transcription: Transcription, points: Points) -> str:
 
 def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
     """Widths of a contact that are small against how it moves, each with its number."""
-    slip = _along(span, at, contact.slip)
+    slip = along_points(span, at, contact.slip)[0]
     fastest = float(np.abs(slip).max(initial=0.0))
     turns = slip.size > 0 and bool(slip.min() <= 0.0 <= slip.max())
     law: Any = contact.law  # which is Parametric
@@ -236,15 +236,15 @@ def _width_number(value: Any, span: Span) -> float:
     return float(function(span.p))
 
 
-def _along(span: Span, at: SpanPoints, expression: ca.SX) -> Array:
-    """An expression at the collocation points, or at the nodes where there are none."""
+def along_points(span: Span, at: SpanPoints, column: ca.SX) -> Array:
+    """Values at the collocation points, or at the nodes where there are none, (rows, points)."""
     inner = at.inner.shape[1]
     x, n = (at.inner, inner) if inner else (at.nodes[:, :-1], at.u.shape[1])
     u = np.repeat(at.u, n // at.u.shape[1], axis=1)
     z = at.z if at.z.shape[1] == n else np.zeros((at.z.shape[0], n))
     p = np.tile(span.p[:, None], (1, n))
-    function = ca.Function("along", span.symbols, [expression])
-    return function.map(n)(np.zeros((1, n)), x, z, u, p).full().ravel()
+    function = ca.Function("along", span.symbols, [column])
+    return function.map(n)(np.zeros((1, n)), x, z, u, p).full()
 
 
 def solve_once(

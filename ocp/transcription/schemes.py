@@ -6,7 +6,7 @@ Collocation after Radau or Gauss-Legendre, or shooting.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 import numpy as np
@@ -59,9 +59,31 @@ class Coefficients:
         return bool(self.nodes[-1] == 1.0)
 
 
+@dataclass(frozen=True)
+class _Collocation:
+    """Collocation with `degree` points of CasADi's `kind`, of order 2 degree + gain."""
+
+    degree: int = 3
+    kind: ClassVar[str]
+    gain: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        where = f"{type(self).__name__}: degree"
+        object.__setattr__(self, "degree", checks.count(where, self.degree, most=MAX_DEGREE))
+
+    @property
+    def order(self) -> int:
+        """Order of the solution at the nodes of the mesh."""
+        return 2 * self.degree + self.gain
+
+    def coefficients(self) -> Coefficients:
+        """Coefficients of the method on an interval."""
+        return _collocation(self.kind, self.degree)
+
+
 @final
 @dataclass(frozen=True)
-class Radau:
+class Radau(_Collocation):
     """Radau IIA collocation with `degree` points: L-stable, order 2 d - 1 at the nodes.
 
     Limits: the order holds where the solution is smooth.
@@ -71,25 +93,13 @@ class Radau:
         ValueError: degree is not in 1 ... 9.
     """
 
-    degree: int = 3
-
-    def __post_init__(self) -> None:
-        degree = checks.count("Radau: degree", self.degree, most=MAX_DEGREE)
-        object.__setattr__(self, "degree", degree)
-
-    @property
-    def order(self) -> int:
-        """Order of the solution at the nodes of the mesh."""
-        return 2 * self.degree - 1
-
-    def coefficients(self) -> Coefficients:
-        """Coefficients of the method on an interval."""
-        return _collocation("radau", self.degree)
+    kind: ClassVar[str] = "radau"
+    gain: ClassVar[int] = -1
 
 
 @final
 @dataclass(frozen=True)
-class Legendre:
+class Legendre(_Collocation):
     """Gauss-Legendre collocation with `degree` points: order 2 d at the nodes, conserves energy.
 
     Limits: A-stable, not L-stable: what is stiff rings from interval to interval. The end of an
@@ -100,20 +110,8 @@ class Legendre:
         ValueError: degree is not in 1 ... 9.
     """
 
-    degree: int = 3
-
-    def __post_init__(self) -> None:
-        degree = checks.count("Legendre: degree", self.degree, most=MAX_DEGREE)
-        object.__setattr__(self, "degree", degree)
-
-    @property
-    def order(self) -> int:
-        """Order of the solution at the nodes of the mesh."""
-        return 2 * self.degree
-
-    def coefficients(self) -> Coefficients:
-        """Coefficients of the method on an interval."""
-        return _collocation("legendre", self.degree)
+    kind: ClassVar[str] = "legendre"
+    gain: ClassVar[int] = 0
 
 
 @final
