@@ -11,8 +11,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.model.sketch import Symbol
-from symfric.multibody.friction import JointFriction
-from symfric.multibody.joint import FORCE, Joint, Pair, unit
+from symfric.multibody.joint import FORCE, Joint, JointFriction, Pair, unit
 from symfric.multibody.spatial import euler_g, rotation, rotation_x, rotation_y, rotation_z
 
 
