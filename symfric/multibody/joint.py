@@ -239,8 +239,8 @@ class Keywords:
 
 
 Pair = tuple[ca.SX, ca.SX]
-FORCE = ("Fx", "Fy", "Fz")
-COMPONENTS = (*FORCE, "Mx", "My", "Mz")
+FORCE_NAMES = ("Fx", "Fy", "Fz")
+COMPONENTS = (*FORCE_NAMES, "Mx", "My", "Mz")
 
 
 def unit(k: int) -> ca.SX:

@@ -19,7 +19,7 @@ from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import Axial, Force, SpringDamper
-from symfric.multibody.joint import COMPONENTS, FORCE, Joint
+from symfric.multibody.joint import COMPONENTS, FORCE_NAMES, Joint
 from symfric.multibody.joints import Distance
 from symfric.multibody.kinematics import Kinematics, angles
 from symfric.multibody.spatial import GROUND, Body
@@ -75,7 +75,7 @@ def _reactions(eq: Equations, joints: Sequence[Joint]) -> Iterator[tuple[str, Ou
     for joint in joints:
         column = ca.vertcat(*eq.reactions[joint.name])
         for component in joint.transmits:
-            unit, what = ("N", "force") if component in FORCE else ("N m", "moment")
+            unit, what = ("N", "force") if component in FORCE_NAMES else ("N m", "moment")
             value = column[COMPONENTS.index(component)]
             doc = f"{what} of joint '{joint.name}' on its child along {component[1]} of its frame"
             yield f"{joint.name}_{component}", Output(value, unit, doc)
