@@ -50,13 +50,9 @@ class Plant:
     """
 
     def __init__(
-        self,
-        integrator: Integrator,
-        plants: Plants,
-        backend: str,
-        batch: int | None,
+        self, integrator: Integrator, plants: Plants, backend: str, batch: int | None,
         tolerance: float,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.model, self.dt = integrator.model, plants.dt
         self.failed: dict[int, tuple[Status, str]] = {}
         self._plants, self._batch, self._tolerance = plants, batch, tolerance
