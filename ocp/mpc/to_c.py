@@ -12,7 +12,7 @@ from ocp.mpc.closed_loop import SLACK, Optimality
 from ocp.mpc.design import CycleData, CycleStatus, Design
 from ocp.mpc.session import Session
 from ocp.mpc.source import header, source
-from symfric.codegen.compiler import compile_object, needed_symbols
+from symfric.codegen.runner import compile_object, needed_symbols
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
-from symfric.codegen.compiler import FLAGS
 from symfric.codegen.layout import TEMPLATES, called, filled, prefix
-from symfric.codegen.runner import bound
+from symfric.codegen.runner import FLAGS, bound
 from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS, Real
