@@ -145,9 +145,11 @@ class Run:
     def _arguments(self) -> tuple[Array, Array, Array]:
         """States before every step, parameters and inputs, as the step takes them."""
         block, model = self.block, GuardModel(self.block, self.real)
-        start, inputs = model.start, model.typed(self.inputs)
+        start, inputs = model.start, self.real.rounded(self.inputs)
         states = np.vstack([start, self.rows[:-1, : len(block.states)]])
-        parameters = model.default if self.parameters is None else model.typed(self.parameters)
+        parameters = (
+            model.default if self.parameters is None else self.real.rounded(self.parameters)
+        )
         if self.generated.guards:
             inputs, _ = model.inputs(inputs)
             states = np.where([[model.lost(x)] for x in states], start, states)

@@ -207,7 +207,7 @@ def found_states(block: Block, real: Real, status: str) -> list[str]:
 def finite_outputs(block: Block, real: Real, status: str) -> list[str]:
     """Statements that put 0 in the place of outputs that are not finite."""
     name, said = prefix(block, real), _said(block, real, Status.OUTPUT, status)
-    most = real.literal(float(np.finfo(np.float32 if real.size == 4 else np.float64).max))
+    most = real.literal(float(np.finfo(real.kind).max))
     if block.is_function:
         (shown,) = block.outputs
         bad = f"if ({name}_beyond({shown}, {most})) {{"

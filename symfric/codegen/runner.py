@@ -25,13 +25,9 @@ from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.graph import graph
 from symfric.foundation.programs import PATIENCE, ProgramError, finished
 
-WARNINGS = (
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wdouble-promotion",
-    "-Wmissing-prototypes",
+WARNINGS = tuple(
+    f"-W{name}"
+    for name in ("all", "extra", "pedantic", "conversion", "double-promotion", "missing-prototypes")
 )
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
@@ -213,11 +209,10 @@ def run_c(
     Raises:
         CompileError: the program does not run here, or ends too early.
     """
-    kind = np.float32 if real.size == 4 else np.float64
     given = inputs if parameters is None else np.column_stack([parameters, inputs])
     command = [str(executable), str(len(inputs)), *(["own"] if parameters is not None else [])]
     with np.errstate(over="ignore", under="ignore"):
-        numbers = given.astype(kind).tobytes()
+        numbers = given.astype(real.kind).tobytes()
     try:
         limit = PATIENCE + PER_STEP * len(inputs)
         done = finished(command, numbers, limit=limit, name="the program that was compiled")
@@ -226,7 +221,7 @@ def run_c(
     columns = len(signals(block, guards=guards))
     if done.status != 0 or len(done.output) != len(inputs) * columns * real.size:
         raise CompileError(f"the program ended too early, with status {done.status}")
-    return np.frombuffer(done.output, kind).reshape(len(inputs), columns).astype(float)
+    return np.frombuffer(done.output, real.kind).reshape(len(inputs), columns).astype(float)
 
 
 def run_vm(
@@ -247,7 +242,7 @@ def run_vm(
         parameters: of every step, shape (steps, parameters); the defaults without them.
     """
     model = GuardModel(block, real)
-    inputs, said = model.typed(inputs), np.zeros(len(inputs), np.int64)
+    inputs, said = real.rounded(inputs), np.zeros(len(inputs), np.int64)
     if guards:
         inputs, said = model.inputs(inputs)
     p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
@@ -264,7 +259,7 @@ def run_vm(
         if states is not None and k:
             x[:] = states[k - 1]
         if parameters is not None:
-            p[:] = model.typed(parameters[k])
+            p[:] = real.rounded(parameters[k])
             if guards:
                 p[:], bits = model.parameters(p)
                 said[k] |= bits
@@ -316,21 +311,15 @@ class GuardModel:
     block: Block
     real: Real
 
-    def typed(self, values: Sequence[Any] | Array) -> Array:
-        """Numbers rounded to the type, as doubles."""
-        kind = np.float32 if self.real.size == 4 else np.float64
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            return np.asarray(values, dtype=float).astype(kind).astype(float)
-
     @cached_property
     def start(self) -> Array:
         """Start values of the states."""
-        return self.typed([v.start for v in self.block.states])
+        return self.real.rounded([v.start for v in self.block.states])
 
     @cached_property
     def default(self) -> Array:
         """Parameters as the block has them by default, in its type."""
-        return self.typed([v.start for v in self.block.parameters])
+        return self.real.rounded([v.start for v in self.block.parameters])
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
         """Inputs (steps, inputs) as a guarded step sees them, and the status of every step."""
@@ -364,16 +353,18 @@ class GuardModel:
 
     @cached_property
     def _limits(self) -> Array:
-        return self.typed([state_limit(v) for v in self.block.states])
+        return self.real.rounded([state_limit(v) for v in self.block.states])
 
     @cached_property
     def _ranges(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         ranges = [parameter_range(v) for v in self.block.parameters]
-        low, high = (self.typed([getattr(r, side) for r in ranges]) for side in ("low", "high"))
+        low, high = (
+            self.real.rounded([getattr(r, side) for r in ranges]) for side in ("low", "high")
+        )
         return low, high, np.array([v.name == STEP_SIZE for v in self.block.parameters], bool)
 
     def _mended(self, column: Array, within: Range) -> tuple[Array, NDArray[np.int64]]:
-        low, high, safe = self.typed([within.low, within.high, within.safe])
+        low, high, safe = self.real.rounded([within.low, within.high, within.safe])
         finite = np.isfinite(column)
         found = np.where(finite, np.clip(column, low, high), safe)
         kinds = np.where(finite, int(Status.CLAMPED), int(Status.NOT_FINITE))

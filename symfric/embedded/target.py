@@ -347,7 +347,7 @@ def built(subject: Subject, real: str, inputs: Array, columns: int, target: Targ
 
 def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
     """What a measured program said."""
-    kind = np.float32 if real == "float" else np.float64
+    kind = REALS[real].kind
     ticks = words["ticks"] - words["idle"].mean()
     return Said(
         instructions=ticks * (1e9 / CLOCK / 2**SHIFT),
