@@ -9,12 +9,6 @@ FLOORS: dict[str, set[str]] = {
     "symfric.laws": {"symfric.foundation"},
     "symfric.model": {"symfric.foundation"},
     "symfric.multibody": {"symfric.foundation", "symfric.laws", "symfric.model"},
-    "symfric.multibody.urdf": {
-        "symfric.foundation",
-        "symfric.laws",
-        "symfric.model",
-        "symfric.multibody",
-    },
     "symfric.scenes": {
         "symfric.foundation",
         "symfric.laws",

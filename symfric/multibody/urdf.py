@@ -16,12 +16,11 @@ from symfric.laws import Coulomb, Law, Sum, Viscous
 from symfric.laws.base.law import check_law
 from symfric.multibody.constraints import Gear
 from symfric.multibody.forces import JointSpringDamper
-from symfric.multibody.friction import JointFriction
-from symfric.multibody.joint import Joint
+from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import GROUND, Vector, unphysical
-from symfric.multibody.urdf.file import (
+from symfric.multibody.urdf_file import (
     Carried,
     Inertial,
     Urdf,
@@ -31,7 +30,7 @@ from symfric.multibody.urdf.file import (
     merged,
     parse,
 )
-from symfric.multibody.urdf.notes import Array
+from symfric.multibody.urdf_notes import Array
 
 KINDS: dict[str, type[Joint]] = {
     "revolute": Revolute,

@@ -12,7 +12,7 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.multibody.spatial import unphysical
-from symfric.multibody.urdf.notes import Array, Notes
+from symfric.multibody.urdf_notes import Array, Notes
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
