@@ -21,8 +21,8 @@ from symfric.integrator.equations.initial import first_guess, first_step, smalle
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.program import program
 from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.running.built import built
 from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.integrator import built
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
 from symfric.laws import BrownMcPhee, Law, LuGre

@@ -13,7 +13,7 @@ MODULES = (
     "symfric.foundation.instructions", "symfric.foundation.packed", "symfric.foundation.status",
     "symfric.foundation.variable", "symfric.laws.", "symfric.model.", "symfric.scenes.",
     "symfric.multibody.friction", "symfric.results.ensemble", "symfric.results.statistics",
-    "symfric.integrator.stored", "symfric.integrator.derivatives.seeds",
+    "symfric.integrator.stored", "symfric.integrator.derivatives.path",
     "symfric.integrator.equations.inputs", "symfric.integrator.running.dense",
     "symfric.integrator.running.events",
     "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.formulation.",
@@ -25,6 +25,7 @@ MODULES = (
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
 MOVED = {
+    "symfric.integrator.derivatives.seeds": "symfric.integrator.derivatives.path",
     "symfric.laws.composed.normalised": "symfric.laws.composed.wrap",
     "symfric.laws.dynamic.armstrong": "symfric.laws.dynamic.dwell",
     "symfric.laws.dynamic.bliman_sorine": "symfric.laws.dynamic.dahl",

@@ -26,15 +26,25 @@ from symfric.integrator.arguments import (
     tolerances,
 )
 from symfric.integrator.equations.initial import first_steps
-from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
+from symfric.integrator.many.chunk import (
+    EXECUTORS,
+    Chunk,
+    Job,
+    Recipe,
+    Solved,
+    digest,
+    pool_of,
+    solve_chunk,
+    solve_elsewhere,
+    solve_one_by_one,
+    solved,
+    suited,
+)
 from symfric.integrator.many.given import MemberInput, Members, members_of
-from symfric.integrator.many.one_by_one import Recipe, solve_elsewhere, solve_one_by_one, suited
 from symfric.integrator.many.store import Store
-from symfric.integrator.many.workers import EXECUTORS, pool_of, solved
 from symfric.integrator.methods.tableaux import key_of
-from symfric.integrator.running.built import built
 from symfric.integrator.running.doubts import of_members
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
 from symfric.model import Model

@@ -34,7 +34,7 @@ WATCH = "symfric/integrator/step/attempt.py"
 EVENTS = "symfric/integrator/running/events.py"
 SEARCH = "symfric/integrator/running/search.py"
 CROSSINGS = "symfric/integrator/running/crossings.py"
-ISOLATION = "symfric/integrator/running/isolation.py"
+ISOLATION = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/emitter/emit.py"
@@ -281,7 +281,7 @@ DIFFERENTIAL_ALGEBRAIC = (
 )  # fmt: skip
 
 MEMORY = "symfric/foundation/memory.py"
-BUILT = "symfric/integrator/running/built.py"
+BUILT = "symfric/integrator/running/integrator.py"
 KEPT = "symfric/integrator/compiled/compiler.py"
 COMPILED = "symfric/integrator/compiled/compiler.py"
 T_BUILT = ("tests/symfric/integrator/running/test_built.py",)
@@ -330,7 +330,7 @@ CACHES = (
         ("tests/symfric/integrator/running/test_bits.py",),
     ),
     Mutant(
-        "outputs at a jump are those before it", "symfric/integrator/running/outputs.py",
+        "outputs at a jump are those before it", "symfric/integrator/running/dense.py",
         'side="right" if last else "left"', 'side="right"', T_OUTPUTS,
     ),
     Mutant(
@@ -351,7 +351,7 @@ CACHES = (
         ("tests/symfric/integrator/running/test_bits.py::test_only_a_far_jump_is_searched_for",),
     ),
     Mutant(
-        "settings of another kind are taken as checked", "symfric/integrator/settings.py",
+        "settings of another kind are taken as checked", "symfric/integrator/simulate.py",
         "key = (*asked, *map(type, asked))", "key = asked",
         ("tests/symfric/integrator/test_settings.py",),
     ),

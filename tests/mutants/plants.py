@@ -5,7 +5,7 @@ from mutants.mutant import Mutant
 FOLLOWING = "symfric/integrator/equations/following.py"
 CONSTANTS = "symfric/integrator/equations/expressions.py"
 PLANT, LOOPS = "symfric/integrator/plant.py", "symfric/integrator/running/plants.py"
-EVENTFUL = "symfric/integrator/running/eventful_plants.py"
+EVENTFUL = "symfric/integrator/many/plants.py"
 LANES = "symfric/integrator/many/plants.py"
 T_FOLLOWING = ("tests/symfric/integrator/equations/test_following.py",)
 T_CONSTANTS = ("tests/symfric/integrator/equations/test_constants.py",)

@@ -24,9 +24,10 @@ from symfric.integrator.running.crossings import (
     RESTART,
     SOON,
     Crossings,
+    Isolation,
     Memory,
+    passed,
 )
-from symfric.integrator.running.isolation import Isolation, passed
 from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ from symfric.foundation.numeric import address
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
+from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.events import Eventful
-from symfric.integrator.running.outputs import Outputs
 from symfric.integrator.running.search import search_source
 from symfric.integrator.step.layout import Given, State
 
