@@ -29,6 +29,7 @@ RECORD = "symfric/integrator/running/record.py"
 DIAGNOSIS = "symfric/integrator/running/diagnosis.py"
 T_DIAGNOSIS = ("tests/symfric/integrator/running/test_diagnosis.py",)
 ENSEMBLE = "symfric/integrator/ensemble.py"
+GIVEN = "symfric/integrator/many/given.py"
 
 WRITTEN = (
     Mutant(
@@ -146,7 +147,7 @@ WRITTEN = (
         'if False:\n        return ""', T_DIAGNOSIS,
     ),
     Mutant(
-        "inputs of an ensemble have no units", ENSEMBLE,
+        "inputs of an ensemble have no units", GIVEN,
         'for what, group in (("x0", model.x), ("u", model.u)):',
         'for what, group in (("x0", model.x),):', T_STUDIES,
     ),

@@ -81,11 +81,6 @@ def pieces_of(records: Array, n: int) -> Dense:
     )
 
 
-def from_records(records: Array, n: int) -> Dense:
-    """Pieces of records whose buffer may be written over."""
-    return pieces_of(records.copy(), n)
-
-
 def join(pieces: list[Dense]) -> Dense:
     """Pieces of several runs, in order."""
     if len(pieces) == 1:
@@ -132,6 +127,12 @@ class Outputs:
         if end > self.found:
             self.values[:, self.found : end] = piece(self.times[self.found : end])
             self.found = end
+
+    def stand(self, t: float, y: Array) -> None:
+        """Values at the times up to `t` [s] that are left: a run stands there with `y`."""
+        end = int(np.searchsorted(self.times, t, side="right"))
+        self.values[:, self.found : end] = y[:, None]
+        self.found = max(self.found, end)
 
     def back_to(self, t: float) -> None:
         """Forget what lies behind `t` [s]: steps that were interrupted before they were kept."""
