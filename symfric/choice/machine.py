@@ -18,7 +18,7 @@ from symfric.foundation.numeric import is_number
 from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.inputs import Input, input_data
-from symfric.integrator.running.built import built
+from symfric.integrator.running.integrator import built
 from symfric.laws import BrownMcPhee, Law
 from symfric.model import Model
 from symfric.scenes import Scene

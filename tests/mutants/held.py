@@ -116,7 +116,7 @@ HELD = (
         ("tests/symfric/laws/composed/test_normalised.py",),
     ),
     Mutant(
-        "friction that adds energy is not said", "symfric/integrator/running/gains.py",
+        "friction that adds energy is not said", "symfric/integrator/running/doubts.py",
         "steady[worst] * slip[worst] < 0", "steady[worst] * slip[worst] > 0", T_DOUBTS,
     ),
     Mutant(
