@@ -19,7 +19,7 @@ from symfric.foundation.parameters import Parameter, parameters
 from symfric.foundation.style import COLOURS
 from symfric.model import Contact
 from symfric.page import html
-from symfric.page.scale import around
+from symfric.page.svg import around
 from symfric.page.svg import Path as Line
 from symfric.page.svg import chart
 from symfric.results.kinds import is_mechanism, norms

@@ -16,7 +16,7 @@ from symfric.foundation.shown import Shown, Table, among, counted
 from symfric.model.shown import friction
 from symfric.results.energy import EnergyBalance, energy_balance
 from symfric.results.signals import Signals
-from symfric.results.tables import module
+from symfric.results.stored import module
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
