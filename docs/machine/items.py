@@ -13,7 +13,7 @@ from docs.machine.names import linked
 from docs.machine.rst import first_line, sentence, to_rst
 from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, law_name, parameters
 from symfric.cli.laws import costs
-from symfric.figures.magnitudes import phenomena
+from symfric.figures.data import phenomena
 from symfric.foundation.parameters import options
 from symfric.laws import PHENOMENA, AnyLaw
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum

@@ -17,9 +17,9 @@ from sphinx.addnodes import pending_xref
 from sphinx.util import logging
 from sphinx.util.math import get_node_equation_number
 
-from docs.machine.api_pages import Place
-from docs.machine.api_pages import place as documented
 from docs.machine.generated import make_all
+from docs.machine.lists import Place
+from docs.machine.lists import place as documented
 from docs.machine.made import MADE, make_page_pictures, place
 from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE

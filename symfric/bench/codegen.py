@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 from symfric.bench import table
 from symfric.bench.codegen_runs import compensation, units
@@ -28,10 +28,6 @@ from symfric.foundation.parameters import check_names
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
 from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import Arm, Drive, Rabinowicz, rabinowicz
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
 """Elements of a tenth of the friction each, of stiffnesses over three decades."""
@@ -290,11 +286,9 @@ class CodegenBenchmark(table.Report):
                 yield table.Table(section.title, section.head, rows)
             yield from (f"{name}: {note}" for note in section.notes)
 
-    def plot(self, path: str | Path) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """How far each number is from its goal; right of the line it is worse."""
-        from symfric.bench.pictures import plot_goals  # noqa: PLC0415  (matplotlib is slow)
-
-        return plot_goals(((g.what, g) for s in self.sections.values() for g in s.goals), path)
+        return "goals", ((g.what, g) for s in self.sections.values() for g in s.goals)
 
 
 def bench_codegen(

@@ -8,17 +8,13 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Literal, NamedTuple, final
+from typing import Any, Literal, NamedTuple, final
 
 from identification import Dataset, Fit, Fitted, InverseDynamics
 from symfric.bench import table
 from symfric.bench.file_campaign import File, campaign
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import SolveError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 CASES = {
     "lugre": "memory",
@@ -73,11 +69,9 @@ class IdentificationBenchmark(table.Report):
              "note": "note"},
         )  # fmt: skip
 
-    def plot(self, path: str | Path) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """How far each number is from its goal; right of the line it is worse."""
-        from symfric.bench.pictures import plot_goals  # noqa: PLC0415  (matplotlib is slow)
-
-        return plot_goals(((f"{row.case}: {row.what}", row) for row in self.rows), path)
+        return "goals", ((f"{row.case}: {row.what}", row) for row in self.rows)
 
 
 def bench_identification(

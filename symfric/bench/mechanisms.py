@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.timing import best_time, compile_time
+from symfric.bench.table import best_time, compile_time
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.equations.initial import consistent, first_guess

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from symfric.choice.friction import Friction as Friction
     from symfric.choice.nature import NEEDS as NEEDS
     from symfric.choice.ranking import Row as Row
-    from symfric.choice.result import Choice as Choice
+    from symfric.choice.select import Choice as Choice
     from symfric.choice.select import select as select
 else:
     hand_out(
@@ -16,8 +16,7 @@ else:
         {
             "symfric.choice.friction": "Friction",
             "symfric.choice.nature": "NEEDS",
-            "symfric.choice.result": "Choice",
             "symfric.choice.ranking": "Row",
-            "symfric.choice.select": "select",
+            "symfric.choice.select": "Choice select",
         },
     )

@@ -18,7 +18,7 @@ from symfric.cli.options import (
     option,
 )
 from symfric.figures import FIGURES, FigureData, compare
-from symfric.figures.magnitudes import NORMAL_FORCE, parts, phenomena
+from symfric.figures.data import NORMAL_FORCE, parts, phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population

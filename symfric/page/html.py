@@ -1,4 +1,4 @@
-"""Pieces of one self-contained page, and its style sheet; everything that comes from a user is escaped here."""
+"""Pieces of one self-contained page, and its style sheet; text of a user is escaped here."""
 
 from collections.abc import Iterable, Sequence
 from html import escape

@@ -16,8 +16,8 @@ from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.style import COLOURS, EDGE, colour, line
 from symfric.foundation.units import clock, readable
 from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION
-from symfric.results.signals import Signals
 from symfric.results.kinds import Group, every, friction_laws, kinds, main
+from symfric.results.signals import Signals
 
 Array = NDArray[np.float64]
 CHOICES = ("main", "all")

@@ -19,9 +19,8 @@ from symfric.foundation.parameters import Parameter, parameters
 from symfric.foundation.style import COLOURS
 from symfric.model import Contact
 from symfric.page import html
-from symfric.page.svg import around
 from symfric.page.svg import Path as Line
-from symfric.page.svg import chart
+from symfric.page.svg import around, chart
 from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory
 

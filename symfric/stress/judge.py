@@ -22,22 +22,27 @@ import numpy as np
 from symfric.foundation.status import SolveError, Status
 from symfric.results.trajectory import Trajectory
 from symfric.stress.cases import Case
-from symfric.stress.measures import (
+from symfric.stress.problem import (
     RIGHT,
+    TIMES,
+    WORK,
+    Answer,
+    Problem,
+    States,
     amplification,
+    answered,
     apart,
     at_steps,
     attempt,
     distance,
     of,
     other_method,
+    problem,
     table,
     third_method,
     tolerances,
     worst_step,
 )
-from symfric.stress.problem import TIMES, WORK, Problem, problem
-from symfric.stress.refereed import Answer, States, answered
 
 CLASSES = {
     "right": "as the reference, within ten tolerances",

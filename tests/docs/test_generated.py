@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from docs.machine import bench_pages, items, lists
-from docs.machine.api_pages import pages as api_pages
-from docs.machine.api_pages import place
 from docs.machine.generated import stale, write
+from docs.machine.lists import place
+from docs.machine.lists import reference_pages as api_pages
 from docs.machine.names import catalogue, known, linked
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
-from symfric.cli.commands import COMMANDS, prose_and_examples
+from symfric.cli.app import COMMANDS, prose_and_examples
 from symfric.scenes import ALL_SCENES
 
 

@@ -2,7 +2,7 @@
 
 from mutants.mutant import Mutant
 
-BELT = "symfric/gallery/belt.py"
+BELT = "symfric/gallery/shared.py"
 MACHINES = "symfric/gallery/self_tuning/machines.py"
 ORACLE = "symfric/gallery/self_tuning/machines.py"
 PLATE = "symfric/gallery/plate.py"

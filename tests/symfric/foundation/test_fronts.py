@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 import symfric
-from symfric.cli.commands import COMMANDS, MODULES
+from symfric.cli.app import COMMANDS, MODULES
 
 ROOT = Path(symfric.__file__).parent
 LAZY = [p for p in ROOT.rglob("__init__.py") if "hand_out(" in p.read_text(encoding="utf-8")]
