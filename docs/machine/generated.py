@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from docs.machine import bench_pages, items, lists, made, rst
+from docs.machine import items, lists, made, measure, rst
 from docs.machine.made import MADE, code_hash, code_of, digest, kept
 from docs.machine.names import linked
 from docs.machine.pages import DOCS, ROOT
@@ -170,8 +170,8 @@ def make_all(say: Callable[[str], None]) -> list[str]:
     failed += made.draw_all("scenes", items.ALL_SCENES, items.draw_scene, say)
     write("examples", lists.example_pages())
     write("reference", reference())
-    write("benchmarks", {"index": bench_pages.page()})
-    bench_pages.write_interop()
+    write("benchmarks", {"index": measure.page()})
+    measure.write_interop()
     failed += make_gallery(say)
     write("gallery", gallery_pages())
     return failed

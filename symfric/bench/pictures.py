@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from symfric.bench.table import Judged
 from symfric.figures import FigureData
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import COLOURS, MARKERS, colour, dash
@@ -104,8 +103,13 @@ def plot_regularisation(rows: Sequence[Any], path: str | Path | None = None) -> 
     return save(figure, path)
 
 
-def plot_goals(rows: Iterable[tuple[str, Judged]], path: str | Path | None) -> Figure:
-    """How many decades each number lies beyond its goal, a bar each; left of zero it is met."""
+def plot_goals(rows: Iterable[tuple[str, Any]], path: str | Path | None) -> Figure:
+    """How many decades each number lies beyond its goal, a bar each; left of zero it is met.
+
+    Args:
+        rows: names, and numbers with their goals (`symfric.bench.table.Judged`).
+        path: image file.
+    """
     known = [(name, goal) for name, goal in rows if goal.decades == goal.decades]
     figure, (axis,) = panels(1, 8.0, 0.5 + 0.25 * len(known))
     for name, goal in known:

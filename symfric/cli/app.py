@@ -39,7 +39,7 @@ COMMANDS = {
     "stress": "Judge runs of random laws in random scenes.",
 }
 """What there is, and the first line of each."""
-MODULES = {"report": "run"}
+MODULES = dict.fromkeys(("bench", "gallery", "stress"), "campaigns") | {"report": "run"}
 """Commands that do not stand in a module of their own name."""
 
 SETTINGS: dict[str, Any] = {

@@ -135,7 +135,7 @@ SHOWN = (
     ),
     Mutant(
         "a gallery with failures ends well",
-        "symfric/cli/gallery.py",
+        "symfric/cli/campaigns.py",
         "    if done.failures:\n        raise typer.Exit(1)",
         "    pass",
         T_COMMAND,
