@@ -23,7 +23,7 @@ ASIDE = ROOT / "symfric" / "gallery" / "pages.py"
 
 
 def quick() -> bool:
-    """Whether figures are computed at reduced size."""
+    """True if figures are computed at reduced size."""
     return os.environ.get("SYMFRIC_DOCS", "") == "quick"
 
 

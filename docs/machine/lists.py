@@ -114,7 +114,7 @@ COMMAND = re.compile(r"symfric ([\w-]+)\b")
 
 
 def place(text: str) -> Place | None:
-    """Where what stands between backticks is documented; None where it is no name of ours."""
+    """The place that documents a name between backticks; None if it is no name of ours."""
     bare = text.removesuffix("()")
     if bare in ALL_LAWS or bare in POPULATIONS or bare in MADE_OF_LAWS:
         return "std", "doc", f"/laws/{bare}"
@@ -241,7 +241,7 @@ LIMITS = re.compile(r"^(?:Limits|Not valid): (.*?)(?=\n\n|\n[A-Z][a-z]+:|\Z)", r
 
 
 def limits(item: Any) -> str:
-    """What a docstring says about limits, "" for nothing."""
+    """The limits that a docstring states, "" for none."""
     return " ".join(" ".join(found.split()) for found in LIMITS.findall(getdoc(item) or ""))
 
 
@@ -281,7 +281,7 @@ ASIDE = ("laws", "gallery", "bench", "stress", "cli")
 
 
 def literature_page() -> str:
-    """How to cite, then laws, figures and methods with their sources."""
+    """Citation of symfric, then laws, figures and methods with their sources."""
     text = rst.title("Literature, and how to cite")
     text += cite()
     text += rst.title("Laws", "-")
@@ -300,7 +300,7 @@ def literature_page() -> str:
 
 
 def cite() -> str:
-    """What to put into a paper."""
+    """The entry for a paper."""
     words = "Name the version, and the paper of the law that you took.\n\n"
     entry = f"""@software{{symfric,
   title   = {{symfric: friction laws as {{CasADi}} expressions}},

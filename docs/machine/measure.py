@@ -211,7 +211,7 @@ def moves(lines: Sequence[Row]) -> str:
 
 
 def cell(line: Row) -> str:
-    """What one tool made of the move: its miss, iterations and seconds, or why it ended."""
+    """Miss, iterations and seconds of one tool in the move, or the reason why it ended."""
     if line[""] or line["miss"] in ("nan", "-"):
         return rst.plain(line[""] or "none")
     miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")
@@ -231,7 +231,7 @@ def integrators(lines: Sequence[Row]) -> str:
 
 
 def off(line: Row) -> str:
-    """How far an integrator is off and how long it takes, or that it stops."""
+    """Error and time of an integrator, or that it stops."""
     if line[""]:
         return "stops"
     if line["error [m]"] == "-":

@@ -184,7 +184,7 @@ def link(app: Any, tree: nodes.document) -> None:
 
 
 def ancestors(node: nodes.Node) -> list[nodes.Node]:
-    """What holds a node, the nearest first."""
+    """The nodes around a node, the nearest first."""
     found: list[nodes.Node] = []
     while node.parent is not None:
         node = node.parent

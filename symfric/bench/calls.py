@@ -1,4 +1,4 @@
-"""Where users feel speed beside one long run: many short calls, events, gradients, signals, import.
+"""Speed besides one long run: many short calls, events, gradients, signals, import.
 
 Times are processor time of whole calls from Python, the shortest of rounds in which all contenders
 take turns; ratios are over the first of each task, which is ours.

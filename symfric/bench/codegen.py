@@ -188,7 +188,7 @@ class EmbeddedRow:
 
     @property
     def ok(self) -> bool:
-        """Whether it was measured, all numbers are finite, and none is wrong."""
+        """True if it was measured, all numbers are finite, and none is wrong."""
         return self.measured.ok and self.wrong == 0
 
     def to_dict(self) -> dict[str, Any]:
@@ -199,7 +199,7 @@ class EmbeddedRow:
 @final
 @dataclass(frozen=True, eq=False)
 class EmbeddedBenchmark(table.Report):
-    """What was measured; `advice` says which tools are absent, and where to get them."""
+    """Measurements on cores; `advice` names the tools that are absent, and their sources."""
 
     rows: tuple[EmbeddedRow, ...]
     advice: str = ""
@@ -267,7 +267,7 @@ note that says which."""
 @final
 @dataclass(frozen=True, eq=False)
 class CodegenBenchmark(table.Report):
-    """What was measured, section by section."""
+    """Measurements by section."""
 
     sections: Mapping[str, Section] = field(default_factory=dict[str, Section])
 
@@ -287,7 +287,7 @@ class CodegenBenchmark(table.Report):
             yield from (f"{name}: {note}" for note in section.notes)
 
     def drawn(self) -> tuple[Any, ...]:
-        """How far each number is from its goal; right of the line it is worse."""
+        """The distance of each number from its goal; right of the line it is worse."""
         return "goals", ((g.what, g) for s in self.sections.values() for g in s.goals)
 
 

@@ -55,7 +55,7 @@ class Row(table.Judged):
 @final
 @dataclass(frozen=True, eq=False)
 class IdentificationBenchmark(table.Report):
-    """What was measured, case by case."""
+    """Measurements by case."""
 
     rows: tuple[Row, ...]
 
@@ -70,7 +70,7 @@ class IdentificationBenchmark(table.Report):
         )  # fmt: skip
 
     def drawn(self) -> tuple[Any, ...]:
-        """How far each number is from its goal; right of the line it is worse."""
+        """The distance of each number from its goal; right of the line it is worse."""
         return "goals", ((f"{row.case}: {row.what}", row) for row in self.rows)
 
 
@@ -106,7 +106,7 @@ EVERY = 5
 
 
 class Outcome(NamedTuple):
-    """How a file ended.
+    """The outcome for one file.
 
     Attributes:
         file: its name.
@@ -130,7 +130,7 @@ def outcomes(quick: bool = False, seed: int = 3) -> Iterator[Outcome]:
 
 
 def outcome(file: File, folder: Path) -> Outcome:
-    """What becomes of one file."""
+    """Read, check and fit one file."""
     path = folder / f"log{file.suffix}"
     path.write_bytes(file.content)
     try:
@@ -164,7 +164,7 @@ def _judged(path: Path, file: File) -> tuple[str, str]:
 
 
 def _is_close(fit: Fitted, name: str) -> bool:
-    """Whether a parameter is right, or is said not to be told by the data."""
+    """True if a parameter is right, or is reported as not identifiable."""
     estimate = fit.parameters[name]
     error = abs(estimate.value - TRUTH[name])
     low, high = estimate.low, estimate.high

@@ -60,7 +60,7 @@ class Case:
 
     @property
     def times(self) -> Array:
-        """Where positions are compared [s]."""
+        """Times at which positions are compared [s]."""
         return np.linspace(0.0, self.t_end, 26)[1:]
 
 

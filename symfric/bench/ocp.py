@@ -254,7 +254,7 @@ def _middle(values: Sequence[float]) -> float:
 
 
 def attempt_of(solution: Solution, time_s: float) -> Attempt:
-    """What `ocp.solve` found, in the same terms."""
+    """The solution of `ocp.solve` as an `Attempt`."""
     motion, meshes, controls = solution.motions[0], [], []
     for stretch in motion.phases:
         inside = (motion.t_control >= stretch.begin - 1e-12) & (motion.t_control < stretch.end)

@@ -104,7 +104,7 @@ def plot_regularisation(rows: Sequence[Any], path: str | Path | None = None) -> 
 
 
 def plot_goals(rows: Iterable[tuple[str, Any]], path: str | Path | None) -> Figure:
-    """How many decades each number lies beyond its goal, a bar each; left of zero it is met.
+    """Decades by which each number exceeds its goal, a bar each; left of zero it is met.
 
     Args:
         rows: names, and numbers with their goals (`symfric.bench.table.Judged`).

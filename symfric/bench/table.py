@@ -84,7 +84,7 @@ class Judged:
 
     @property
     def met(self) -> bool:
-        """Whether the goal is met; NaN meets none."""
+        """True if the goal is met; NaN meets none."""
         return self.value <= self.goal if self.better == "<=" else self.value >= self.goal
 
     @property

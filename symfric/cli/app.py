@@ -108,7 +108,7 @@ class Commands(TyperGroup):
         return typer.main.get_command(one)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """What the first word calls; a word that calls nothing is refused as everywhere."""
+        """The command of the first word; an unknown word is refused as everywhere."""
         if not (args[0] in COMMANDS or ctx.resilient_parsing or args[0].startswith("-")):
             from symfric.foundation.checks import check_names  # noqa: PLC0415  (CasADi is slow)
 
@@ -158,7 +158,7 @@ class Command(TyperCommand):
 
 
 def is_option(parameter: Any) -> bool:
-    """Whether a parameter of a command has a name on the line."""
+    """True if a parameter of a command has a name on the line."""
     return parameter.opts[0].startswith("-")
 
 
@@ -174,7 +174,7 @@ def argument_shown(parameter: Any) -> str:
 
 
 def prose_and_examples(text: str) -> tuple[str, list[str]]:
-    """What a command says of itself, and the lines of its examples."""
+    """The prose of a command's docstring, and the lines of its examples."""
     paragraphs = cleandoc(text).split("\n\n")
     examples = [" ".join(p.split())[len(EXAMPLE) :] for p in paragraphs if p.startswith(EXAMPLE)]
     return "\n\n".join(p for p in paragraphs if not p.startswith(EXAMPLE)), examples
@@ -328,6 +328,6 @@ def _parameter_shown(parameter: Any) -> str:
 
 
 def _value_given(error: Any) -> str:
-    """What was given, from the sentence or from the error behind it."""
+    """The given value, from the sentence or from the error behind it."""
     told = search(r"^'(.*)' is not", error.message)
     return told[1] if told else str(error.__cause__.errors()[0]["input"])

@@ -182,7 +182,7 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
 
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
-    """What `--json` holds."""
+    """Content of `--json`."""
     books: dict[str, Any] = {}
     if is_mechanism(trajectory.model):
         books["energy_balance"] = trajectory.energy_balance().to_dict()

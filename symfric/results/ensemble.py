@@ -172,7 +172,7 @@ class Ensemble(Showing):
     def _at(
         self, where: str, names: Sequence[str], at: float | str
     ) -> tuple[str, dict[str, Array]]:
-        """What the place `at` is called, and name -> values there, shape (members,)."""
+        """The name of the place `at`, and name -> values there, shape (members,)."""
         if isinstance(at, str):
             checks.choice(where, at, PLACES)
             if at == "end":
@@ -292,7 +292,7 @@ def load_ensemble(path: str | Path) -> Ensemble:
 
 
 def _shown(runs: Ensemble) -> Shown:
-    """How many members, how they ended, and least, middle and greatest value at the last time."""
+    """Number of members, their ends, and least, middle and greatest value at the last time."""
     members, times = runs.attempts.size, runs.t.shape[-1]
     first, last = np.min(runs.t), np.max(runs.t)
     span = f"{counted(times, 'time')} from {first:g} to {last:g} s" if times > 1 else f"{last:g} s"

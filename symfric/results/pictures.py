@@ -169,7 +169,7 @@ def _title(trajectories: Mapping[str, Signals]) -> str:
 
 
 def _legend(figure: Figure, trajectories: Mapping[str, Signals], alone: bool) -> None:
-    """What line belongs to what simulation, below the panels; nothing for one without a name."""
+    """Legend of the simulations below the panels; nothing for one without a name."""
     first = next(iter(trajectories.values()))
     if list(trajectories) == [first.scene]:
         return
@@ -301,7 +301,7 @@ def _bands(axis: Axes, t: Array, values: Array) -> None:
 
 
 def _histogram(axis: Axes, values: Array) -> None:
-    """How often which end."""
+    """Histogram of the ends."""
     finite = values[np.isfinite(values)]
     spread = finite.size > 1 and np.ptp(finite) > 0
     axis.hist(finite, bins="auto" if spread else 1, color=colour(0), alpha=0.7)

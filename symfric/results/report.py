@@ -88,7 +88,7 @@ def report(
 
 
 def _verdict(runs: Mapping[str, Trajectory]) -> str:
-    """How the runs ended."""
+    """The ends of the runs."""
     ended = all(run.status.ok for run in runs.values())
     good = ended and not any(run.doubts for run in runs.values())
     said = [f"{name}: {run.message}" for name, run in runs.items()]

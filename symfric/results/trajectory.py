@@ -166,7 +166,7 @@ class Trajectory(Signals):
     keep: "Callable[[Trajectory], Kept] | None" = None
 
     def shown(self) -> Shown:
-        """How it ended, and every signal with its extremes."""
+        """The end of the run, and every signal with its extremes."""
         return _shown(self)
 
     def thumbnail(self) -> "Figure":
@@ -176,7 +176,7 @@ class Trajectory(Signals):
         return thumbnail(self)
 
     def energy_balance(self) -> EnergyBalance:
-        """Where the energy of a mechanism went, and what the books do not explain.
+        """The balance of a mechanism's energy: work by cause, and the unexplained rest.
 
         Raises:
             ValueError: a model that does not keep books of its energy.
@@ -358,7 +358,7 @@ def _shown(run: Signals) -> Shown:
 
 
 def _measured(run: Signals) -> list[str]:
-    """What was measured of its errors."""
+    """The measured errors in words."""
     counts = run.statistics
     if not isfinite(counts.error):
         return []

@@ -1,4 +1,4 @@
-"""How a case is judged: against a referee that shares no code with symfric, or by other methods.
+"""Verdicts on cases, by a referee that shares no code with symfric, or by other methods.
 
     tolerance of a state = rtol max|x| + atol,   error = max over states and times of
                                                          |run - truth| / tolerance
@@ -78,7 +78,7 @@ RAW = ("Traceback", ".cpp:", "casadi::", "Assertion")
 @final
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a case.
+    """The verdict on a case.
 
     Attributes:
         kind: one of `CLASSES`.
@@ -102,7 +102,7 @@ class Verdict:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Verdict":
-        """What `to_dict` wrote."""
+        """Restore the output of `to_dict`."""
         return cls(**data)
 
 

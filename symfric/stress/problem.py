@@ -1,4 +1,4 @@
-"""What the data of a case mean, the referee's answer to it, and what judges measure."""
+"""The model of a case, the referee's answer to it, and the measures of the judge."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -54,7 +54,7 @@ class Problem:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Where runs are compared [s]."""
+        """Times at which runs are compared [s]."""
         return np.linspace(self.case.t_start, self.case.t_end, TIMES)
 
     def run(
@@ -296,7 +296,7 @@ def table(run: Trajectory, times: Array) -> Array:
 
 
 def amplification(ready: Problem, y: Array, limit: int, answer: Answer | None = None) -> float:
-    """What becomes of one tolerance [tolerances], put in at the start or on the way of y."""
+    """Growth of one tolerance [tolerances] that is added at the start or on the way of y."""
     size, worst = tolerances(ready, y), 1.0
     for k in STATIONS:
         times, ends = ready.times[k:], list[Array]()
