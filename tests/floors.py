@@ -73,12 +73,6 @@ FLOORS: dict[str, set[str]] = {
         "symfric.integrator.running",
         "symfric.integrator.step",
     },
-    "symfric.integrator.peers": {
-        "symfric.foundation",
-        "symfric.model",
-        "symfric.integrator.equations",
-        "symfric.integrator.running",
-    },
     "symfric.integrator": {"symfric.foundation", "symfric.model", "symfric.results"},
     "symfric.figures": {
         "symfric.foundation",

@@ -101,7 +101,7 @@ class Browser:
         return json.loads(first)
 
     def show(self, width: int, dark: bool = False, as_print: bool = False) -> None:
-        """How pages are shown from now on."""
+        """Set how pages are shown from now on."""
         self.ask(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=900, deviceScaleFactor=1, mobile=width < 600,
@@ -119,7 +119,7 @@ class Browser:
             self.events.append(self.hear())
 
     def value(self, expression: str) -> Any:
-        """What a piece of JavaScript gives, once it is there."""
+        """The value of a piece of JavaScript, once it is there."""
         seen = self.ask(
             "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
         )
@@ -173,7 +173,7 @@ KINDS = {
 
 
 def said(event: dict[str, Any]) -> str:
-    """What an event says against a page, "" for nothing."""
+    """The problem of a page that an event reports, "" for none."""
     method, what = event.get("method", ""), event.get("params", {})
     if method == "Runtime.exceptionThrown":
         return f"exception: {what['exceptionDetails'].get('exception', {}).get('description', '')}"
@@ -210,7 +210,7 @@ def problems(
 
 
 def searched(browser: Browser, folder: Path, patience: float = 20.0) -> Iterator[str]:
-    """What is wrong with the search, which runs in the browser and asks nobody."""
+    """Problems of the search, which runs in the browser alone."""
     page = folder / "search.html"
     if not page.exists():
         return

@@ -58,13 +58,13 @@ def digest(texts: Iterable[str]) -> str:
 
 
 def is_fresh(folder: Path, key: str) -> bool:
-    """Whether `folder` was made with `key`, or was made at all where what is there is kept."""
+    """True if `folder` was made with `key`, or was made at all where pictures are kept."""
     stamp = folder / ".key"
     return stamp.is_file() and (kept() or stamp.read_text() == key)
 
 
 def kept() -> bool:
-    """Whether SYMFRIC_DOCS=keep: pictures stay as they are, for those who write text."""
+    """True for SYMFRIC_DOCS=keep: pictures stay as they are, for those who write text."""
     return os.environ.get("SYMFRIC_DOCS", "") == "keep"
 
 

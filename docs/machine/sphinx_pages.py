@@ -17,9 +17,9 @@ from sphinx.addnodes import pending_xref
 from sphinx.util import logging
 from sphinx.util.math import get_node_equation_number
 
-from docs.machine.api_pages import Place
-from docs.machine.api_pages import place as documented
 from docs.machine.generated import make_all
+from docs.machine.lists import Place
+from docs.machine.lists import place as documented
 from docs.machine.made import MADE, make_page_pictures, place
 from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE
@@ -184,7 +184,7 @@ def link(app: Any, tree: nodes.document) -> None:
 
 
 def ancestors(node: nodes.Node) -> list[nodes.Node]:
-    """What holds a node, the nearest first."""
+    """The nodes around a node, the nearest first."""
     found: list[nodes.Node] = []
     while node.parent is not None:
         node = node.parent

@@ -256,7 +256,7 @@ def _compensated(smaller: float, hunting: float) -> str:
 
 
 def _size() -> str:
-    """What the C of the compensator costs on a small core."""
+    """The cost of the compensator's C on a small core."""
     whole, alone = on_core(trials()[0].blocks[0]), on_core(law_block(BELIEVED))
     if not whole.ok:
         return f"No instructions counted: {whole.status}"

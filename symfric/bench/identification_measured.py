@@ -330,7 +330,7 @@ def static_laws() -> list[str]:
 
 
 def outcome(name: str, data: Dataset) -> str:
-    """What becomes of a law: "fits", "refused", or what went wrong."""
+    """Fit a law: "fits", "refused", or the failure."""
     try:
         found = Fit(InverseDynamics(), name, data).solve(throw=False)
     except ValueError as error:

@@ -102,7 +102,7 @@ def case(seed: int) -> Case:
 
 
 def within(fit: Fitted) -> bool:
-    """Whether all six are within 5 % and three standard errors of the truth."""
+    """True if all six are within 5 % and three standard errors of the truth."""
     for name, value in TRUTH.items():
         found = fit.parameters[name]
         error = found.standard_error or 0.0

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
 from math import inf, nan
-from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -31,15 +30,11 @@ from symfric.bench.mechanisms import (
     norms,
     scaling,
 )
-from symfric.bench.timing import best_time, unwarned
+from symfric.bench.table import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 OURS, LOOP, EXUDYN = "symfric", "symfric loop", "exudyn"
 ERRORS = (1e-4, 2e-5, 1e-5)
@@ -65,7 +60,7 @@ class Case:
 
     @property
     def times(self) -> Array:
-        """Where positions are compared [s]."""
+        """Times at which positions are compared [s]."""
         return np.linspace(0.0, self.t_end, 26)[1:]
 
 
@@ -234,13 +229,9 @@ class MultibodyBenchmark(table.Report):
             return {}
         return {column: exponent(self.chains, column) for column in ("instructions", "step_s")}
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """Work-precision diagram: time against error, a panel per case."""
-        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
-
-        return plot_work_precision(
-            ((r.case, r.integrator, r.error, r.time_s) for r in self.runs), path
-        )
+        return "work_precision", ((r.case, r.integrator, r.error, r.time_s) for r in self.runs)
 
 
 def bench_multibody(

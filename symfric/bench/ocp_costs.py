@@ -20,7 +20,7 @@ from ocp.solvers.methods import Ipopt
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise
-from symfric.bench.timing import interleaved
+from symfric.bench.table import interleaved
 from symfric.foundation.compiler import find_compiler
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Model

@@ -18,8 +18,7 @@ measured against its own limit, and a law with mu_s = mu_d against set-valued fr
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import log, nan
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,9 +45,6 @@ from symfric.laws import (
 )
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import FourMass, PendulumBox, Rabinowicz, Scene, SliderCrank
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 RTOLS = (1e-5, 1e-6, 1e-8)
@@ -208,11 +204,9 @@ class RegularisationBenchmark(table.Report):
                 ],
             )  # fmt: skip
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """Error against width above, CPU time below, a column per case, a line per tolerance."""
-        from symfric.bench.pictures import plot_regularisation  # noqa: PLC0415
-
-        return plot_regularisation(self.rows, path)
+        return "regularisation", self.rows
 
 
 def bench_regularisation(

@@ -17,8 +17,7 @@ from dataclasses import dataclass, field
 from math import inf, nan
 from typing import Any, final
 
-from symfric.choice.machine import FAILURES, Candidate, Machine
-from symfric.choice.reference import Reference
+from symfric.choice.machine import FAILURES, Candidate, Machine, Reference
 from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
 from symfric.figures.regularisation import Sample, apart
 from symfric.foundation.status import SolveError, Status

@@ -35,7 +35,7 @@ DISTANCE, LIMIT = 0.05, 200.0
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one part of the demo left behind."""
+    """Files and numbers of one part of the demo."""
 
     title: str
     says: str

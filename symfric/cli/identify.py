@@ -55,7 +55,7 @@ RULES = {"log": log, "linear": linear}
 @final
 @dataclass(frozen=True)
 class Reading:
-    """How files are read, see `Dataset.read`; `resample`: as equal intervals, cut at gaps."""
+    """Options of `Dataset.read`; `resample`: to equal intervals, cut at gaps."""
 
     columns: dict[str, str] | list[str] | None
     units: dict[str, str] | str | None
@@ -284,7 +284,7 @@ def identify(
 @final
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What there is to show.
+    """Results to show.
 
     Attributes:
         fit: with its errors on other data.
@@ -299,7 +299,7 @@ class Found:
     failed: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """What `--json` holds: the fit, which `Fitted.from_json` reads, and more."""
+        """Content of `--json`: the fit, which `Fitted.from_json` reads, and more."""
         more: dict[str, Any] = {}
         if self.profiles:
             more["profiles"] = [p.to_dict() for p in self.profiles]

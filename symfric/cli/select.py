@@ -37,7 +37,7 @@ from symfric.cli.options import (
     option,
     with_settings,
 )
-from symfric.figures.magnitudes import phenomena
+from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import ALL_LAWS

@@ -13,8 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symfric.figures.data import Curve, FigureData, draw_curves
-from symfric.figures.magnitudes import Scales, phenomena, scales
+from symfric.figures.data import Curve, FigureData, Scales, draw_curves, phenomena, scales
 from symfric.figures.pushing import stiction
 from symfric.figures.sliding import dwell, hysteresis, lag, transition, velocity_step
 from symfric.foundation.panels import blank, dressed, grid, save

@@ -12,10 +12,9 @@ from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
-from symfric.integrator.many.plants import pays, side_by_side
+from symfric.integrator.many.plants import pays, side_by_side, with_events
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
-from symfric.integrator.running.eventful_plants import with_events
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import (
     AGAIN,

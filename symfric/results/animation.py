@@ -212,7 +212,7 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
 
 
 def _legend(figure: Figure) -> None:
-    """What the fill of a joint says."""
+    """Legend of the fill of joints."""
     entries = [
         Line2D([], [], linestyle="", marker="o", color=EDGE, markerfacecolor=fill, label=label)
         for fill, label in ((SLIDES, "slides"), (STICKS, "sticks"))
@@ -295,7 +295,7 @@ def _direction(axis: Array) -> str:
 
 
 def _style(stroke: Stroke) -> dict[str, Any]:
-    """How a stroke looks."""
+    """The look of a stroke."""
     shade = colour(stroke.body) if stroke.body >= 0 else EDGE
     styles: dict[str, dict[str, Any]] = {
         "path": {"color": shade, "linewidth": 0.8, "alpha": 0.35},

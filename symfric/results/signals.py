@@ -48,7 +48,7 @@ class Signals(Showing):
 
     @property
     def doubts(self) -> str:
-        """What its tolerances do not vouch for, in sentences; "" where nothing is known."""
+        """Errors that its tolerances do not bound, in sentences; "" where none are known."""
         return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What a simulation cost."""
+"""Cost of a simulation."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a simulation cost.
+    """Cost of a simulation.
 
     Attributes:
         backend: what ran it.

@@ -27,10 +27,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from symfric.choice.friction import Friction
-from symfric.choice.machine import Machine, machine_of
+from symfric.choice.machine import OWN, Machine, machine_of
 from symfric.choice.measured import Task, measured
 from symfric.choice.ranking import Row
-from symfric.choice.reference import OWN
 from symfric.choice.text import WIDTH
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError

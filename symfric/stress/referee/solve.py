@@ -94,7 +94,7 @@ class Question:
 
 
 def knows(law: str, scene: str) -> bool:
-    """Whether this law in this scene is written here."""
+    """True if this law in this scene is written here."""
     return law in LAWS and scene in SCENES and (law, scene) not in UNKNOWN
 
 

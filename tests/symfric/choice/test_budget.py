@@ -21,9 +21,8 @@ from symfric.choice.climb import (
     counted,
     nearest,
 )
-from symfric.choice.machine import Candidate
+from symfric.choice.machine import Candidate, Reference
 from symfric.choice.measured import _holds  # pyright: ignore[reportPrivateUsage]
-from symfric.choice.reference import Reference
 from symfric.choice.softness import Ladder, Rung
 from symfric.figures.regularisation import Sample
 from symfric.laws import LuGre, Stribeck

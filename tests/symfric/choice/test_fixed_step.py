@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric.choice.fixed_step import Motion, largest
 from symfric.choice.machine import Machine
+from symfric.choice.measured import Motion, largest
 from symfric.integrator import Input, Linear
 from symfric.laws import Viscous
 from symfric.scenes import Drive

@@ -1,70 +1,3 @@
-"""The search for events behind each accepted step, in C; in Python it is `running.events`."""
-
-from collections.abc import Iterable
-from string import Template
-
-from symfric.integrator.equations.initial import SURE
-from symfric.integrator.running.crossings import (
-    ALIKE,
-    FINER,
-    KEPT,
-    LEAST,
-    LOOKS,
-    RESTART,
-    SHARPER,
-    SOON,
-    STRAIGHT,
-    Crossings,
-)
-from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
-
-
-def search_source(crossings: Crossings | None, given: int) -> str:
-    """C of the search in an accepted step, to be called behind it; none without events.
-
-    `given` is the length of R.
-    """
-    if crossings is None:
-        return ""
-    functions, m = crossings.functions, len(crossings.resets)
-    return Template(_SEARCH).substitute(
-        n=crossings.record.n,
-        events=crossings.count,
-        looks=len(LOOKS) - 1,
-        resets=m,
-        row=crossings.record.width,
-        y0=crossings.record.y0.start,
-        y1=crossings.record.y1.start,
-        at_looks=", ".join(map(repr, LOOKS)),
-        directions=_table(crossings.directions),
-        terminal=_table(crossings.terminal),
-        by_event=_table(i for i, _ in crossings.resets),
-        of_state=_table(j for _, j in crossings.resets),
-        kept=KEPT,
-        alike=ALIKE,
-        finer=FINER,
-        sharper=repr(SHARPER),
-        soon=repr(SOON),
-        straight=repr(STRAIGHT),
-        restart=repr(RESTART),
-        least=repr(LEAST),
-        sure=repr(SURE),
-        growth=repr(GROWTH_MEMORY),
-        memory=State.MEMORY,
-        d=given - crossings.data,
-        h_max=Given.H_MAX,
-        follows=int(crossings.follows),
-        arg=max(f.sz_arg() for f in functions),
-        res=max(f.sz_res() for f in functions),
-    )
-
-
-def _table(values: Iterable[int]) -> str:
-    """Entries of a C array, which has at least one."""
-    return ", ".join(str(int(value)) for value in values) or "0"
-
-
-_SEARCH = """
 /* Zero crossings in an accepted step; M is what is remembered between steps. */
 enum { EVENTS = $events, LOOKS = $looks, RESETS = $resets, UNKNOWNS = $n, KEPT = $kept };
 enum { PHASE, TOLERANCE, COUNT, ALIKE, RESUME, TIMES };
@@ -382,4 +315,3 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
     *stop = 6;
   return kept ? CUT : DROPPED;
 }
-"""

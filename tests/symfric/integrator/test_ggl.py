@@ -7,9 +7,9 @@ import pytest
 
 from symfric import BrownMcPhee, Model, SolveError, simulate
 from symfric.integrator import simulate_by_peer
+from symfric.integrator.by_peer import stabilised
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.peers.ggl import stabilised
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import MechanismScene, Pendulum, Rabinowicz, SliderCrank
 
