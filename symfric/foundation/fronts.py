@@ -58,14 +58,14 @@ def hand_out(package: str) -> None:
     """
     front = sys.modules[package]
     source = vars(front)["__loader__"].get_source(package)
-    found = {
-        alias.asname or alias.name: node.module
-        for block in ast.parse(source).body
-        if isinstance(block, ast.If)
-        for node in block.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
+    found: dict[str, str] = {}
+    for block in ast.parse(source).body:
+        if isinstance(block, ast.If):
+            for line in block.body:
+                if isinstance(line, ast.ImportFrom) and line.module:
+                    names = [alias.asname or alias.name for alias in line.names]
+                    names = import_module(line.module).__all__ if names == ["*"] else names
+                    found |= dict.fromkeys(names, line.module)
     front.__dict__["_places"] = found
     front.__dict__["__all__"] = [*found]
     front.__class__ = Front

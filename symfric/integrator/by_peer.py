@@ -18,6 +18,8 @@ stabilised form of index 2 ("ggl"). Nothing is projected: the norms of the
 constraints among the results show what each of them makes of it.
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """Many runs of one model: over arrays of parameters and start values, on one machine or many."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor, Executor
@@ -292,7 +294,7 @@ class _Way:
     prepare: Callable[[slice], Any]
     solve: Callable[[Any], Solved]
     chunk: int = CHUNK
-    device: "OnDevice | None" = None
+    device: OnDevice | None = None
 
 
 def _way(

@@ -1,5 +1,7 @@
 """A plant: a model that goes from sample to sample with its inputs held."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any, final
 
@@ -47,13 +49,9 @@ class Plant:
     """
 
     def __init__(
-        self,
-        integrator: Integrator,
-        plants: Plants,
-        backend: str,
-        batch: int | None,
+        self, integrator: Integrator, plants: Plants, backend: str, batch: int | None,
         tolerance: float,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.model, self.dt = integrator.model, plants.dt
         self.failed: dict[int, tuple[Status, str]] = {}
         self._plants, self._batch, self._tolerance = plants, batch, tolerance
@@ -178,7 +176,7 @@ class Plant:
         self._seen = False
         return self._x.copy()
 
-    def copy(self) -> "Plant":
+    def copy(self) -> Plant:
         """A plant in the same state that goes its own way."""
         plants = self._plants.copy()
         other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
@@ -186,7 +184,7 @@ class Plant:
         other._own, other._places = self._own, list(self._places)
         return other
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Plant":
+    def __deepcopy__(self, memo: dict[int, Any]) -> Plant:
         return self.copy()
 
     @property

@@ -4,6 +4,8 @@ Loops over parameters call with the same settings again and again, and a short r
 than the checks of its arguments.
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -217,8 +219,8 @@ def simulate(
         x0: start values of states by name; the others start where the model says (bristles in
             steady sliding).
         u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time,
-            which is looked at on a grid of 8193 times for pulses that a step could leap over: name
-            those that are shorter in `times`.
+            sampled at 8193 times and within its jumps to detect short pulses; list those in
+            `times` that lie between two samples and leave no jump.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
         atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol, and

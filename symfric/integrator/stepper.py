@@ -1,5 +1,7 @@
 """A model as a plant for control loops and learning: inputs held, from sample to sample."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from symfric.foundation import checks

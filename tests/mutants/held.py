@@ -157,4 +157,14 @@ HELD = (
         "normal forces may depend on friction by any function", HOLDING,
         "if ca.depends_on(slopes, F):", "if False:", T_HOLDING,
     ),
+    Mutant(
+        "pulses within jumps of a function of time are leapt over",
+        "symfric/integrator/equations/expressions.py", "return tuple(middle[high].tolist())",
+        "return ()", ("tests/symfric/integrator/equations/test_onsets.py",),
+    ),
+    Mutant(
+        "peaks of short pulses are not hit", "symfric/integrator/equations/expressions.py",
+        "if height.max() > PULSE * height[-1]:", "if False:",
+        ("tests/symfric/integrator/equations/test_onsets.py",),
+    ),
 )  # fmt: skip

@@ -200,7 +200,7 @@ TRANSCRIPTION = (
 
 EMIT = (
     Mutant(
-        "operands lose their parentheses", "symfric/emitter/expressions.py",
+        "operands lose their parentheses", "symfric/emitter/c99.py",
         "return self.text if self.binds >= least else", "return self.text if True else", T_EMITTER,
     ),
     Mutant(
@@ -222,11 +222,11 @@ EMIT = (
         "(operand, max(repeats, 1))", "(operand, 1)", T_EMITTER,
     ),
     Mutant(
-        "a bool stands where a number is meant", "symfric/emitter/expressions.py",
+        "a bool stands where a number is meant", "symfric/emitter/c99.py",
         "if not self.logical[i]:\n", "if True:\n", T_EMITTER,
     ),
     Mutant(
-        "a parameter that spares a function stays variable", "symfric/codegen/blocks/folding.py",
+        "a parameter that spares a function stays variable", "symfric/codegen/blocks/variables.py",
         ">= least", ">= 0", ("tests/symfric/codegen/blocks/test_folding.py",),
     ),
     Mutant(

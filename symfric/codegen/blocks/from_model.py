@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.discretisation import of_method
-from symfric.codegen.blocks.folding import Fold, above_zero, variable, without_idle
 from symfric.codegen.blocks.from_law import step_variable
-from symfric.codegen.blocks.law_text import equations
+from symfric.codegen.blocks.texts import equations, of_method
+from symfric.codegen.blocks.variables import Fold, above_zero, variable, without_idle
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, Parametric, Variable, parameters
 from symfric.integrator.equations.initial import consistent

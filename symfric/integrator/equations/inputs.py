@@ -1,5 +1,7 @@
 """Inputs of a model over time: constants, expressions, sampled signals, and their rates."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -131,7 +133,7 @@ class InputData:
         """Number of the interval that holds each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
-    def stopping_at(self, times: ArrayLike) -> "InputData":
+    def stopping_at(self, times: ArrayLike) -> InputData:
         """The same inputs, with breaks at `times` [s], too; those outside the span are left out."""
         at = np.asarray(times, dtype=float)
         at = at[(at > self.breaks[0]) & (at < self.breaks[-1])]
@@ -192,7 +194,7 @@ def paced(inputs: InputData, model: Model) -> InputData:
     return inputs.stopping_at(times) if times else inputs
 
 
-def _written(model: Model, parts: "list[_Part]") -> tuple[ca.SX, ca.SX]:
+def _written(model: Model, parts: list[_Part]) -> tuple[ca.SX, ca.SX]:
     """Expression and data of inputs of this structure, written once and kept with the model."""
     known: dict[Hashable, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
     key = tuple(part.key for part in parts)

@@ -17,9 +17,8 @@ from typing import final
 
 import casadi as ca
 
-from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, Real, macro
+from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, Real, macro, representable
 from symfric.emitter.emit import emit
-from symfric.emitter.vanishing import representable
 from symfric.foundation.graph import graph
 
 
