@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.shown import Shown, Table, among, counted
-from symfric.model.shown import friction
+from symfric.model.model import friction
 from symfric.results.energy import EnergyBalance, energy_balance
 from symfric.results.signals import Signals
 from symfric.results.tables import module
