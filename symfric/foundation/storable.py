@@ -25,10 +25,10 @@ MODULES = (
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
 MOVED = {
+    "symfric.integrator.derivatives.seeds": "symfric.integrator.derivatives.path",
     "symfric.laws.base.curve": "symfric.laws.base.families",
     "symfric.laws.base.facts": "symfric.laws.base.law",
     "symfric.laws.base.sticking": "symfric.laws.base.families",
-    "symfric.integrator.derivatives.seeds": "symfric.integrator.derivatives.path",
     "symfric.laws.composed.normalised": "symfric.laws.composed.wrap",
     "symfric.laws.cost": "symfric.laws.composed.populations",
     "symfric.laws.dynamic.armstrong": "symfric.laws.dynamic.dwell",

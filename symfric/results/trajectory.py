@@ -16,7 +16,7 @@ from symfric.foundation.files import write_table, write_text
 from symfric.foundation.shown import Showing, Shown, Table, among, counted
 from symfric.foundation.symbols import stacked
 from symfric.model.kinds import WORK
-from symfric.model.shown import friction
+from symfric.model.model import friction
 from symfric.results.quadrature import integrals
 from symfric.results.signals import Signals
 from symfric.results.stored import module
