@@ -51,33 +51,5 @@ if TYPE_CHECKING:
     from identification.unknowns.spec import tied as tied
     from identification.verdict.design import expected_errors as expected_errors
     from identification.verdict.design import informative as informative
-else:
-    hand_out(
-        __name__,
-        {
-            "identification.data.dataset": "Dataset",
-            "identification.data.findings": "Finding Findings",
-            "identification.data.record": "PositionLoop Record",
-            "identification.data.synthetic": "synthetic_drive_data",
-            "identification.cross": "cross_validate",
-            "identification.fit": "Fit",
-            "identification.residuals.closed_loop": "ClosedLoop Controller",
-            "identification.residuals.inverse": "InverseDynamics",
-            "identification.residuals.points": "Points",
-            "identification.residuals.shooting": "Shooting",
-            "identification.result.series": "Estimate",
-            "identification.result.fitted": "Fitted load_fit",
-            "identification.select": "select",
-            "identification.signals.differentiate": (
-                "MotionSignals differentiate plateaus LinearFit linear_regression"
-            ),
-            "identification.signals.filters": "Filter central_difference lowpass",
-            "identification.starts.measured": "break_away hysteresis Measured",
-            "identification.starts.maxwell_slip": "fit_elements",
-            "identification.starts.six_steps": "six_steps",
-            "identification.starts.start": "start_values",
-            "identification.starts.stribeck": "binned fit_curve",
-            "identification.unknowns.spec": "above linear log tied",
-            "identification.verdict.design": "expected_errors informative",
-        },
-    )
+
+hand_out(__name__)

@@ -47,25 +47,5 @@ if TYPE_CHECKING:
     from ocp.transcription.schemes import Legendre as Legendre
     from ocp.transcription.schemes import Radau as Radau
     from ocp.transcription.schemes import Shooting as Shooting
-else:
-    hand_out(
-        __name__,
-        {
-            "ocp.checking.verification": "Miss Verification",
-            "ocp.checking.verify": "verify",
-            "ocp.formulation.bounds": "FREE Free Range",
-            "ocp.formulation.expressions": "Cost Signals TIME at_end effort integral track worst",
-            "ocp.formulation.phase": "Chain Phase",
-            "ocp.formulation.problem": "Problem",
-            "ocp.formulation.templates": "rest_to_rest",
-            "ocp.friction.event_check": "set_valued verify_exactly",
-            "ocp.mpc.closed_loop": "ClosedLoop plot_loops",
-            "ocp.mpc.controller": "Controller controller_of",
-            "ocp.result.solution": "Mode Solution load plot_solutions",
-            "ocp.solve": "solve",
-            "ocp.solvers.methods": "Fatrop Ipopt Sqp",
-            "ocp.solvers.outcome": "Progress SolverStatistics",
-            "ocp.solving.starts": "Guess",
-            "ocp.transcription.schemes": "Legendre Radau Shooting",
-        },
-    )
+
+hand_out(__name__)

@@ -1,5 +1,7 @@
 """Solve an optimal control problem, directly or by homotopy in the width of friction; verify it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
@@ -32,7 +34,7 @@ def solve(
     intervals: int | ArrayLike | Sequence[ArrayLike] | None = None,
     solver: Solver | None = None,
     guess: Start = None,
-    friction: "Friction" = "auto",
+    friction: Friction = "auto",
     tolerance: float = 1e-3,
     refine: bool = True,
     verify: bool = True,

@@ -10,8 +10,9 @@
 What there is; `help` of each tells more:
 
     laws        LuGre, BrownMcPhee, GMS, ... (ALL_LAWS by name, POPULATIONS of random contacts);
-                Law, StaticLaw, Element and Slider to write and compose them; law_from_text and
-                any_from_text, law_name; PlanarSlip and SpatialSlip in a plane and in space
+                Law, StaticLaw, State, Input, Facts (PHENOMENA) to write them, Element and Slider to
+                compose them; law_from_text and any_from_text (AnyLaw), law_name; steady_force,
+                steady_inputs; PlanarSlip and SpatialSlip in a plane and in space
     machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
     equations   Model of Variable, Output, Event and Monitor; contact puts a law into it (Contact)
     mechanisms  Mechanism of bodies and joints that rub, read_urdf; more in symfric.multibody
@@ -65,80 +66,7 @@ if TYPE_CHECKING:
     from symfric.integrator import simulate as simulate
     from symfric.integrator import simulate_many as simulate_many
     from symfric.integrator import stepper as stepper
-    from symfric.laws import ALL_LAWS as ALL_LAWS
-    from symfric.laws import BAM as BAM
-    from symfric.laws import GMS as GMS
-    from symfric.laws import POPULATIONS as POPULATIONS
-    from symfric.laws import Ambrosio as Ambrosio
-    from symfric.laws import Andersson as Andersson
-    from symfric.laws import Armstrong as Armstrong
-    from symfric.laws import Asymmetric as Asymmetric
-    from symfric.laws import Awrejcewicz as Awrejcewicz
-    from symfric.laws import BengisuAkay as BengisuAkay
-    from symfric.laws import Benson as Benson
-    from symfric.laws import Berger as Berger
-    from symfric.laws import Bittencourt as Bittencourt
-    from symfric.laws import BlimanSorine as BlimanSorine
-    from symfric.laws import BoucWen as BoucWen
-    from symfric.laws import Bristle2D as Bristle2D
-    from symfric.laws import BrittleSelfTuning as BrittleSelfTuning
-    from symfric.laws import BrownMcPhee as BrownMcPhee
-    from symfric.laws import Capstan as Capstan
-    from symfric.laws import Coulomb as Coulomb
-    from symfric.laws import Dahl as Dahl
-    from symfric.laws import DuanSingh as DuanSingh
-    from symfric.laws import ElastoPlastic as ElastoPlastic
-    from symfric.laws import Element as Element
-    from symfric.laws import ExactCoulomb as ExactCoulomb
-    from symfric.laws import Exudyn as Exudyn
-    from symfric.laws import GenericAsperity as GenericAsperity
-    from symfric.laws import Gonthier as Gonthier
-    from symfric.laws import HaessigFriedland as HaessigFriedland
-    from symfric.laws import Hollars as Hollars
-    from symfric.laws import Karnopp as Karnopp
-    from symfric.laws import Lagged as Lagged
-    from symfric.laws import Law as Law
-    from symfric.laws import LeineSwitch as LeineSwitch
-    from symfric.laws import Leuven as Leuven
-    from symfric.laws import LoadDependent as LoadDependent
-    from symfric.laws import LoadNormalised as LoadNormalised
-    from symfric.laws import Lorentzian as Lorentzian
-    from symfric.laws import LuGre as LuGre
-    from symfric.laws import LuGreNormalised as LuGreNormalised
-    from symfric.laws import LuGrePassive as LuGrePassive
-    from symfric.laws import MakkarDixon as MakkarDixon
-    from symfric.laws import MaxwellSlip as MaxwellSlip
-    from symfric.laws import ModifiedThrelfall as ModifiedThrelfall
-    from symfric.laws import PlanarSlip as PlanarSlip
-    from symfric.laws import PoppStelter as PoppStelter
-    from symfric.laws import Population as Population
-    from symfric.laws import PowerLawViscous as PowerLawViscous
-    from symfric.laws import QuarterCarGeneral as QuarterCarGeneral
-    from symfric.laws import QuarterCarSimple as QuarterCarSimple
-    from symfric.laws import RandomBristles as RandomBristles
-    from symfric.laws import RateAndState as RateAndState
-    from symfric.laws import RuiWang as RuiWang
-    from symfric.laws import SelfTuning as SelfTuning
-    from symfric.laws import SimscapeBreakaway as SimscapeBreakaway
-    from symfric.laws import Slider as Slider
-    from symfric.laws import SpatialSlip as SpatialSlip
-    from symfric.laws import Specker as Specker
-    from symfric.laws import StaticLaw as StaticLaw
-    from symfric.laws import SteadyStateLuGre as SteadyStateLuGre
-    from symfric.laws import Step5 as Step5
-    from symfric.laws import StickSlip as StickSlip
-    from symfric.laws import Stribeck as Stribeck
-    from symfric.laws import Sum as Sum
-    from symfric.laws import Table as Table
-    from symfric.laws import TemperatureDependent as TemperatureDependent
-    from symfric.laws import Threlfall as Threlfall
-    from symfric.laws import Tustin as Tustin
-    from symfric.laws import VelocityBased as VelocityBased
-    from symfric.laws import Viscous as Viscous
-    from symfric.laws import Wojewoda as Wojewoda
-    from symfric.laws import any_from_text as any_from_text
-    from symfric.laws import law_from_text as law_from_text
-    from symfric.laws import law_name as law_name
+    from symfric.laws import *  # noqa: F403  (all of them)
     from symfric.model import Contact as Contact
     from symfric.model import Event as Event
     from symfric.model import Model as Model
@@ -150,38 +78,7 @@ if TYPE_CHECKING:
     from symfric.scenes import contact as contact
     from symfric.scenes import drive as drive
     from symfric.scenes import rabinowicz as rabinowicz
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.choice": "Choice select",
-            "symfric.figures": "FigureData Recommendation compare figure recommended",
-            "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
-            "symfric.foundation.printing": "for_print",
-            "symfric.foundation.status": "EnergyWarning OverloadWarning SolveError Status",
-            "symfric.integrator": """
-                Ensemble Hold Linear Plant Statistics Trajectory flow load_ensemble load_run
-                rate_of simulate simulate_many stepper
-            """,
-            "symfric.laws": """
-                ALL_LAWS BAM GMS POPULATIONS Ambrosio Andersson Armstrong Asymmetric
-                Awrejcewicz BengisuAkay Benson Berger Bittencourt BlimanSorine
-                BoucWen Bristle2D BrittleSelfTuning BrownMcPhee Capstan Coulomb Dahl
-                DuanSingh ElastoPlastic Element ExactCoulomb Exudyn GenericAsperity
-                Gonthier HaessigFriedland Hollars Karnopp Lagged Law LeineSwitch
-                Leuven LoadDependent LoadNormalised Lorentzian LuGre LuGreNormalised LuGrePassive
-                MakkarDixon MaxwellSlip ModifiedThrelfall PlanarSlip PoppStelter
-                Population PowerLawViscous QuarterCarGeneral QuarterCarSimple
-                RandomBristles RateAndState RuiWang SelfTuning SimscapeBreakaway
-                Slider SpatialSlip Specker StaticLaw SteadyStateLuGre Step5
-                StickSlip Stribeck Sum Table TemperatureDependent Threlfall Tustin
-                VelocityBased Viscous Wojewoda any_from_text law_from_text law_name
-            """,
-            "symfric.model": "Contact Event Model Monitor Output",
-            "symfric.multibody": "Mechanism read_urdf",
-            "symfric.results.report": "report",
-            "symfric.scenes": "contact drive rabinowicz",
-        },
-    )
+
+hand_out(__name__)
 
 __version__ = "0.1.0"

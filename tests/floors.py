@@ -9,12 +9,6 @@ FLOORS: dict[str, set[str]] = {
     "symfric.laws": {"symfric.foundation"},
     "symfric.model": {"symfric.foundation"},
     "symfric.multibody": {"symfric.foundation", "symfric.laws", "symfric.model"},
-    "symfric.multibody.urdf": {
-        "symfric.foundation",
-        "symfric.laws",
-        "symfric.model",
-        "symfric.multibody",
-    },
     "symfric.scenes": {
         "symfric.foundation",
         "symfric.laws",
@@ -79,12 +73,6 @@ FLOORS: dict[str, set[str]] = {
         "symfric.integrator.running",
         "symfric.integrator.step",
     },
-    "symfric.integrator.peers": {
-        "symfric.foundation",
-        "symfric.model",
-        "symfric.integrator.equations",
-        "symfric.integrator.running",
-    },
     "symfric.integrator": {"symfric.foundation", "symfric.model", "symfric.results"},
     "symfric.figures": {
         "symfric.foundation",
@@ -102,35 +90,12 @@ FLOORS: dict[str, set[str]] = {
         "symfric.emitter",
         "symfric.integrator",
     },
-    "symfric.codegen.writing": {
-        "symfric.foundation",
-        "symfric.emitter",
-        "symfric.codegen.blocks",
-    },
-    "symfric.codegen.running": {
-        "symfric.foundation",
-        "symfric.emitter",
-        "symfric.codegen.blocks",
-        "symfric.codegen.writing",
-    },
-    "symfric.codegen.kit": {
+    "symfric.codegen": {
         "symfric.foundation",
         "symfric.laws",
-        "symfric.emitter",
-        "symfric.codegen.blocks",
-        "symfric.codegen.writing",
-        "symfric.codegen.running",
-    },
-    "symfric.codegen.proof": {
-        "symfric.foundation",
         "symfric.model",
         "symfric.emitter",
-        "symfric.codegen.blocks",
-        "symfric.codegen.writing",
-        "symfric.codegen.running",
-        "symfric.codegen.kit",
     },
-    "symfric.codegen": {"symfric.foundation"},
     "symfric.compensation": {
         "symfric.foundation",
         "symfric.laws",

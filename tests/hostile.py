@@ -22,11 +22,11 @@ Arrays = dict[str, np.ndarray[Any, Any]]
 CLASSES = (
     "os:system", "subprocess:Popen", "casadi:external", "casadi.casadi:Function", "builtins:eval",
     "pathlib:Path", "symfric.foundation.compiler:Compiler", "symfric.foundation.files:written",
-    "symfric.integrator.compiled.rows:Rows", "symfric.integrator.stored:Stored",
+    "symfric.integrator.compiled.columns:Rows", "symfric.integrator.stored:Stored",
     "symfric.integrator.stored:Later", "symfric.model.model:Model", "symfric.__main__:main",
     "symfric.laws.dynamic.lugre:LuGre", "symfric.foundation.variable:Variable",
     "symfric.foundation.packed:Given",
-    "identification.residuals.shots:unpacked", "identification.fit:Fit", "ocp.mpc.to_c:InC",
+    "identification.residuals.shots:unpacked", "identification.fit:Fit", "ocp.mpc.session:Session",
     "symfric.foundation.packed:partial", "symfric.results.trajectory:Trajectory",
 )  # fmt: skip
 """Names that a file may try to give to its objects: dangerous, forbidden and allowed ones."""

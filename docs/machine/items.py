@@ -18,9 +18,9 @@ from symfric.foundation.parameters import options
 from symfric.laws import PHENOMENA, AnyLaw
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip
+from symfric.laws.composed.populations import cost
 from symfric.laws.composed.wrap import Lagged, TemperatureDependent
-from symfric.laws.cost import cost
-from symfric.laws.static.table import Table
+from symfric.laws.static.coulomb import Table
 from symfric.scenes import ALL_SCENES, Scene
 
 MADE_OF_LAWS: dict[str, type[Any]] = {

@@ -69,13 +69,13 @@ def handed_out(front: str) -> list[Public]:
     if not init.exists():
         return []
     tree = ast.parse(init.read_text("utf-8"))
-    found = [
-        Public(front, alias.asname, node.module or "")
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-        if alias.asname == alias.name
-    ]
+    found: list[Public] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [a.name for a in node.names if a.asname == a.name]
+            if node.names[0].name == "*":
+                names = [public.name for public in handed_out(node.module)]
+            found += [Public(front, name, node.module) for name in names]
     return list({p.name: p for p in found}.values())
 
 

@@ -12,6 +12,8 @@ that jams), reactions without a solution; contacts of a loop of several degrees 
 more than these. Contacts in balls keep their laws.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

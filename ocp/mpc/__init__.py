@@ -1,9 +1,9 @@
-"""Receding horizons: quadratic programs on implicit steps, in closed loop and as C."""
+"""Receding horizons: quadratic programs on implicit steps, as C, and in closed loop."""
 
 from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
 from ocp.mpc.controller import Controller as Controller
 from ocp.mpc.controller import controller_of as controller_of
-from ocp.mpc.gauss_newton import CycleStatus as CycleStatus
+from ocp.mpc.design import CycleStatus as CycleStatus
 from ocp.mpc.session import Action as Action
 from ocp.mpc.session import Session as Session
 from ocp.mpc.to_c import ControllerCheck as ControllerCheck

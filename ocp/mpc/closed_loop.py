@@ -15,9 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.mpc.design import Design
-from ocp.mpc.gauss_newton import CycleStatus, Plan
-from ocp.mpc.interior_point import Given
+from ocp.mpc.design import CycleData, CycleStatus, Design, Plan
 from ocp.mpc.session import Action, Session
 from symfric.foundation import checks
 from symfric.foundation.brief import brief
@@ -76,11 +74,11 @@ class Optimality:
         self._whole = ca.Function("whole", [X, U, R, t, p, b, m], results)
         self._size = w.numel()
 
-    def residual(self, plan: Plan, given: Given) -> float:
-        """As `gauss_newton` defines it."""
+    def residual(self, plan: Plan, data: CycleData) -> float:
+        """As `ocp.mpc.source` defines it."""
         h, prices = self._design.horizon, self._design.prices
         gradient, slopes, c, v = evaluate_all(
-            self._whole, plan.X, plan.U, given.R, given.t, given.p, given.b, plan.z
+            self._whole, plan.X, plan.U, data.R, data.t, data.p, data.b, plan.z
         )
         n, model = self._states, h.model
         by_states, by_inputs = slopes[:, :n], slopes[:, n:]
@@ -326,7 +324,7 @@ def run_closed_loop(
         action = session.step(measured, wanted, t=t, p=p)
         opinion = np.nan
         if look is not None and action.status is not CycleStatus.BAD_INPUT:
-            opinion = look.residual(session.plan, session.given(wanted, t, p, None))
+            opinion = look.residual(session.plan, session.data(wanted, t, p, None))
         log.actions.append(action)
         log.opinions.append(opinion)
         log.wanted.append({name: float(values[0]) for name, values in wanted.items()})

@@ -1,5 +1,7 @@
 """Model predictive controllers made of problems."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -12,15 +14,15 @@ from numpy.typing import NDArray
 
 from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import ClosedLoop, Reference, run_closed_loop
-from ocp.mpc.design import Control, Design
+from ocp.mpc.design import Control, Design, Settings
 from ocp.mpc.from_problem import horizon_of
-from ocp.mpc.gauss_newton import Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.session import Session
+from ocp.mpc.session import BACKENDS, Session
 from ocp.mpc.source import timed
 from ocp.mpc.to_c import GeneratedController, write_c
 from symfric.codegen.blocks.block import KEYWORDS
 from symfric.foundation import checks
+from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -76,13 +78,18 @@ class Controller:
         """The controller at work, without a plan yet.
 
         Args:
-            backend: "compiled" (the C itself), "vm" (the same bits, some ten times slower), or
-                "auto": compiled where there is a compiler.
+            backend: "auto" or "compiled", which mean the same: the C of `to_c` on this machine.
 
         Raises:
-            CompileError: backend="compiled" without a compiler, or it failed.
+            CompileError: there is no compiler (install gcc or clang, or set $CC), or it failed.
         """
-        return Session(self.design, backend)
+        checks.choice("start: backend", backend, BACKENDS)
+        if find_compiler() is None:
+            raise CompileError(
+                "start: expected a C compiler ($CC, gcc, clang or cc), found none; a controller "
+                "runs as C: install gcc or clang, or set $CC"
+            )
+        return Session(self.design)
 
     def simulate(
         self,
@@ -118,6 +125,7 @@ class Controller:
         Raises:
             ValueError: unknown names, bad numbers.
             SolveError: the plant could not be simulated to the end.
+            CompileError: as `start`.
         """
         return run_closed_loop(
             self.design,
@@ -138,7 +146,7 @@ class Controller:
 
         The C allocates nothing, needs math.h alone, and has no data but constants: memory is in the
         caller's struct. Every loop is bounded, so a cycle has a longest time. Each cycle reports
-        the residual of what it hands out. In double it has the bits of `start("vm")`.
+        the residual of what it hands out. `start` runs the same C.
 
         Raises:
             ValueError: no folder, or an operation that C99 lacks.
@@ -162,8 +170,8 @@ def controller_of(
 
         min  sum_k h [sum_i w_i r_i^2 + L] + E(x_N)   s.t.  x_(k+1) = F(x_k, u_k),  bounds
 
-    by sequential quadratic programs (`gauss_newton`) from the shifted plan of the last cycle, over
-    N = T / step intervals with inputs held. Costs are `track`, `effort`, and convex quadratic
+    by sequential quadratic programs (`ocp.mpc.source`) from the shifted plan of the last cycle,
+    over N = T / step intervals with inputs held. Costs are `track`, `effort`, and convex quadratic
     `integral` and `at_end`; what `track("x", "goal", 900.0)` refers to by name is a reference of
     the controller, whose default stands in the `p` of the problem. The start of the phase is not
     used: the state is measured. Bounds on inputs are hard; those on states and outputs, path
@@ -177,7 +185,7 @@ def controller_of(
             not, as the residual shows. With bristles "backward_euler".
         measured: names of measured states, by default all; the others, such as bristles, are those
             of the plan. Inputs with a rate (`rates`) are never measured.
-        tolerance: residual (see `gauss_newton`) at which a plan is optimal.
+        tolerance: residual (see `ocp.mpc.source`) at which a plan is optimal.
         iterations: quadratic programs in a cycle at most; 1 is the real-time iteration.
         penalty: price of violating a soft bound by its unit, per largest curvature of the cost.
         name: C identifier; by default that of the model with "_mpc".

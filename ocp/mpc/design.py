@@ -1,19 +1,94 @@
 """All that makes a controller: its horizon, how it is solved, what goes in and what comes out."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.mpc.gauss_newton import Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.interior_point import Prices, Sweeps
 from ocp.mpc.kernels import Kernels, kernels
 from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
+
+
+class CycleStatus(IntEnum):
+    """End of a cycle; the numbers are those of the C."""
+
+    CONVERGED = 0
+    NOT_CONVERGED = 1
+    BAD_INPUT = 2
+    FAILED = 3
+
+    @property
+    def sentence(self) -> str:
+        """Meaning, and what to try."""
+        return {
+            0: "converged",
+            1: "not converged: the residual is above the tolerance after the last iteration; allow "
+            "more of them, or let steps resolve the transition velocity",
+            2: "bad input: a number is not finite; the plan of the last cycle goes on",
+            3: "failed: numbers were not finite; the plan of the last cycle goes on, the next one "
+            "starts afresh",
+        }[int(self)]
+
+
+@final
+@dataclass(frozen=True)
+class Settings:
+    """Limits of the work in one cycle.
+
+    Attributes:
+        tolerance: residual at which a plan is optimal.
+        iterations: quadratic programs at most; 1 is the real-time iteration.
+        program: iterations of the interior point in each at most.
+        halvings: of a step, at most.
+    """
+
+    tolerance: float = 1e-3
+    iterations: int = 20
+    program: int = 40
+    halvings: int = 6
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """States (N+1, nx), inputs (N, nu), and multipliers of all rows."""
+
+    X: Array
+    U: Array
+    z: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CycleData:
+    """Data of the whole horizon in one cycle.
+
+    Attributes:
+        R: references, shape (N+1, number of them).
+        t: times [s], shape (N+1,).
+        p, b: parameters, and bounds of the rows of an interval and of the end.
+    """
+
+    R: Array
+    t: Array
+    p: Array
+    b: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Prices:
+    """rho and sigma of all rows, zeros in hard ones, and which are soft."""
+
+    rho: Array
+    sigma: Array
+    soft: NDArray[np.bool_]
 
 
 @final
@@ -77,11 +152,6 @@ class Design:
     def kernels(self) -> Kernels:
         """Functions of an interval."""
         return kernels(self.horizon)
-
-    @cached_property
-    def sweeps(self) -> Sweeps:
-        """Loops over them in the virtual machine."""
-        return Sweeps(self.horizon, self.kernels)
 
     @property
     def bounds(self) -> Array:

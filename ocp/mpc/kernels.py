@@ -6,8 +6,8 @@ The quadratic program of an iteration, with d the change of the states and c = F
     s.t. d_(k+1) = A_k d_k + B_k du_k + c_k,   d_0 = 0,   v + D (d_k, du_k, d_(k+1)) >= 0
 
 is solved by Riccati's recursion, to which an interior point adds weights w and slopes e of the
-rows, H + D'w D and g + D'e. Loops over the intervals call these functions, in C and in Python
-alike, so that both give the same bits. What is constant in A, B, H and D is folded into the code.
+rows, H + D'w D and g + D'e. The loops over the intervals in C (`ocp.mpc.source`) call these
+functions. What is constant in A, B, H and D is folded into the code.
 
 Source: Rao, Wright and Rawlings, Application of interior-point methods to model predictive control,
     JOTA 99(3), 1998.

@@ -1,8 +1,46 @@
-"""Header and source of a controller in C99.
+"""Header and source of a controller in C99, which is the one implementation of the solver.
+
+Sequential quadratic programs over the horizon, and how far their result is from optimal:
+
+    1. linearise at the plan (X, U); residual <= tolerance: done
+    2. change and multipliers by the quadratic program
+    3. a step of 1, 1/2, 1/4, ... of it by the merit  cost + prices + nu |defects|_1
+
+The Hessian is that of Gauss and Newton in the first two iterations of a cycle. Near rest, friction
+bends more than the cost does, and these converge slowly; from the third one on the curvature of the
+equations, weighted with their multipliers, is taken along wherever Riccati's recursion then finds
+no negative pivot.
+
+The residual is that of the conditions of Karush, Kuhn and Tucker at the plan that is handed out,
+whose multipliers of the equations make the gradients in the states zero: the largest of
+
+ * gradients in the inputs, per nominal and own curvature of the cost in an input: an input would
+   move by no more than that share of its nominal;
+ * defects of the equations per nominal of the state;
+ * violations of rows in units of their signals; products of rows and multipliers, by the larger
+   of multiplier and that curvature. A soft row may be violated instead where its multiplier is the
+   price: what it is off, relative to the price, times the violation.
+
+The quadratic program is solved by a primal-dual interior point. A hard row keeps v >= 0; a soft one
+may be violated by s >= 0 at the price rho s + sigma s^2 / 2:
+
+    v - t + s = 0,   t z = mu,   s y = mu,   z + y = rho + sigma s
+
+Newton's method with t, s and y eliminated leaves a weight w and a slope e for each row,
+
+    z_new = z + w (o - D d),   w = 1 / (t / z + f),   e = -(z + w o),
+    o = mu / z - v - s + f a,   a = rho + sigma s - z - mu / s,   f = 1 / (sigma + y / s)
+
+with f = 0 in a hard row, for the recursion over the intervals. Mehrotra's predictor and corrector
+share its matrices. A program whose free minimum keeps all rows needs none of this.
 
 Names begin with that of the controller: `NAME_t` holds plan and work space, `NAME_param_t` model
 parameters, bounds, tolerance and iterations, with `NAME_default`; `NAME_in_t` what is measured and
 wanted; `NAME_out_t` controls and how the cycle went; `NAME_init`, `NAME_step`.
+
+Sources: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36) (weight of the merit);
+    Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim. 2(4),
+    1992; Frison and Diehl, HPIPM, IFAC 2020 (soft rows).
 """
 
 from collections import Counter
@@ -12,21 +50,30 @@ from pathlib import Path
 
 import casadi as ca
 
-from ocp.mpc.design import Control, Design
-from ocp.mpc.gauss_newton import ARMIJO, PLAIN, ROUNDING, CycleStatus
-from ocp.mpc.interior_point import AWAY, BACK, CLOSE
-from symfric.codegen.writing.text import folded
+from ocp.mpc.design import Control, CycleStatus, Design
+from symfric.codegen.layout import folded
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
 
 LOOPS = Path(__file__).with_name("cycle.c").read_text(encoding="utf-8")
-"""The loops of a cycle, those of `gauss_newton` and `interior_point`, to the bit.
+"""The loops of a cycle.
 
 One text for all controllers, called NAME in it: sizes are macros, kernels are functions. Every loop
 is bounded, nothing is allocated, all memory is in the caller's struct.
 """
+PLAIN = 2
+"""Iterations without curvature of the equations, which has no meaning yet far from the optimum."""
+ARMIJO = 1e-4
+ROUNDING = 1e-12
+"""Of the merit, relative: what a step may lose by it."""
+BACK = 0.995
+"""Share of the way to the boundary."""
+CLOSE = 1e-7
+"""mu, in units of the curvature, at which a program is solved."""
+AWAY = 0.1
+"""Least distance from the bounds at which the interior point starts, in units of the signals."""
 
 
 def header(design: Design) -> str:

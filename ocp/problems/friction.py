@@ -24,7 +24,7 @@ from symfric.multibody import (
     Prismatic,
     Revolute,
 )
-from symfric.scenes.drive import drive
+from symfric.scenes.blocks import drive
 
 FRICTION: list[Ready] = []
 frictional = partial(ready, FRICTION, friction=True)

@@ -20,10 +20,10 @@ from symfric.bench import table
 from symfric.bench.contenders import buffered, compiled, tolerances
 from symfric.bench.table import interleaved, unwarned
 from symfric.foundation.compiler import find_compiler
+from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.background import wait
 from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.simulate import simulate
 from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip

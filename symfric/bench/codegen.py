@@ -11,7 +11,7 @@ from symfric.bench import table
 from symfric.bench.codegen_runs import compensation, units
 from symfric.bench.table import Cell, Goal, Section
 from symfric.codegen import Block, generate, inverse_dynamics_block, law_block, plant_block
-from symfric.codegen.proof.fuzz import STEPS, Fuzzed, fuzz
+from symfric.codegen.fuzz import STEPS, Fuzzed, fuzz
 from symfric.embedded import (
     BY,
     CORES,

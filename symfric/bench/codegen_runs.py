@@ -27,7 +27,7 @@ from symfric.compensation import (
 )
 from symfric.embedded import measure as on_core
 from symfric.fmu import Exported, export_fmu
-from symfric.fmu.running import running
+from symfric.fmu.export import running
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator import Input
 from symfric.laws import GMS, ElastoPlastic

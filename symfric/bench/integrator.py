@@ -19,7 +19,7 @@ from symfric.bench.contenders import Contender, equations, tolerances
 from symfric.bench.ensemble import EnsembleRow, measure_ensemble
 from symfric.bench.table import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
-from symfric.integrator.peers.casadi_integrators import peer
+from symfric.integrator.by_peer import peer
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model

@@ -24,7 +24,7 @@ from symfric.bench.table import interleaved
 from symfric.foundation.compiler import find_compiler
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Model
-from symfric.scenes.drive import drive
+from symfric.scenes.blocks import drive
 
 INTERVALS = (50, 200, 1000, 5000)
 

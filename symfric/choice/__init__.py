@@ -10,13 +10,5 @@ if TYPE_CHECKING:
     from symfric.choice.ranking import Row as Row
     from symfric.choice.select import Choice as Choice
     from symfric.choice.select import select as select
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.choice.friction": "Friction",
-            "symfric.choice.nature": "NEEDS",
-            "symfric.choice.ranking": "Row",
-            "symfric.choice.select": "Choice select",
-        },
-    )
+
+hand_out(__name__)

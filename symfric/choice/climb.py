@@ -23,7 +23,7 @@ from symfric.figures.regularisation import Machine, Sample, apart
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.running.built import built
+from symfric.integrator.running.integrator import built
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 

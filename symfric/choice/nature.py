@@ -8,7 +8,7 @@ import numpy as np
 
 from symfric.choice.friction import Friction
 from symfric.codegen.blocks.from_law import law_block
-from symfric.codegen.writing.routines import routines
+from symfric.codegen.routines import routines
 from symfric.embedded import measure
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks

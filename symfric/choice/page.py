@@ -15,7 +15,8 @@ from matplotlib.transforms import Bbox
 from symfric.choice.nature import GROUPS, NEEDS, shown
 from symfric.choice.ranking import Ranking, Row
 from symfric.choice.text import STANDING_TEXTS, interrupted, number, verdict
-from symfric.foundation.panels import blank, data_uri, dressed, save
+from symfric.foundation.panels import blank, dressed, save
+from symfric.foundation.shown import data_uri
 from symfric.foundation.style import MARKERS, colour
 from symfric.page import html
 

@@ -26,7 +26,7 @@ from symfric.choice.friction import Friction, fall_of, peaked
 from symfric.figures.regularisation import Regularisation
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
-from symfric.laws.base.sticking import Sticking
+from symfric.laws.base.families import Sticking
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7

@@ -31,8 +31,8 @@ from symfric.cli.options import (
     with_settings,
 )
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
-from symfric.codegen.kit.generate import with_cores
-from symfric.codegen.proof.verify import Check
+from symfric.codegen.generated import with_cores
+from symfric.codegen.verification import Check
 from symfric.embedded import CORES, Measured, measure
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler

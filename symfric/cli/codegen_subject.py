@@ -16,7 +16,7 @@ from symfric.foundation.status import Status
 from symfric.laws import AnyLaw
 from symfric.multibody import Mechanism, read_urdf
 from symfric.scenes import Drive, Scene
-from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.linkages import MechanismScene
 
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"

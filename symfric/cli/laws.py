@@ -23,7 +23,7 @@ from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
 from symfric.laws.catalogue import ALIASES
-from symfric.laws.cost import cost
+from symfric.laws.composed.populations import cost
 from symfric.scenes import ALL_SCENES
 
 

@@ -1,17 +1,24 @@
 """Friction compensators and observers as blocks, and their proof in closed loops."""
 
-from symfric.compensation.cascade import Cascade as Cascade
-from symfric.compensation.compensator import compensator as compensator
-from symfric.compensation.loop import close_loop as close_loop
-from symfric.compensation.observers import disturbance_observer as disturbance_observer
-from symfric.compensation.observers import gms_observer as gms_observer
-from symfric.compensation.observers import lugre_observer as lugre_observer
-from symfric.compensation.reference import Reference as Reference
-from symfric.compensation.reference import moves as moves
-from symfric.compensation.reference import sine as sine
-from symfric.compensation.reference import step as step
-from symfric.compensation.result import Comparison as Comparison
-from symfric.compensation.result import Loop as Loop
-from symfric.compensation.settings import Compensation as Compensation
-from symfric.compensation.settings import settings_from_text as settings_from_text
-from symfric.compensation.terms import TERMS as TERMS
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.compensation.compensator import Cascade as Cascade
+    from symfric.compensation.compensator import compensator as compensator
+    from symfric.compensation.force import TERMS as TERMS
+    from symfric.compensation.loop import close_loop as close_loop
+    from symfric.compensation.observers import disturbance_observer as disturbance_observer
+    from symfric.compensation.observers import gms_observer as gms_observer
+    from symfric.compensation.observers import lugre_observer as lugre_observer
+    from symfric.compensation.result import Comparison as Comparison
+    from symfric.compensation.result import Loop as Loop
+    from symfric.compensation.result import Reference as Reference
+    from symfric.compensation.result import moves as moves
+    from symfric.compensation.result import sine as sine
+    from symfric.compensation.result import step as step
+    from symfric.compensation.settings import Compensation as Compensation
+    from symfric.compensation.settings import settings_from_text as settings_from_text
+
+hand_out(__name__)

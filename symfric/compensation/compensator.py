@@ -1,21 +1,34 @@
-"""A friction compensator as a block: the force to add to that of a controller."""
+"""A friction compensator as a block: the force to add to that of a controller, and a controller."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
+from typing import Any, final
 
 import casadi as ca
 
 from symfric.codegen import Block, law_block
-from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.from_law import in_turning, step_variable
-from symfric.compensation import stages
-from symfric.compensation.parts import Parts
+from symfric.codegen.blocks.variables import arranged
+from symfric.compensation.force import (
+    TERMS,
+    Parts,
+    Terms,
+    beyond_dead_zone,
+    blended,
+    built_up,
+    dithered,
+    freed,
+    limited,
+    ramped,
+    slowed,
+    terms,
+)
 from symfric.compensation.settings import Compensation, chosen_settings, formula
-from symfric.compensation.terms import TERMS, Terms, terms
 from symfric.foundation import checks
+from symfric.foundation.parameters import Parametric, Variable, param
 from symfric.laws import Law, law_name
+from symfric.laws.base import smooth
 from symfric.laws.base.law import check_law
 from symfric.model import Output
 from symfric.scenes import Drive
@@ -91,26 +104,28 @@ def compensator(
     duration = size.symbol if h is None else float(size.start)
     own = tuple(v for v in inner.parameters if v is not size)
     parts = Parts(states=inner.states, parameters=own)
-    parts, wanted, v = _velocity(parts, s)
-    moved = v
-    if s.dead_zone is not None:
-        parts, moved = stages.beyond_dead_zone(parts, v, s.dead_zone)
-    parts, N = _load(parts, s)
-    old, new = ca.vertcat(found.v, found.N), ca.vertcat(moved, N)
+    wanted, v = _velocity(parts, s)
+    moved = v if s.dead_zone is None else beyond_dead_zone(parts, v, s.dead_zone)
+    normal = (
+        parts.given("N", "N", "normal force", 10.0, lower=0.0)
+        if isinstance(s.N, str)
+        else parts.parameter("N", 1.0 if s.N is None else s.N, "N", "normal force")
+    )
+    old, new = ca.vertcat(found.v, found.N), ca.vertcat(moved, normal)
     following = ca.substitute(inner.next, old, new)
-    parts = replace(parts, next=tuple(ca.vertsplit(following)) if inner.states else ())
-    parts, found = _built(parts, found, s, moved, duration, where)
-    parts, force = _scaled(parts, found, s, where)
+    parts.next = ca.vertsplit(following) if inner.states else []
+    found = _built(parts, found, s, moved, duration, where)
+    force = _scaled(parts, found, s, where)
     force = ca.substitute(force, old, new)
-    parts, force = _added(parts, force, s, wanted, duration)
-    parts, more = _held(parts, s)
+    force = _added(parts, force, s, wanted, duration)
+    more = _held(parts, s)
     uses_h = h is None and ca.depends_on(ca.vertcat(force, *parts.next), size.symbol)
     block = Block(
         "friction_compensator" if name is None else name,
         doc=f"Friction compensator: the force to add to that of a controller. {inner.doc}",
-        states=parts.states,
+        states=tuple(parts.states),
         inputs=tuple(sorted(parts.inputs, key=lambda v: INPUTS.index(v.name))),
-        parameters=(*parts.parameters, size) if uses_h else parts.parameters,
+        parameters=(*parts.parameters, *[size] * uses_h),
         next=ca.vertcat(ca.SX(0, 1), *parts.next),
         outputs={"F": Output(force, "N", "force to add to that of the controller")} | more,
         about=inner.about,
@@ -125,25 +140,24 @@ def compensator(
     return in_turning(block) if turning else block
 
 
-def _velocity(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX, ca.SX]:
+def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
     """The desired velocity, and the one that moves the law."""
     wanted = v = ca.SX(0)
     if s.velocity != "measured" or s.stick is not None:
-        parts, wanted = parts.given("v_ref", "m/s", "reference velocity", 0.1)
+        wanted = parts.given("v_ref", "m/s", "reference velocity", 0.1)
     if s.delay is not None and s.velocity != "measured":
-        parts, a = parts.given("a_ref", "m/s^2", "reference acceleration")
-        parts, delay = parts.parameter("t_ahead", s.delay, "s", "look-ahead of the reference")
+        a = parts.given("a_ref", "m/s^2", "reference acceleration")
+        delay = parts.parameter("t_ahead", s.delay, "s", "look-ahead of the reference")
         wanted = wanted + delay * a
     if s.error_gain is not None:
-        parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
-        parts, gain = parts.parameter("k_error", s.error_gain, "1/s", "set velocity over error")
+        e = parts.given("e", "m", "position error, reference less measured", 1e-5)
+        gain = parts.parameter("k_error", s.error_gain, "1/s", "set velocity over error")
         wanted = wanted + gain * e
     if s.velocity != "reference" or s.stick is not None:
-        parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
+        v = parts.given("v", "m/s", "measured velocity", 0.1)
     if s.velocity == "blend":
-        parts, blend = stages.blended(parts, wanted, v, s.v_blend)
-        return parts, wanted, blend
-    return parts, wanted, wanted if s.velocity == "reference" else v
+        return wanted, blended(parts, wanted, v, s.v_blend)
+    return wanted, wanted if s.velocity == "reference" else v
 
 
 def folded(block: Block) -> Block:
@@ -183,29 +197,21 @@ def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
     )
 
 
-def _load(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX]:
-    """The normal force, an input or a parameter."""
-    if isinstance(s.N, str):
-        return parts.given("N", "N", "normal force", 10.0, lower=0.0)
-    return parts.parameter("N", 1.0 if s.N is None else s.N, "N", "normal force")
-
-
 def _built(
     parts: Parts, found: Terms, s: Compensation, v: ca.SX, h: ca.SX | float, where: str
-) -> tuple[Parts, Terms]:
+) -> Terms:
     """The terms with dry friction that builds up over a way, where that is chosen."""
     if s.build_up is None:
-        return parts, found
+        return found
     if found.law.states:
         raise ValueError(
             f"{where}: build_up: expected a law without states, got one whose states build friction"
             " up over a way of their own"
         )
-    parts, b = stages.built_up(parts, v, h, s.build_up, s.build_up_table)
-    return parts, found.one_sided(b)
+    return found.one_sided(built_up(parts, v, h, s.build_up, s.build_up_table))
 
 
-def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> tuple[Parts, ca.SX]:
+def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> ca.SX:
     """The force of the law with the scales of its terms."""
     checks.check_names(f"{where}: without", s.without, found.names)
     asked = s.scales
@@ -220,46 +226,108 @@ def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> tuple[Pa
         raise ValueError(f"{where}: expected terms in scales or in without, got both for {twice}")
     scales: dict[str, ca.SX | float] = dict.fromkeys(s.without, 0.0)
     for term, start in asked.items():
-        parts, scales[term] = parts.parameter(f"scale_{term}", start, "1", f"scale: {TERMS[term]}")
-    return parts, found.scaled(scales)
+        scales[term] = parts.parameter(f"scale_{term}", start, "1", f"scale: {TERMS[term]}")
+    return found.scaled(scales)
 
 
-def _held(parts: Parts, s: Compensation) -> tuple[Parts, dict[str, Output]]:
+def _held(parts: Parts, s: Compensation) -> dict[str, Output]:
     """The output that stops the integrator of the controller, where that is chosen."""
     if s.hold is None:
-        return parts, {}
-    parts, v_ref = parts.given("v_ref", "m/s", "reference velocity", 0.1)
-    parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
-    parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
-    parts, band = parts.parameter("e_hold", s.hold[0], "m", "error that is small enough to rest")
-    parts, slow = parts.parameter("v_hold", s.hold[1], "m/s", "slower than this is rest")
+        return {}
+    v_ref = parts.given("v_ref", "m/s", "reference velocity", 0.1)
+    e = parts.given("e", "m", "position error, reference less measured", 1e-5)
+    v = parts.given("v", "m/s", "measured velocity", 0.1)
+    band = parts.parameter("e_hold", s.hold[0], "m", "error that is small enough to rest")
+    slow = parts.parameter("v_hold", s.hold[1], "m/s", "slower than this is rest")
     small = (ca.fabs(e) <= band, ca.fabs(v_ref) <= slow, ca.fabs(v) <= slow)
     rests = ca.if_else(ca.logic_and(ca.logic_and(*small[:2]), small[2]), 1, 0)
-    return parts, {"hold": Output(rests, "1", "1: stop the integrator of the controller")}
+    return {"hold": Output(rests, "1", "1: stop the integrator of the controller")}
 
 
-def _added(
-    parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float
-) -> tuple[Parts, ca.SX]:
+def _added(parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float) -> ca.SX:
     """The force of the law with all that is added, and within its limits."""
     if s.offset is not None:
-        parts, more = parts.parameter("offset", s.offset, "N", "constant force", lower=-inf)
+        more = parts.parameter("offset", s.offset, "N", "constant force", lower=-inf)
         force = force + more
     if s.inertia is not None:
-        parts, a = parts.given("a_ref", "m/s^2", "reference acceleration")
-        parts, mass = parts.parameter("inertia", s.inertia, "kg", "mass that a_ref is times")
+        a = parts.given("a_ref", "m/s^2", "reference acceleration")
+        mass = parts.parameter("inertia", s.inertia, "kg", "mass that a_ref is times")
         force = force + mass * a
     if s.stick is not None:
-        parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
-        parts, more = stages.freed(parts, wanted, v, h, *s.stick)
+        v = parts.given("v", "m/s", "measured velocity", 0.1)
+        more = freed(parts, wanted, v, h, *s.stick)
         force = force + more
     if s.dither is not None:
-        parts, more = stages.dithered(parts, h, *s.dither)
+        more = dithered(parts, h, *s.dither)
         force = force + more
     if s.ramp is not None:
-        parts, force = stages.ramped(parts, force, h, s.ramp)
+        force = ramped(parts, force, h, s.ramp)
     if s.limit is not None:
-        parts, force = stages.limited(parts, force, s.limit)
+        force = limited(parts, force, s.limit)
     if s.slew is not None:
-        parts, force = stages.slowed(parts, force, h, s.slew)
-    return parts, force
+        force = slowed(parts, force, h, s.slew)
+    return force
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cascade(Parametric):
+    """A cascade of position (P) and velocity (PI) with an encoder, at a fixed sample time.
+
+        x_m = count round(x / count)                     what the encoder says
+        v_m = v_m + share [(x_m - x_m before) / h - v_m]    filtered difference
+        v_s = v_ref + kp (r - x_m)                       set velocity
+        u   = kv (v_s - v_m) + I + inertia a_ref,   I+ = I + ki kv h (v_s - v_m)
+
+    I and u are held within +-limit; I does not go on where u has reached it, nor on `hold`.
+    """
+
+    h: float = param(1e-3, unit="s", role="time", doc="sample time", lower=1e-9)
+    kp: float = param(60.0, unit="1/s", doc="position gain", lower=0.0)
+    kv: float = param(200.0, unit="N s/m", doc="velocity gain", lower=0.0)
+    ki: float = param(20.0, unit="1/s", doc="integral gain of the velocity loop", lower=0.0)
+    inertia: float = param(1.0, unit="kg", doc="mass that a_ref is times", lower=0.0)
+    limit: float = param(100.0, unit="N", doc="largest force", lower=0.0)
+    count: float = param(1e-6, unit="m", doc="one count of the encoder", lower=1e-15)
+    share: float = param(
+        0.5, unit="1", doc="of a new difference in the velocity", lower=1e-6, upper=1.0
+    )
+
+    def block(self) -> Block:
+        """(x, r, v_ref, a_ref, hold) -> u, and what it measures: x_m, v_m, e, v_s."""
+        x, r, v_ref, a_ref, hold = inputs = (
+            Variable("x", "m", nominal=0.1, doc="position"),
+            Variable("r", "m", nominal=0.1, doc="reference position"),
+            Variable("v_ref", "m/s", nominal=0.1, doc="reference velocity"),
+            Variable("a_ref", "m/s^2", nominal=1.0, doc="reference acceleration"),
+            Variable("hold", "1", lower=0.0, upper=1.0, doc="above 0.5: no integration"),
+        )
+        before, v_before, integral = states = (
+            Variable("before", "m", doc="position before"),
+            Variable("v_before", "m/s", doc="velocity before"),
+            Variable("integral", "N", doc="integral force"),
+        )
+        x_m = self.count * ca.floor(x.symbol / self.count + 0.5)
+        v_m = v_before.symbol + self.share * ((x_m - before.symbol) / self.h - v_before.symbol)
+        e = r.symbol - x_m
+        v_s = v_ref.symbol + self.kp * e
+        wanted = self.kv * (v_s - v_m) + integral.symbol + self.inertia * a_ref.symbol
+        u = smooth.clip(wanted, -self.limit, self.limit)
+        more = integral.symbol + self.ki * self.kv * self.h * (v_s - v_m)
+        more = smooth.clip(more, -self.limit, self.limit)
+        free = ca.logic_or(wanted == u, (v_s - v_m) * u < 0)
+        free = ca.logic_and(free, hold.symbol <= 0.5)
+        return Block(
+            "cascade",
+            doc="Position controller: P in position, PI in velocity.",
+            states=states,
+            inputs=inputs,
+            next=ca.vertcat(x_m, v_m, ca.if_else(free, more, integral.symbol)),
+            outputs={
+                "u": Output(u, "N", "commanded force"),
+                "x_m": Output(x_m, "m", "measured position"),
+                "v_m": Output(v_m, "m/s", "measured velocity"),
+                "e": Output(e, "m", "position error"),
+                "v_s": Output(v_s, "m/s", "set velocity"),
+            },
+        )

@@ -1,18 +1,16 @@
 """Observers of friction as blocks: its states by a law and an error, or the force by a mass."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 
 from symfric.codegen import Block, law_block
-from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.from_law import in_turning, step_variable
 from symfric.codegen.blocks.held_step import held_step
-from symfric.compensation import stages
+from symfric.codegen.blocks.variables import arranged
 from symfric.compensation.compensator import without_end
-from symfric.compensation.parts import Parts
-from symfric.compensation.terms import LEAST
+from symfric.compensation.force import LEAST, Parts, limited, ramped
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import GMS, Law, LuGre, LuGreNormalised, LuGrePassive, law_name
@@ -27,17 +25,6 @@ USE = (
 Corrected = tuple[ca.SX, ca.SX]
 """States after the step, and the mean force."""
 ESTIMATE = "estimated friction force, to add to that of the controller; mean over the step"
-
-
-@dataclass(frozen=True, eq=False)
-class At:
-    """Where a step begins: velocity, load, states, gain times error, step size."""
-
-    v: ca.SX
-    N: ca.SX
-    z: ca.SX
-    push: ca.SX
-    h: ca.SX | float
 
 
 def lugre_observer(
@@ -84,13 +71,14 @@ def lugre_observer(
     kinds: tuple[type[Law], ...] = (LuGre, LuGreNormalised, LuGrePassive)
     where = _check("lugre_observer", law, kinds, "LuGre()", gain)
 
-    def corrected(known: Law, at: At) -> Corrected:
-        v, load, push, size = at.v, at.N, at.push, at.h
-        p, z, normalised = vars(known), at.z[0], isinstance(known, LuGreNormalised)
+    def corrected(
+        known: Law, v: ca.SX, load: ca.SX, z: ca.SX, push: ca.SX, size: ca.SX | float
+    ) -> Corrected:
+        p, normalised = vars(known), isinstance(known, LuGreNormalised)
         of_load = load if normalised else 1.0
         most = p["mu_s"] * (1.0 if normalised else load) / p["sigma_0"]
-        rate = ca.SX(known.rate(v, load, at.z)) + push
-        step = held_step(rate, at.z, size, ca.SX(1, 1), where)
+        rate = ca.SX(known.rate(v, load, z)) + push
+        step = held_step(rate, z, size, ca.SX(1, 1), where)
         end, mean = ca.SX(smooth.clip(step.end, -most, most)), smooth.clip(step.mean, -most, most)
         damping = p["sigma_1"]
         if isinstance(known, LuGrePassive):
@@ -98,11 +86,14 @@ def lugre_observer(
         force = p["sigma_0"] * mean + damping * (end - z) / size + p["sigma_2"] * v
         return end, ca.SX(force * of_load)
 
-    doc = "Observer of the bristle deflection by the position error."
-    formula = "dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0"
-    called = "lugre_observer" if name is None else name
-    setup = Setup(name=called, doc=doc, equations=formula, gain=gain, N=N, ramp=ramp, limit=limit)
-    return _observer(law, setup, corrected, h, turning, where)
+    block = _observer(law, corrected, gain, N, ramp, limit, h, where)
+    block = replace(
+        block,
+        name="lugre_observer" if name is None else name,
+        doc=f"Observer of the bristle deflection by the position error. {block.doc}",
+        equations=f"dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0\n\n{block.equations}",
+    )
+    return in_turning(block) if turning else block
 
 
 def gms_observer(
@@ -142,9 +133,10 @@ def gms_observer(
     if law.form != "event":
         raise checks.refused(f"{where}: form", "'event', whose step is known", law.form)
 
-    def corrected(known: Law, at: At) -> Corrected:
-        v, load, push, size = at.v, at.N, at.push, at.h
-        step = known.held_step(v, load, at.z, size)
+    def corrected(
+        known: Law, v: ca.SX, load: ca.SX, z: ca.SX, push: ca.SX, size: ca.SX | float
+    ) -> Corrected:
+        step = known.held_step(v, load, z, size)
         if step is None or not isinstance(known, GMS):
             raise checks.refused(where, "a law that knows its step", known)
         end, mean = ca.SX(step[0]), ca.SX(step[1])
@@ -155,24 +147,15 @@ def gms_observer(
             force = force + smooth.clip(mean[i] + more / 2, -most, most)
         return end, ca.SX(force)
 
-    doc = "Observer of the spring forces by the position error."
+    block = _observer(law, corrected, gain, N, ramp, limit, h, where)
     formula = "F_i+ = F_i of the law + k_i h k_e e, |F_i| <= alpha_i mu_s N"
-    called = "gms_observer" if name is None else name
-    setup = Setup(name=called, doc=doc, equations=formula, gain=gain, N=N, ramp=ramp, limit=limit)
-    return _observer(law, setup, corrected, h, turning, where)
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What observers of states share: texts, gain, load, and what is done to the force."""
-
-    name: str
-    doc: str
-    equations: str
-    gain: float
-    N: float
-    ramp: float | None
-    limit: float | None
+    block = replace(
+        block,
+        name="gms_observer" if name is None else name,
+        doc=f"Observer of the spring forces by the position error. {block.doc}",
+        equations=f"{formula}\n\n{block.equations}",
+    )
+    return in_turning(block) if turning else block
 
 
 def _check(what: str, law: object, kinds: tuple[type[Law], ...], such_as: str, gain: object) -> str:
@@ -186,47 +169,49 @@ def _check(what: str, law: object, kinds: tuple[type[Law], ...], such_as: str, g
 
 def _observer(
     law: Law,
-    setup: Setup,
-    corrected: Callable[[Law, At], Corrected],
+    corrected: Callable[[Law, ca.SX, ca.SX, ca.SX, ca.SX, ca.SX | float], Corrected],
+    gain: float,
+    N: float,
+    ramp: float | None,
+    limit: float | None,
     h: float | None,
-    turning: bool,
     where: str,
 ) -> Block:
-    """The block of an observer of the states of `law`."""
+    """The block of an observer of the states of `law`, with the name and texts of the law.
+
+    Args:
+        corrected: (law, v, N, states, gain times error, step size) -> states after the step and
+            mean force.
+    """
     inner = law_block(law, h=h)
     known = parameters(law)
     own = {p.name: p.symbol for p in inner.parameters if p.name in known}
-    size = next((p for p in inner.parameters if p.name == "h"), None)
-    duration = float(inner.constants["h"]) if size is None else size.symbol
+    size = [p for p in inner.parameters if p.name == "h"]
+    duration = size[0].symbol if size else float(inner.constants["h"])
     v = inner.inputs[0]
-    parts = Parts(inner.states, (v,), tuple(p for p in inner.parameters if p is not size))
-    parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
-    parts, k = parts.parameter("k_e", setup.gain, "1/s", "gain of the error")
-    load = checks.number(f"{where}: N", setup.N, unit="N", lower=0.0)
-    parts, constant = parts.parameter("N", load, "N", "normal force")
+    parts = Parts(inner.states, (v,), tuple(p for p in inner.parameters if p not in size))
+    e = parts.given("e", "m", "position error, reference less measured", 1e-5)
+    k = parts.parameter("k_e", gain, "1/s", "gain of the error")
+    load = checks.number(f"{where}: N", N, unit="N", lower=0.0)
+    constant = parts.parameter("N", load, "N", "normal force")
     z = ca.vertcat(*(state.symbol for state in inner.states))
-    at = At(v.symbol, ca.fmax(constant, LEAST), z, k * e, duration)
-    end, force = corrected(with_values(law, own), at)
-    parts = replace(parts, next=tuple(ca.vertsplit(end)))
-    parts, force = _finished(parts, force, setup.ramp, setup.limit, duration, where)
-    block = Block(
-        setup.name,
-        doc=f"{setup.doc} {inner.doc}",
-        equations=f"{setup.equations}\n\n{inner.equations}",
+    least = ca.fmax(constant, LEAST)
+    end, force = corrected(with_values(law, own), v.symbol, least, z, k * e, duration)
+    parts.next = ca.vertsplit(end)
+    force = _finished(parts, force, ramp, limit, duration, where)
+    block = replace(
+        inner,
         discretisation=without_end(inner.discretisation),
         use=USE,
-        limits=inner.limits,
-        sources=inner.sources,
-        about=inner.about,
-        states=parts.states,
-        inputs=parts.inputs,
-        parameters=parts.parameters + (() if size is None else (size,)),
+        states=tuple(parts.states),
+        inputs=tuple(parts.inputs),
+        parameters=(*parts.parameters, *size),
         next=ca.vertcat(*parts.next),
         outputs={"F": Output(force, "N", ESTIMATE)},
-        constants=inner.constants,
+        resets={},
+        arrays=(),
     )
-    block = arranged(block)
-    return in_turning(block) if turning else block
+    return arranged(block)
 
 
 def _finished(
@@ -236,15 +221,15 @@ def _finished(
     limit: float | None,
     h: ca.SX | float,
     where: str,
-) -> tuple[Parts, ca.SX]:
+) -> ca.SX:
     """The force faded in and limited, where that is chosen."""
     if ramp is not None:
         ramp = checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
-        parts, force = stages.ramped(parts, force, h, ramp)
+        force = ramped(parts, force, h, ramp)
     if limit is not None:
         limit = checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
-        parts, force = stages.limited(parts, force, limit)
-    return parts, force
+        force = limited(parts, force, limit)
+    return force
 
 
 def disturbance_observer(
@@ -295,20 +280,21 @@ def disturbance_observer(
     order = checks.count(f"{where}: order", order, least=1, most=2)
     size = step_variable(where, h)
     duration = size.symbol if h is None else float(size.start)
-    parts, u = Parts().given(
+    parts = Parts()
+    u = parts.given(
         "u", "N", "force that acted since the last call, less that of a compensator beside"
     )
-    parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
-    parts, m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
-    parts, w = parts.parameter("w", bandwidth, "rad/s", "bandwidth of the filter")
-    parts, before = parts.state("v_before", "m/s", "velocity at the last call", 0.1)
-    parts = parts.following(v)
+    v = parts.given("v", "m/s", "measured velocity", 0.1)
+    m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
+    w = parts.parameter("w", bandwidth, "rad/s", "bandwidth of the filter")
+    before = parts.state("v_before", "m/s", "velocity at the last call", 0.1)
+    parts.next.append(v)
     force = u - m * (v - before) / duration
     for k in range(order):
-        parts, d = parts.state(f"d_{k + 1}", "N", "filtered force")
+        d = parts.state(f"d_{k + 1}", "N", "filtered force")
         force = d + (1 - ca.exp(-w * duration)) * (force - d)
-        parts = parts.following(force)
-    parts, force = _finished(parts, force, ramp, limit, duration, where)
+        parts.next.append(force)
+    force = _finished(parts, force, ramp, limit, duration, where)
     block = Block(
         where if name is None else name,
         doc="Disturbance observer: what opposes the force of a drive beside its mass.",
@@ -318,9 +304,9 @@ def disturbance_observer(
         ),
         discretisation="The balance of impulse over the last interval, and an exact filter of it.",
         use=("Call it once a sample and add F to the force that the controller commands.",),
-        states=parts.states,
-        inputs=parts.inputs,
-        parameters=parts.parameters + ((size,) if h is None else ()),
+        states=tuple(parts.states),
+        inputs=tuple(parts.inputs),
+        parameters=(*parts.parameters, *([size] if h is None else [])),
         next=ca.vertcat(*parts.next),
         outputs={"F": Output(force, "N", "estimated opposing force, to add to that commanded")},
         constants={} if h is None else {"h": float(h)},

@@ -6,7 +6,7 @@ from typing import Any, final
 
 import numpy as np
 
-from symfric.compensation.terms import TERMS
+from symfric.compensation.force import TERMS
 from symfric.foundation import checks
 
 VELOCITIES = ("blend", "reference", "measured")

@@ -1,11 +1,18 @@
 """Generated C on Cortex-M cores: cross-compiled, run under QEMU, measured."""
 
-from symfric.embedded.cores import CORES as CORES
-from symfric.embedded.cores import Core as Core
-from symfric.embedded.measure import Measured as Measured
-from symfric.embedded.measure import measure as measure
-from symfric.embedded.self_check import wrong_on_target as wrong_on_target
-from symfric.embedded.subjects import BY as BY
-from symfric.embedded.tools import Absent as Absent
-from symfric.embedded.tools import Tools as Tools
-from symfric.embedded.tools import find_tools as find_tools
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.embedded.measure import Measured as Measured
+    from symfric.embedded.measure import measure as measure
+    from symfric.embedded.measure import wrong_on_target as wrong_on_target
+    from symfric.embedded.subjects import BY as BY
+    from symfric.embedded.target import CORES as CORES
+    from symfric.embedded.target import Absent as Absent
+    from symfric.embedded.target import Core as Core
+    from symfric.embedded.target import Tools as Tools
+    from symfric.embedded.target import find_tools as find_tools
+
+hand_out(__name__)

@@ -1,4 +1,4 @@
-"""What a step of a block costs on a Cortex-M core, and whether it gives what the host gives."""
+"""Cost of a step of a block on a Cortex-M core, its accuracy, and the unit test of a kit there."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -11,18 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.running.compiler import link_program
-from symfric.codegen.running.runner import program, run_c, run_vm
-from symfric.codegen.writing.layout import prefix
-from symfric.embedded.cores import CORES, Core
-from symfric.embedded.inputs import day
-from symfric.embedded.qemu import Said, Target, built, said
+from symfric.codegen.compiler import link_program
+from symfric.codegen.generated import Generated
+from symfric.codegen.layout import filled, prefix
+from symfric.codegen.runner import program, run_c, run_vm
 from symfric.embedded.subjects import BY, by_casadi, own
-from symfric.embedded.tools import Absent, Tools, find_tools
+from symfric.embedded.target import (
+    CORES,
+    SOURCES,
+    Absent,
+    Core,
+    Said,
+    Target,
+    Tools,
+    built,
+    find_tools,
+    said,
+)
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.files import write_text
+from symfric.foundation.parameters import Variable
 
 Array = NDArray[np.float64]
 
@@ -189,3 +199,81 @@ def _equal(block: Block, source: Path, how: tuple[str, bool], inputs: Array, row
     link_program(compiler, [folder / "main.c", source], folder, folder / "main")
     host = run_c(block, real, folder / "main", inputs, guards=guards)
     return float((host[:, : rows.shape[1]] == rows).mean())
+
+
+def wrong_on_target(
+    generated: Generated,
+    real: str = "float",
+    core: str = "m4f",
+    *,
+    flags: Sequence[str] = ("-O2",),
+    tools: Tools | Absent | None = None,
+) -> int:
+    """How many results of the kit's own unit test are wrong on a core under QEMU.
+
+    Args:
+        generated: what `generate` returned, with the floating point type `real`.
+        core: one of `CORES`.
+        flags: of the compiler.
+        tools: what `find_tools` found.
+
+    Raises:
+        ValueError: an unknown core, a type that was not generated.
+        CompileError: tools are absent, the compiler refuses the code, or the program fails.
+    """
+    where = "embedded"
+    checks.kind(where, generated, Generated, "what generate(...) returned")
+    checks.choice(f"{where}: real", real, generated.reals)
+    checks.choice(f"{where}: core", core, CORES)
+    found = find_tools() if tools is None else tools
+    if isinstance(found, Absent):
+        raise CompileError(f"{where}: {found.advice}")
+    name = prefix(generated.block, REALS[real])
+    sources = [generated.folder / f"{name}{ending}.c" for ending in ("", "_test")]
+    target = Target(CORES[core], found, flags)
+    with TemporaryDirectory(prefix="symfric-") as folder:
+        own = (f"-D{name.upper()}_TEST_NO_MAIN", f"-I{generated.folder}")
+        image = target.linked(Path(folder), filled(SOURCES / "test.c", name=name), sources, *own)
+        return int(target.heard(image)["wrong"][0])
+
+
+STRETCH = 20
+"""Steps of one kind of motion in a row."""
+
+LOADS = (1.0, 1.5, 0.5, 1.0, 0.1, 10.0)
+"""Of a load, in units of its nominal value, one after the other: steps up to a hundredfold."""
+
+
+def day(block: Block, steps: int) -> Array:
+    """Inputs of every step, shape (steps, inputs), the same at each call.
+
+    In stretches of 20 steps, in units of the nominal value: a slow sine through zero, bursts up to
+    2, values of 1e-12 ... 1e-3 of either sign, reversals between -0.1 and 0.1, rest: a fifth each,
+    shuffled. A load (lower bound 0 or more) wavers by a tenth around levels that jump between the
+    stretches by factors up to 100.
+    """
+    random = np.random.default_rng(0)
+    columns = [np.zeros((steps, 0)), *(_signal(v, steps, random) for v in block.inputs)]
+    values = np.column_stack(columns)
+    lower = np.array([v.lower for v in block.inputs])
+    upper = np.array([v.upper for v in block.inputs])
+    return np.clip(values, lower, upper)
+
+
+def _signal(variable: Variable, steps: int, random: np.random.Generator) -> Array:
+    k = np.arange(steps)
+    count = -(-steps // STRETCH)
+    if variable.lower >= 0.0:
+        levels = np.resize(LOADS, count).repeat(STRETCH)[:steps]
+        return variable.nominal * levels * (1.0 + 0.1 * np.sin(0.3 * k + random.uniform(0.0, 6.0)))
+    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
+    pieces = [
+        0.05 * np.sin(0.15 * k),
+        np.clip(random.standard_normal(steps), -2.0, 2.0),
+        tiny,
+        0.1 * np.sign(np.sin(0.6 * k + 0.1)),
+        np.zeros(steps),
+    ]
+    turns = np.resize(np.arange(len(pieces)), count)
+    random.shuffle(turns)
+    return variable.nominal * np.choose(turns.repeat(STRETCH)[:steps], pieces)

@@ -3,16 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from re import MULTILINE, escape, search
 from typing import final
 
 import casadi as ca
 import numpy as np
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.writing.header import header
-from symfric.codegen.writing.layout import prefix
-from symfric.codegen.writing.source import source
+from symfric.codegen.header import header
+from symfric.codegen.layout import called, prefix
+from symfric.codegen.routines import source
 from symfric.emitter.c99 import REALS
 from symfric.foundation.files import write_text
 
@@ -34,7 +33,7 @@ class Subject:
 
     Attributes:
         source: the file to compile.
-        parts: of the main program, see `firmware.MAIN`.
+        parts: of the main program, the places of `sources/measured.c`.
     """
 
     source: Path
@@ -42,60 +41,36 @@ class Subject:
 
 
 def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
-    """Our C, written into `folder` and called as its header says: every argument by its name."""
+    """Our C, written into `folder`, and its call."""
     name, kind = prefix(block, REALS[real]), REALS[real]
-    prototypes = header(block, kind, guards)
-    files = folder / f"{name}.h", folder / f"{name}.c"
-    write_text(files[0], prototypes)
-    write_text(files[1], source(block, kind, guards))
-    values = {
+    write_text(folder / f"{name}.h", header(block, kind, guards))
+    write_text(folder / f"{name}.c", source(block, kind, guards))
+    pointers = {
         "state": "&state",
         "param": f"&{name}_default",
         "in": f"(const {name}_in_t *)U[k]",
         "out": f"({name}_out_t *)(Y[k] + {len(block.states)})",
-        "start": f"&{name}_start",
-        "status": "&status",
-        **{variable.name: f"U[k][{i}]" for i, variable in enumerate(block.inputs)},
     }
+    inputs = [f"U[k][{i}]" for i in range(len(block.inputs))]
+    step = called(block, kind, guards, pointers, inputs)
     declarations, start, keep = ["unsigned int status;"], "status = 0u;", "(void)k;"
     if block.states:
         declarations.append(f"{name}_state_t state;")
-        start += f" {_call(prototypes, f'{name}_init', values)};"
+        start += f" {name}_init(&state, &{name}_start);"
         keep = "memcpy(Y[k], &state, sizeof state);"
-    if block.is_function:
-        step = f"Y[k][0] = {_call(prototypes, name, values)};"
-    else:
-        step = f"{_call(prototypes, f'{name}_step', values)};"
-        if _result(prototypes, f"{name}_step") != "void":
-            step = f"status |= {step}"
     sizes = [f"sizeof({name}_state_t)"] * bool(block.states)
     sizes += [f"sizeof({name}_param_t)"] * bool(block.parameters)
     return Subject(
-        files[1],
+        folder / f"{name}.c",
         {
             "include": f'#include "{name}.h"',
             "declarations": "\n".join(f"static {line}" for line in declarations),
             "start": start,
-            "step": step,
+            "step": f"{'Y[k][0] = ' if block.is_function else 'status |= ' * guards}{step};",
             "keep": keep,
             "data": " + ".join(sizes) or "0u",
         },
     )
-
-
-def _call(prototypes: str, function: str, values: Mapping[str, str]) -> str:
-    """A call of a function with every argument by its name."""
-    found = search(rf"\b{escape(function)}\(([^)]*)\);", prototypes)
-    if found is None:
-        raise RuntimeError(f"embedded: expected {function} in the header, found none")
-    names = [text.split()[-1].lstrip("*") for text in found[1].split(",")]
-    return f"{function}({', '.join(values[n] for n in names if n != 'void')})"
-
-
-def _result(prototypes: str, function: str) -> str:
-    """The type that a function returns."""
-    found = search(rf"^([\w ]+?) {escape(function)}\(", prototypes, MULTILINE)
-    return "void" if found is None else found[1]
 
 
 def by_casadi(block: Block, real: str, folder: Path, *, functions_of_float: bool) -> Subject:

@@ -25,8 +25,7 @@ import casadi as ca
 
 from symfric.emitter.c99 import Real
 from symfric.emitter.emit import Code, emit
-from symfric.emitter.known import settled
-from symfric.emitter.logic import simplified
+from symfric.emitter.logic import settled, simplified
 from symfric.emitter.rolling import OUTER, READ, TABLE, TRUTH, Array, is_truth
 from symfric.emitter.segments import Loop, Plan, planned
 from symfric.foundation.graph import LEAVES, Graph, Node

@@ -14,10 +14,8 @@ from re import fullmatch
 
 import casadi as ca
 
-from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, operation_name
-from symfric.emitter.expressions import Writer
-from symfric.emitter.known import settled
-from symfric.emitter.logic import LOWERED, logical, simplified
+from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, Writer, operation_name
+from symfric.emitter.logic import LOWERED, logical, settled, simplified
 from symfric.emitter.statements import (
     Branch,
     Local,

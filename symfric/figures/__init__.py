@@ -29,15 +29,5 @@ if TYPE_CHECKING:
     from symfric.figures.sliding import sweep_e as sweep_e
     from symfric.figures.sliding import transition as transition
     from symfric.figures.sliding import velocity_step as velocity_step
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.figures.catalogue": "FIGURES compare figure",
-            "symfric.figures.data": "Curve FigureData Scales phenomena scales",
-            "symfric.figures.pushing": "break_away drift push stiction",
-            "symfric.figures.recommended": "Recommendation recommended",
-            "symfric.figures.sliding": "dwell hysteresis lag profile steady_state sweep_b sweep_c "
-            "sweep_e transition velocity_step",
-        },
-    )
+
+hand_out(__name__)

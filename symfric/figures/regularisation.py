@@ -38,8 +38,8 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
+from symfric.laws.base.families import Sticking
 from symfric.laws.base.law import check_law
-from symfric.laws.base.sticking import Sticking
 from symfric.model import Model
 from symfric.model.kinds import FRICTION_STATE, MODE, POSITION
 from symfric.results.trajectory import Trajectory

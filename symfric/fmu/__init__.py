@@ -7,9 +7,6 @@ from symfric.foundation.fronts import hand_out
 if TYPE_CHECKING:
     from symfric.fmu.export import Exported as Exported
     from symfric.fmu.export import export_fmu as export_fmu
-    from symfric.fmu.running import running as running
-else:
-    hand_out(
-        __name__,
-        {"symfric.fmu.export": "Exported export_fmu", "symfric.fmu.running": "running"},
-    )
+    from symfric.fmu.export import running as running
+
+hand_out(__name__)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu.variables import LEAST_RTOL
 from symfric.integrator.arguments import chosen
+from symfric.integrator.equations.expressions import pace
 from symfric.integrator.equations.initial import (
     FLOOR,
     LONGEST_FIRST,
@@ -25,13 +26,12 @@ from symfric.integrator.equations.initial import (
     smallest_step,
 )
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.onsets import pace
 from symfric.integrator.equations.system import System
-from symfric.integrator.methods.suited import suited_to_start
+from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.loop import search_source
 from symfric.integrator.running.run import PACES
-from symfric.integrator.running.search import search_source
 from symfric.integrator.step.attempt import build_fixed
 from symfric.integrator.step.layout import GROWTH_MEMORY
 from symfric.integrator.step.pieces import all_macros, routine

@@ -3,8 +3,8 @@
 `import symfric` then costs what is used: no law, no mechanism, no picture before its name is read.
 """
 
+import ast
 import sys
-from collections.abc import Mapping
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -44,17 +44,28 @@ class Front(ModuleType):
             super().__setattr__(name, value)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self._places})
+        return sorted({*(n for n in super().__dir__() if n.startswith("__")), *self._places})
 
 
-def hand_out(package: str, names: Mapping[str, str]) -> None:
-    """Make the front of `package` hand out `names`, loaded on demand.
+def hand_out(package: str) -> None:
+    """Make the front of `package` hand out the names that its source imports for type checkers.
+
+    These imports stand in `if TYPE_CHECKING:`, so that each name is written once; the front has to
+    be installed with its source.
 
     Args:
         package: `__name__` of the front.
-        names: module -> the names it has, separated by blanks.
     """
     front = sys.modules[package]
-    front.__dict__["_places"] = {name: at for at, text in names.items() for name in text.split()}
-    front.__dict__["__all__"] = [*front.__dict__["_places"]]
+    source = vars(front)["__loader__"].get_source(package)
+    found: dict[str, str] = {}
+    for block in ast.parse(source).body:
+        if isinstance(block, ast.If):
+            for line in block.body:
+                if isinstance(line, ast.ImportFrom) and line.module:
+                    names = [alias.asname or alias.name for alias in line.names]
+                    names = import_module(line.module).__all__ if names == ["*"] else names
+                    found |= dict.fromkeys(names, line.module)
+    front.__dict__["_places"] = found
+    front.__dict__["__all__"] = [*found]
     front.__class__ = Front

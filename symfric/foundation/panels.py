@@ -5,8 +5,6 @@ shows the one that a cell returns, once, and a program without a screen needs no
 wants a window says `figure.show()`.
 """
 
-from base64 import b64encode
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, final
 
@@ -17,6 +15,7 @@ from matplotlib.figure import Figure
 
 from symfric.foundation import checks
 from symfric.foundation.files import written
+from symfric.foundation.shown import png
 from symfric.foundation.style import COLOURS
 
 Shared = bool | Literal["none", "all", "row", "col"]
@@ -110,15 +109,3 @@ def save(figure: Figure, path: str | Path | None, dpi: float = 150) -> Figure:
         with written(place) as temporary:
             figure.savefig(temporary, dpi=dpi)
     return figure
-
-
-def png(figure: Figure, dpi: float = 100) -> bytes:
-    """`figure` as the bytes of a PNG file."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi)
-    return buffer.getvalue()
-
-
-def data_uri(figure: Figure, dpi: float = 60) -> str:
-    """`figure` as text for the `src` of an HTML image: a PNG inside, no file, no network."""
-    return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()

@@ -4,9 +4,11 @@ Everything that comes from a user is escaped; there are no scripts, and pictures
 """
 
 from abc import ABC, abstractmethod
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from io import BytesIO
 from typing import TYPE_CHECKING, ClassVar, final
 
 from symfric.foundation.numeric import Scalar, is_casadi, is_number
@@ -170,10 +172,20 @@ def _html_table(table: Table) -> str:
     return f'<div style="overflow-x:auto">{whole}</div>'  # narrow cells scroll it
 
 
+def png(figure: "Figure", dpi: float = 100) -> bytes:
+    """`figure` as the bytes of a PNG file."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
+
+
+def data_uri(figure: "Figure", dpi: float = 60) -> str:
+    """`figure` as text for the `src` of an HTML image: a PNG inside, no file, no network."""
+    return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
+
+
 def _image(figure: "Figure", words: str) -> str:
     """A figure as an image inside the page."""
-    from symfric.foundation.panels import data_uri  # noqa: PLC0415  (matplotlib is slow to import)
-
     return (
         f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
         f'src="{data_uri(figure, DOTS_PER_INCH)}">'

@@ -8,10 +8,17 @@ plate = plates()["self_tuning/fig_07_shape_factor"](quick=True)
 plate.picture.savefig("fig_07.png")
 """
 
-from symfric.gallery.plate import Plate as Plate
-from symfric.gallery.plate import chosen as chosen
-from symfric.gallery.plate import plate_of as plate_of
-from symfric.gallery.plate import plates as plates
-from symfric.gallery.plate import script as script
-from symfric.gallery.plate import scripts as scripts
-from symfric.gallery.plate import short as short
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.gallery.plate import Plate as Plate
+    from symfric.gallery.plate import chosen as chosen
+    from symfric.gallery.plate import plate_of as plate_of
+    from symfric.gallery.plate import plates as plates
+    from symfric.gallery.plate import script as script
+    from symfric.gallery.plate import scripts as scripts
+    from symfric.gallery.plate import short as short
+
+hand_out(__name__)

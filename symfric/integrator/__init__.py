@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Hold as Hold
     from symfric.integrator.equations.inputs import Input as Input
     from symfric.integrator.equations.inputs import Linear as Linear
-    from symfric.integrator.equations.rates import rate_of as rate_of
+    from symfric.integrator.equations.inputs import rate_of as rate_of
     from symfric.integrator.flow import flow as flow
     from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate
@@ -20,21 +20,5 @@ if TYPE_CHECKING:
     from symfric.results.ensemble import load_ensemble as load_ensemble
     from symfric.results.statistics import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
-else:
-    hand_out(
-        __name__,
-        {
-            "symfric.integrator.by_peer": "simulate_by_peer",
-            "symfric.integrator.ensemble": "simulate_many",
-            "symfric.integrator.equations.inputs": "Hold Input Linear",
-            "symfric.integrator.equations.rates": "rate_of",
-            "symfric.integrator.flow": "flow",
-            "symfric.integrator.simulate": "simulate",
-            "symfric.integrator.plant": "Plant",
-            "symfric.integrator.stepper": "stepper",
-            "symfric.integrator.stored": "load_run",
-            "symfric.results.ensemble": "Ensemble load_ensemble",
-            "symfric.results.statistics": "Statistics",
-            "symfric.results.trajectory": "Trajectory",
-        },
-    )
+
+hand_out(__name__)

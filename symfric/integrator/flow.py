@@ -8,7 +8,7 @@ from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.methods.suited import suited_to_start
+from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model, check_model

@@ -1,5 +1,7 @@
 """A plant: a model that goes from sample to sample with its inputs held."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any, final
 
@@ -10,10 +12,9 @@ from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
-from symfric.integrator.many.plants import pays, side_by_side
+from symfric.integrator.many.plants import pays, side_by_side, with_events
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
-from symfric.integrator.running.eventful_plants import with_events
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import (
     AGAIN,
@@ -48,13 +49,9 @@ class Plant:
     """
 
     def __init__(
-        self,
-        integrator: Integrator,
-        plants: Plants,
-        backend: str,
-        batch: int | None,
+        self, integrator: Integrator, plants: Plants, backend: str, batch: int | None,
         tolerance: float,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.model, self.dt = integrator.model, plants.dt
         self.failed: dict[int, tuple[Status, str]] = {}
         self._plants, self._batch, self._tolerance = plants, batch, tolerance
@@ -179,7 +176,7 @@ class Plant:
         self._seen = False
         return self._x.copy()
 
-    def copy(self) -> "Plant":
+    def copy(self) -> Plant:
         """A plant in the same state that goes its own way."""
         plants = self._plants.copy()
         other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
@@ -187,7 +184,7 @@ class Plant:
         other._own, other._places = self._own, list(self._places)
         return other
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Plant":
+    def __deepcopy__(self, memo: dict[int, Any]) -> Plant:
         return self.copy()
 
     @property

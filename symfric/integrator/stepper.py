@@ -1,5 +1,7 @@
 """A model as a plant for control loops and learning: inputs held, from sample to sample."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from symfric.foundation import checks
@@ -7,9 +9,8 @@ from symfric.integrator.arguments import BACKENDS, check_model, check_span, chos
 from symfric.integrator.equations.initial import smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.plant import Numbers, Plant
-from symfric.integrator.running.built import built
 from symfric.integrator.running.crossings import Memory
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.plants import SAMPLES, Plants
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State

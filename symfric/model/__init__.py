@@ -1,10 +1,17 @@
 """The one interface between those who write equations and those who solve them."""
 
-from symfric.model.contact import Contact as Contact
-from symfric.model.holonomic import Holonomic as Holonomic
-from symfric.model.model import Model as Model
-from symfric.model.model import Variables as Variables
-from symfric.model.model import check_model as check_model
-from symfric.model.parts import Event as Event
-from symfric.model.parts import Monitor as Monitor
-from symfric.model.parts import Output as Output
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.model.contact import Contact as Contact
+    from symfric.model.holonomic import Holonomic as Holonomic
+    from symfric.model.model import Model as Model
+    from symfric.model.model import Variables as Variables
+    from symfric.model.model import check_model as check_model
+    from symfric.model.parts import Event as Event
+    from symfric.model.parts import Monitor as Monitor
+    from symfric.model.parts import Output as Output
+
+hand_out(__name__)

@@ -99,7 +99,7 @@ def _verdict(runs: Mapping[str, Trajectory]) -> str:
 
 def _picture(runs: Mapping[str, Trajectory]) -> str:
     """The picture that `plot` gives, inside the page."""
-    from symfric.foundation.panels import data_uri  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.foundation.shown import data_uri  # noqa: PLC0415  (matplotlib is slow)
     from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (likewise)
 
     source = data_uri(plot_trajectories(runs), dpi=110)

@@ -1,8 +1,15 @@
 """Random campaigns: cases drawn, each judged against another method. May import everything."""
 
-from symfric.stress.campaign import Report as Report
-from symfric.stress.cases import Case as Case
-from symfric.stress.cases import Signal as Signal
-from symfric.stress.cases import draw as draw
-from symfric.stress.judge import CLASSES as CLASSES
-from symfric.stress.judge import Verdict as Verdict
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.stress.campaign import Report as Report
+    from symfric.stress.cases import Case as Case
+    from symfric.stress.cases import Signal as Signal
+    from symfric.stress.cases import draw as draw
+    from symfric.stress.judge import CLASSES as CLASSES
+    from symfric.stress.judge import Verdict as Verdict
+
+hand_out(__name__)

@@ -5,9 +5,9 @@ from mutants.mutant import Mutant
 FRONTS = "symfric/foundation/fronts.py"
 BACKGROUND = "symfric/integrator/compiled/background.py"
 COMPILER = "symfric/integrator/compiled/compiler.py"
-BRANCHES = "symfric/integrator/equations/branches.py"
-ELIMINATED = "symfric/integrator/equations/eliminated.py"
-WRITTEN = "symfric/integrator/step/written.py"
+BRANCHES = "symfric/integrator/equations/expressions.py"
+ELIMINATED = "symfric/integrator/methods/explicit.py"
+WRITTEN = "symfric/integrator/step/attempt.py"
 T_FRONTS = ("tests/symfric/foundation/test_fronts.py",)
 T_BACKGROUND = ("tests/symfric/integrator/compiled/test_background.py",)
 T_BRANCHES = ("tests/symfric/integrator/equations/test_branches.py",)

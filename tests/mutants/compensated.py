@@ -2,10 +2,10 @@
 
 from mutants.mutant import Mutant
 
-STAGES = "symfric/compensation/stages.py"
-TERMS = "symfric/compensation/terms.py"
+STAGES = "symfric/compensation/force.py"
+TERMS = "symfric/compensation/force.py"
 OBSERVERS = "symfric/compensation/observers.py"
-LOOP, CASCADE = "symfric/compensation/loop.py", "symfric/compensation/cascade.py"
+LOOP, CASCADE = "symfric/compensation/loop.py", "symfric/compensation/compensator.py"
 BLOCK = "symfric/compensation/compensator.py"
 T_MEMBERS = ("tests/symfric/compensation/test_loop_by_hand.py",)
 T_CASCADE = ("tests/symfric/compensation/test_cascade.py",)
@@ -54,8 +54,8 @@ COMPENSATED = (
     ),
     Mutant(
         "compensation: it fades in along a line", STAGES,
-        "return parts.following(end), F * smooth.step3(end)",
-        "return parts.following(end), F * end",
+        "return F * smooth.step3(end)",
+        "return F * end",
         block("it_fades_in_and_out_without_a_bump"),
     ),
     Mutant(
@@ -92,7 +92,7 @@ COMPENSATED = (
     ),
     Mutant(
         "compensation: the stuck axis is told by the measured velocity alone", BLOCK,
-        "stages.freed(parts, wanted, v, h, *s.stick)", "stages.freed(parts, v, v, h, *s.stick)",
+        "freed(parts, wanted, v, h, *s.stick)", "freed(parts, v, v, h, *s.stick)",
         block("a_stuck_axis_is_freed_and_let_go"),
     ),
     Mutant(
@@ -112,7 +112,7 @@ COMPENSATED = (
     ),
     Mutant(
         "observer: the error bends the bristles the other way", OBSERVERS,
-        "at.z)) + push", "at.z)) - push",
+        "rate(v, load, z)) + push", "rate(v, load, z)) - push",
         observer("an_error_that_stands_bends_the_bristles"),
     ),
     Mutant(
@@ -127,8 +127,8 @@ COMPENSATED = (
     ),
     Mutant(
         "observer: a filter of higher order takes the force of the one before it unfiltered",
-        OBSERVERS, "        parts = parts.following(force)\n    parts, force = _finished",
-        "        parts = parts.following(d)\n    parts, force = _finished",
+        OBSERVERS, "        parts.next.append(force)\n    force = _finished",
+        "        parts.next.append(d)\n    force = _finished",
         observer("a_disturbance_is_found_by_the_balance_of_impulse"),
     ),
     Mutant(

@@ -5,7 +5,7 @@ from mutants.mutant import Mutant
 LOGIC = "symfric/emitter/logic.py"
 BRANCHES = "symfric/emitter/branches.py"
 STATEMENTS = "symfric/emitter/statements.py"
-SCHEDULE = "symfric/emitter/schedule.py"
+SCHEDULE = "symfric/emitter/statements.py"
 EMIT = "symfric/emitter/emit.py"
 T_BITS = ("tests/symfric/emitter/test_emit.py",)
 T_LOGIC = ("tests/symfric/emitter/test_logic.py",)

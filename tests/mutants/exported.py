@@ -123,7 +123,7 @@ EXPORTED = (
         '"Pa": "kg/(m s^2)"', '"Pa": "kg m/s^2"', T_UNITS,
     ),
     Mutant(
-        "fmu: zero degrees are zero kelvin", "symfric/fmu/description.py",
+        "fmu: zero degrees are zero kelvin", "symfric/fmu/package.py",
         "shift = 273.15 if", "shift = 0.0 if", T_SOURCES,
     ),
     Mutant(

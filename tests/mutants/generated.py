@@ -2,35 +2,35 @@
 
 from mutants.mutant import Mutant
 
-GUARDS = "symfric/codegen/writing/guards.py"
-SHEET, HEADER = "symfric/codegen/writing/sheet.py", "symfric/codegen/writing/header.py"
-VECTORS, LOADER = "symfric/codegen/kit/vectors.py", "symfric/codegen/kit/loader.py"
-SELF, SIMULINK = "symfric/codegen/kit/self_check.py", "symfric/codegen/kit/simulink.py"
-MANIFEST = "symfric/codegen/kit/manifest.py"
-COMPARED = "symfric/codegen/proof/compared.py"
-MAGNITUDE = "symfric/codegen/proof/magnitude.py"
-VERIFY, FUZZ = "symfric/codegen/proof/verify.py", "symfric/codegen/proof/fuzz.py"
-EXCITATION = "symfric/codegen/proof/excitation.py"
-GUARDED = "symfric/codegen/running/guarded.py"
-T_SOURCE = "tests/symfric/codegen/writing/test_source.py"
-T_GUARDS = "tests/symfric/codegen/writing/test_guards.py"
+GUARDS = "symfric/codegen/guards.py"
+SHEET, HEADER = "symfric/codegen/header.py", "symfric/codegen/header.py"
+VECTORS, LOADER = "symfric/codegen/vectors.py", "symfric/codegen/templates/ctypes_loader.txt"
+SELF, SIMULINK = "symfric/codegen/kit.py", "symfric/codegen/kit.py"
+MANIFEST = "symfric/codegen/generated.py"
+COMPARED = "symfric/codegen/compared.py"
+MAGNITUDE = "symfric/codegen/compared.py"
+VERIFY, FUZZ = "symfric/codegen/verification.py", "symfric/codegen/fuzz.py"
+EXCITATION = "symfric/codegen/excitation.py"
+GUARDED = "symfric/codegen/runner.py"
+T_SOURCE = "tests/symfric/codegen/test_source.py"
+T_GUARDS = "tests/symfric/codegen/test_guards.py"
 T_FLAGGED = (f"{T_GUARDS}::test_every_repair_is_flagged",)
 T_EVERY = (f"{T_GUARDS}::test_numbers_of_every_range_are_mended_in_c_as_beside_casadi",)
 T_RANGES = (f"{T_GUARDS}::test_ranges_are_the_bounds_or_a_million_times_the_nominal_value",)
 T_INTERVAL = (f"{T_SOURCE}::test_a_range_is_where_all_numbers_of_a_member_are_valid",)
 T_DEFAULTS = (f"{T_SOURCE}::test_defaults_of_an_array_that_differ_are_its_ends",)
-T_VECTORS = "tests/symfric/codegen/kit/test_vectors.py"
-T_MANIFEST = "tests/symfric/codegen/kit/test_generate.py"
-T_LOADER = "tests/symfric/codegen/kit/test_loader.py"
-T_SIMULINK = ("tests/symfric/codegen/kit/test_simulink.py",)
-T_SELF = "tests/symfric/codegen/kit/test_unit_test.py"
-T_VERIFY = "tests/symfric/codegen/proof/test_verify.py"
-T_FUZZ = "tests/symfric/codegen/proof/test_fuzz.py"
+T_VECTORS = "tests/symfric/codegen/test_vectors.py"
+T_MANIFEST = "tests/symfric/codegen/test_generate.py"
+T_LOADER = "tests/symfric/codegen/test_loader.py"
+T_SIMULINK = ("tests/symfric/codegen/test_simulink.py",)
+T_SELF = "tests/symfric/codegen/test_unit_test.py"
+T_VERIFY = "tests/symfric/codegen/test_verify.py"
+T_FUZZ = "tests/symfric/codegen/test_fuzz.py"
 
 
 def compared(test: str) -> tuple[str, ...]:
     """A test of what differences are measured in, without `test_`."""
-    return (f"tests/symfric/codegen/proof/test_compared.py::test_{test}",)
+    return (f"tests/symfric/codegen/test_compared.py::test_{test}",)
 
 
 GENERATED = (
@@ -123,9 +123,9 @@ GENERATED = (
         "states = np.vstack([start, after[:-1, :count]])", (T_VECTORS,),
     ),
     Mutant(
-        "kit: NaN passes the unit test", SELF,
-        "return !(fabs{letter}(got - wanted) <= tolerance);",
-        "return fabs{letter}(got - wanted) > tolerance;",
+        "kit: NaN passes the unit test", "symfric/codegen/templates/test.c",
+        "return !(fabs@letter(got - wanted) <= tolerance);",
+        "return fabs@letter(got - wanted) > tolerance;",
         (f"{T_SELF}::test_a_result_that_is_no_number_is_wrong",),
     ),
     Mutant(

@@ -11,6 +11,8 @@ T_STORED = ("tests/symfric/integrator/test_stored.py",)
 T_SHOWN = ("tests/symfric/foundation/test_shown.py",)
 DOUBTS = "symfric/integrator/running/doubts.py"
 T_DOUBTS = ("tests/symfric/integrator/running/test_doubts.py",)
+HOLDING = "symfric/model/holding.py"
+T_HOLDING = ("tests/symfric/model/test_holding.py",)
 T_ACCELERATIONS = ("tests/symfric/model/test_accelerations.py",)
 
 HELD = (
@@ -47,7 +49,7 @@ HELD = (
         T_INSTRUCTIONS,
     ),
     Mutant(
-        "rows of compiled loops may be short", "symfric/integrator/compiled/rows.py",
+        "rows of compiled loops may be short", "symfric/integrator/compiled/columns.py",
         "if flat.shape[1] != size:", "if False:",
         ("tests/symfric/integrator/compiled/test_columns.py",),
     ),
@@ -114,7 +116,7 @@ HELD = (
         ("tests/symfric/laws/composed/test_normalised.py",),
     ),
     Mutant(
-        "friction that adds energy is not said", "symfric/integrator/running/gains.py",
+        "friction that adds energy is not said", "symfric/integrator/running/doubts.py",
         "steady[worst] * slip[worst] < 0", "steady[worst] * slip[worst] > 0", T_DOUBTS,
     ),
     Mutant(
@@ -137,5 +139,32 @@ HELD = (
         "behind a reversal Bliman and Sorine are taken to be overloaded",
         "symfric/laws/dynamic/dahl.py",
         "else self.mu_1 + self.mu_2)", "else self.mu_1)", T_DOUBTS,
+    ),
+    Mutant(
+        "contacts that slide keep their velocity", HOLDING,
+        "ca.if_else(ca.fabs(mode) < STICKS, _change(c, model), sliding)", "_change(c, model)",
+        T_HOLDING,
+    ),
+    Mutant(
+        "the applied force ignores time", HOLDING, " + ca.jacobian(slip, model.t)", "", T_HOLDING,
+    ),
+    Mutant(
+        "a slip is reset in its first state", HOLDING,
+        "key=lambda v: sum(ca.depends_on(s, v.symbol) for s in all_slips)",
+        "key=lambda v: linear.index(v)", T_HOLDING,
+    ),
+    Mutant(
+        "normal forces may depend on friction by any function", HOLDING,
+        "if ca.depends_on(slopes, F):", "if False:", T_HOLDING,
+    ),
+    Mutant(
+        "pulses within jumps of a function of time are leapt over",
+        "symfric/integrator/equations/expressions.py", "return tuple(middle[high].tolist())",
+        "return ()", ("tests/symfric/integrator/equations/test_onsets.py",),
+    ),
+    Mutant(
+        "peaks of short pulses are not hit", "symfric/integrator/equations/expressions.py",
+        "if height.max() > PULSE * height[-1]:", "if False:",
+        ("tests/symfric/integrator/equations/test_onsets.py",),
     ),
 )  # fmt: skip

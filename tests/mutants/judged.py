@@ -139,7 +139,7 @@ JUDGED = (
         of("drill_string"),
     ),
     Mutant(
-        "the second block rubs as the first", SCENES + "rabinowicz.py",
+        "the second block rubs as the first", SCENES + "blocks.py",
         '(self.law_of("block_2"), self.m_2)', "(self.law, self.m_2)", of("coupled_blocks"),
     ),
     Mutant(

@@ -49,7 +49,7 @@ LOOPS = (
         "short loops are written, too", SEGMENTS, "SPARED = 8", "SPARED = 0", T_ELEMENTS,
     ),
     Mutant(
-        "names that count from 0 are a family", "symfric/codegen/blocks/elements.py",
+        "names that count from 0 are a family", "symfric/codegen/blocks/variables.py",
         "sorted(rows) == [*range(1, len(rows) + 1)]",
         "sorted(rows) == [*range(min(rows), min(rows) + len(rows))]", T_ELEMENTS,
     ),

@@ -5,11 +5,11 @@ from mutants.mutant import Mutant
 PRESETS = "symfric/scenes/presets.py"
 JING_MI = "symfric/scenes/jing_mi.py"
 CLUTCH = "symfric/scenes/rotating.py"
-BLOCKS = "symfric/scenes/rabinowicz.py"
+BLOCKS = "symfric/scenes/blocks.py"
 DRILL = "symfric/scenes/rotating.py"
 NIP = "symfric/scenes/rotating.py"
 GIVEN = "symfric/scenes/rigs.py"
-RATES = "symfric/integrator/equations/rates.py"
+RATES = "symfric/integrator/equations/inputs.py"
 T_PRESETS = ("tests/symfric/scenes/test_presets.py",)
 T_CLUTCH = ("tests/symfric/scenes/test_clutch.py",)
 

@@ -3,10 +3,10 @@
 from mutants.mutant import Mutant
 
 INVERSE = "symfric/codegen/blocks/inverse_dynamics.py"
-PAYLOAD = "symfric/codegen/blocks/payload.py"
-RUBBING = "symfric/codegen/blocks/rubbing.py"
-NUMBERING = "symfric/codegen/blocks/numbering.py"
-RUNNER = "symfric/codegen/running/runner.py"
+PAYLOAD = "symfric/codegen/blocks/joints.py"
+RUBBING = "symfric/codegen/blocks/joints.py"
+NUMBERING = "symfric/codegen/blocks/variables.py"
+RUNNER = "symfric/codegen/runner.py"
 T_INVERSE = ("tests/symfric/codegen/blocks/test_inverse_dynamics.py",)
 
 ROBOTS = (
@@ -46,6 +46,6 @@ ROBOTS = (
     ),
     Mutant(
         "a program that hangs is waited for", RUNNER, "limit=limit, name=", "limit=1e4, name=",
-        ("tests/symfric/codegen/running/test_runner.py",),
+        ("tests/symfric/codegen/test_runner.py",),
     ),
 )  # fmt: skip

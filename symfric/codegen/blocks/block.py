@@ -79,7 +79,7 @@ class Block:
         use: what to feed in and what each result is good for, a sentence each.
         limits: what is not valid, a sentence each.
         sources: of the formulas, one each.
-        arrays: variables that are arrays in C, see `symfric.codegen.blocks.elements`.
+        arrays: variables that are arrays in C, see `symfric.codegen.blocks.variables`.
 
     Raises:
         ValueError: all problems at once: names that are repeated or no C identifiers, start values

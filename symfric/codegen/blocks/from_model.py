@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.discretisation import of_method
-from symfric.codegen.blocks.folding import Fold, above_zero, variable, without_idle
 from symfric.codegen.blocks.from_law import step_variable
-from symfric.codegen.blocks.law_text import equations
+from symfric.codegen.blocks.texts import equations, of_method
+from symfric.codegen.blocks.variables import Fold, above_zero, variable, without_idle
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, Parametric, Variable, parameters
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.methods.suited import suited_to_start
+from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model, Output, Variables, check_model

@@ -10,17 +10,16 @@ import numpy as np
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import SLIDING, step_variable
-from symfric.codegen.blocks.numbering import in_arrays, numbered
-from symfric.codegen.blocks.payload import with_gravity, with_payload
-from symfric.codegen.blocks.rubbing import Rubbing, rubbing
+from symfric.codegen.blocks.joints import Rubbing, rubbing, with_gravity, with_payload
+from symfric.codegen.blocks.variables import in_arrays, numbered
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
 from symfric.multibody.equations import Equations
-from symfric.multibody.friction import Contact
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.joint import Contact
+from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
 

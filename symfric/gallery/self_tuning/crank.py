@@ -17,7 +17,7 @@ from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.self_tuning.machines import brown_mcphee, self_tuning, slider_crank, solve
 from symfric.gallery.shared import REFERENCE, acceleration, largest, legend_below
 from symfric.scenes import SliderCrank
-from symfric.scenes.slider_crank import BEARING
+from symfric.scenes.linkages import BEARING
 
 Array = NDArray[np.float64]
 MU = {"mu_s": 0.1, "mu_d": 0.08}

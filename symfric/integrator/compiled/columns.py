@@ -1,8 +1,13 @@
-"""A Function applied to many columns, or step after step, without Python in between."""
+"""A Function applied to many columns, or step after step, without Python in between.
 
+The compiled loop reads the rows of arrays where they lie: nothing is copied.
+"""
+
+import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from string import Template
 from time import perf_counter
 from typing import Any, cast, final
 
@@ -13,9 +18,120 @@ from numpy.typing import NDArray
 from symfric.foundation.compiler import CompileError
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.background import Prospect
-from symfric.integrator.compiled.rows import NAME, Row, Rows, rows_source
+from symfric.integrator.compiled.compiler import load
 
 Array = NDArray[np.float64]
+Row = Array | tuple[Array, NDArray[np.intp]]
+"""Arguments, a row each; or a table with the number of a row for each of them."""
+NAME = "symfric_rows"
+NUMBER = np.dtype(np.float64).itemsize
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A compiled Function with dense results.
+
+    Attributes:
+        library: holds `symfric_rows`.
+        sizes: of its arguments and of its results.
+        chained: the first result of a row is the first argument of the next one.
+    """
+
+    library: ctypes.CDLL
+    sizes: tuple[tuple[int, ...], tuple[int, ...]]
+    chained: bool
+
+    @classmethod
+    def of(cls, function: ca.Function, chained: bool, source: str = "") -> "Rows":
+        """Compile `source`, which is `rows_source`, or load it from the cache.
+
+        Raises:
+            CompileError: there is no compiler, or it failed.
+        """
+        library = load(source or rows_source(function), NAME)
+        library.symfric_rows.restype = None
+        library.symfric_rows.argtypes = [ctypes.c_longlong, ctypes.c_int, *[ctypes.c_void_p] * 2]
+        into = tuple(function.numel_in(i) for i in range(function.n_in()))
+        out = tuple(function.numel_out(i) for i in range(function.n_out()))
+        return cls(library, (into, out), chained)
+
+    def __call__(self, rows: Sequence[Row], first: Array | None = None) -> list[Array]:
+        """Results of all rows; see `Columns`."""
+        into, out = self.sizes
+        begin = int(self.chained)
+        count = next(a.shape[0] for a in rows if isinstance(a, np.ndarray))
+        tables = [a[0] if isinstance(a, tuple) else a for a in rows]
+        arrays = [_in_rows(a, size) for a, size in zip(tables, into[begin:], strict=True)]
+        numbers = [np.ascontiguousarray(a[1]) if isinstance(a, tuple) else None for a in rows]
+        if first is not None:
+            arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
+            numbers.insert(0, None)
+        results = [np.empty((count, size)) for size in out]
+        # address of the first row, how far the next one is, and of the numbers of rows
+        of = [0 if a is None else _address(a) for a in (*numbers, *(None for _ in results))]
+        every = zip((*arrays, *results), of, strict=True)
+        places = np.array([(_address(a), a.strides[0], numbers) for a, numbers in every])
+        here = _address(places)
+        self.library.symfric_rows(count, begin, here, here + len(arrays) * places.strides[0])
+        return results
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Where an array begins; quicker than by its `ctypes`."""
+    return array.__array_interface__["data"][0]
+
+
+def _in_rows(array: Array, size: int) -> Array:
+    """An array whose rows are `size` numbers side by side each; itself, where they are.
+
+    Raises:
+        ValueError: rows of another size, which the loop in C would read beyond their end.
+    """
+    flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
+    if flat.shape[1] != size:
+        raise ValueError(f"expected rows of {size} numbers, got {flat.shape[1]}")
+    beside = size <= 1 or flat.strides[1] == NUMBER
+    return flat if beside and flat.dtype == np.float64 else np.ascontiguousarray(flat, dtype=float)
+
+
+def rows_source(function: ca.Function) -> str:
+    """C of `function` as CasADi generates it, with the loop over rows."""
+    generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
+    generator.add(function)
+    return generator.dump() + Template(_LOOP).substitute(
+        name=function.name(),
+        arguments=function.n_in(),
+        results=function.n_out(),
+        arg=max(1, function.sz_arg()),
+        res=max(1, function.sz_res()),
+        iw=max(1, function.sz_iw()),
+        w=max(1, function.sz_w()),
+    )
+
+
+_LOOP = """
+typedef struct { char *at; long long apart; const long long *of; } symfric_place;
+
+/* Row after row of arguments and results; the first result goes on where they are chained. */
+void symfric_rows(long long count, int chained, const symfric_place *in, const symfric_place *out)
+{
+  const double *arg[$arg];
+  double *res[$res], w[$w];
+  casadi_int iw[$iw];
+  long long k;
+  int i;
+  for (k = 0; k < count; ++k) {
+    for (i = 0; i < $arguments; ++i)
+      arg[i] = (const double *)(in[i].at + (in[i].of ? in[i].of[k] : k) * in[i].apart);
+    if (chained) arg[0] = (const double *)(k ? out[0].at + (k - 1) * out[0].apart : in[0].at);
+    for (i = 0; i < $results; ++i) res[i] = (double *)(out[i].at + k * out[i].apart);
+    $name(arg, res, iw, w, 0);
+  }
+}
+"""
+
+
 CHAINED, SIDE_BY_SIDE = 16, 32
 """Columns of one call of the virtual machine; the last call repeats its last column."""
 PER_INSTRUCTION = 3e-9

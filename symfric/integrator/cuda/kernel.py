@@ -15,8 +15,8 @@ from symfric.integrator.compiled.columns import densified
 from symfric.integrator.equations.following import DONE, ROUNDS
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.in_c import Written, in_c, macros
 from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.pieces import Written, in_c, macros
 
 BLOCK = 64
 """Threads of a block: few, since each holds hundreds of numbers."""

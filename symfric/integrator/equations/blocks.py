@@ -8,8 +8,7 @@ from typing import Any, final
 import casadi as ca
 
 from symfric.foundation.numeric import reciprocal
-from symfric.integrator.equations.lu import SymbolicLU, factorise
-from symfric.integrator.equations.pivots import Factors
+from symfric.integrator.equations.matrices import Factors, SymbolicLU, factorise
 from symfric.integrator.equations.system import System
 from symfric.model.holonomic import Inner
 

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.equations.blocks import Slopes, slopes
-from symfric.integrator.equations.lu import SymbolicLU, factorise
 from symfric.integrator.equations.manifold import PULLING, SHOCK
+from symfric.integrator.equations.matrices import SymbolicLU, factorise
 from symfric.integrator.equations.system import System
 
 Array = NDArray[np.float64]

@@ -1,4 +1,6 @@
-"""Inputs of a model over time: constants, expressions, sampled signals."""
+"""Inputs of a model over time: constants, expressions, sampled signals, and their rates."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
@@ -13,17 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.brief import brief
 from symfric.foundation.memory import remember
+from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
-from symfric.integrator.equations.constants import lifted
-from symfric.integrator.equations.onsets import onsets, pace
+from symfric.integrator.equations.expressions import lifted, onsets, pace
 from symfric.model import Model
 
+Array = NDArray[np.float64]
 REMEMBERED = 16
 """Structures of inputs kept per model; the oldest goes first."""
 NO_ROWS = ca.SX(0, 1)
 """Made once: most calls need no more."""
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +133,7 @@ class InputData:
         """Number of the interval that holds each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
-    def stopping_at(self, times: ArrayLike) -> "InputData":
+    def stopping_at(self, times: ArrayLike) -> InputData:
         """The same inputs, with breaks at `times` [s], too; those outside the span are left out."""
         at = np.asarray(times, dtype=float)
         at = at[(at > self.breaks[0]) & (at < self.breaks[-1])]
@@ -192,7 +194,7 @@ def paced(inputs: InputData, model: Model) -> InputData:
     return inputs.stopping_at(times) if times else inputs
 
 
-def _written(model: Model, parts: "list[_Part]") -> tuple[ca.SX, ca.SX]:
+def _written(model: Model, parts: list[_Part]) -> tuple[ca.SX, ca.SX]:
     """Expression and data of inputs of this structure, written once and kept with the model."""
     known: dict[Hashable, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
     key = tuple(part.key for part in parts)
@@ -303,3 +305,35 @@ def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.S
     if other := strays(expression, own):
         raise ValueError(f"{where}: expected an expression in time alone, got {', '.join(other)}")
     return expression
+
+
+def rate_of(signal: Input) -> Input:
+    """The derivative of an input in time, exactly that of what is between its samples.
+
+    A number has the rate 0, a function its derivative, and `Linear` samples the slopes between them
+    as `Hold`, 0 before the first and after the last sample.
+
+    Raises:
+        ValueError: `Hold` samples, which jump, or what is no input.
+    """
+    if isinstance(signal, Linear):
+        t, values = np.asarray(signal.t), np.asarray(signal.values)
+        if t.size < 2:
+            return 0.0
+        slopes = np.diff(values) / np.diff(t)
+        still = np.zeros((*values.shape[:-1], 1))
+        before = t[0] - (t[1] - t[0])
+        return Hold(np.r_[before, t], np.concatenate([still, slopes, still], axis=-1))
+    if isinstance(signal, Sampled):
+        raise ValueError(
+            "rate_of: expected a signal without jumps, got Hold samples; Linear(t, values) goes "
+            "straight from one to the next"
+        )
+    if is_number(signal):
+        return 0.0
+    function = checks.function("rate_of", signal, KINDS)
+
+    def rate(t: ca.SX) -> ca.SX:
+        return ca.jtimes(ca.SX(function(t)), t, ca.SX(1))
+
+    return rate

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import evaluate
-from symfric.integrator.equations.lu import factorise
+from symfric.integrator.equations.matrices import factorise
 from symfric.model import Model
 from symfric.model.holonomic import Holonomic
 

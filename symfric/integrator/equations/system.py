@@ -1,4 +1,24 @@
-"""A model as the step sees it: one column of unknowns, one right-hand side, a mass pattern."""
+"""The equations of a model in the form M y' = f(y, d), which the step takes.
+
+One column of unknowns, one right-hand side, a constant mass pattern. Fully implicit models have it,
+too, whatever the rank of their mass matrix. A constant matrix dF/dx' stays the mass matrix,
+singular or not: nothing is inverted. Only rows that follow from others are replaced by what is left
+over without rates,
+
+    M_i = sum_k c_k M_k   =>   0 = f_i - sum_k c_k f_k,
+
+because in M / (gamma h) - J these equations, as small as J, would drown in the rounding of M / h.
+(A capacitor between two nodes of a circuit: its current leaves one and enters the other.)
+
+Where dF/dx' is not constant, the rates v = B x' that the equations depend on are unknowns,
+
+    B x' = v,   0 = F(v, x, z),
+
+with the same combination of equations that never depend on rates.
+
+Limits: the directions that a matrix maps to zero must not turn with states or parameters. Write
+such a charge q(x) as a state of its own, q' = i, 0 = q - q(x).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,17 +29,116 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import listed
 from symfric.foundation.symbols import stacked
-from symfric.integrator.equations.branches import branchless
-from symfric.integrator.equations.implicit import implicit_columns
-from symfric.integrator.equations.index import check_index
+from symfric.integrator.equations.expressions import branchless, divided_once
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
-from symfric.integrator.equations.quotients import divided_once
-from symfric.integrator.equations.rank import null_space
+from symfric.integrator.equations.matrices import Order, echelon, null_space
 from symfric.model import Model
 from symfric.model.holonomic import Inner
+
+
+def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -> None:
+    """Refuse M y' = f(y) whose equations without rates leave unknowns undetermined.
+
+    Rates determine what M sees of y; the rest has to follow from the equations without rates.
+    Constraints on positions alone, for example, do not say what their multipliers are (index 3).
+
+    Raises:
+        ValueError: structurally so, whatever the numbers.
+    """
+    pattern = ca.DM(mass.sparsity(), 1)
+    still = [i for i in range(f.numel()) if not pattern[i, :].nnz()]
+    if not still:
+        return
+    pattern[still, :] = ca.DM(ca.jacobian_sparsity(f[still], y), 1)
+    pattern = ca.sparsify(pattern)
+    rank = ca.sprank(pattern)
+    if rank == f.numel():
+        return
+    every = range(f.numel())
+    loose = [names[i] for i in every if ca.sprank(pattern[:, [k for k in every if k != i]]) == rank]
+    raise ValueError(
+        f"{where}: expected algebraic equations that determine {listed(loose)} at given states "
+        "(index 1), got some that do not depend on them; differentiate these by time, or make what "
+        "changes (a charge, a momentum) a state of its own"
+    )
+
+
+Array = NDArray[np.float64]
+Equations = tuple[ca.SX, ca.SX, ca.SX, list[str]]
+"""Unknowns without time, right-hand side, mass matrix and names."""
+SAMPLES = 4
+"""Random points at which a matrix that is not constant is looked at."""
+
+
+def implicit_columns(model: Model) -> Equations:
+    """Unknowns, right-hand side, mass matrix and names of a model with a residual."""
+    x, z, F = model.vector("x"), model.vector("z"), model.residual
+    nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
+    matrix = ca.jacobian(F, model.xdot)
+    at_rest = ca.substitute(F, model.xdot, ca.SX.zeros(nx))
+    if matrix.is_constant():
+        M = ca.DM(matrix).full()
+        dependent = _dependent(M)
+        M[list(dependent)] = 0.0
+        f = -_combined(at_rest, at_rest, dependent)
+        return ca.vertcat(x, z), f, _padded(M, f.numel()), names
+    samples = _samples(model, matrix)
+    moving, B = echelon(np.vstack(samples))
+    v, rates = model.xdot[moving], ca.SX.zeros(nx)
+    rates[moving] = v
+    moved = ca.substitute(F, model.xdot, rates)
+    f = ca.vertcat(v, _combined(moved, at_rest, _dependent(np.hstack(samples))))
+    mass = ca.vertcat(_padded(B, f.numel()), ca.SX(F.numel(), f.numel()))
+    names[nx:nx] = [f"{model.x[i].name}_dot" for i in moving]
+    return ca.vertcat(x, v, z), f, mass, names
+
+
+def _padded(M: Array, columns: int) -> ca.SX:
+    """M as a sparse matrix with that many columns."""
+    return ca.sparsify(ca.horzcat(ca.SX(ca.DM(M)), ca.SX(M.shape[0], columns - M.shape[1])))
+
+
+def _dependent(M: Array) -> dict[int, dict[int, float]]:
+    """Rows of M that follow from others: row -> coefficients of these; rows of zeros have none."""
+    rows, B = echelon(M.T)
+    return {
+        i: {rows[k]: float(B[k, i]) for k in np.flatnonzero(B[:, i])}
+        for i in range(M.shape[0])
+        if i not in rows
+    }
+
+
+def _combined(F: ca.SX, at_rest: ca.SX, dependent: dict[int, dict[int, float]]) -> ca.SX:
+    """F, with dependent equations freed of rates; `at_rest` is F without any."""
+    found = ca.SX(F)
+    for i, coefficients in dependent.items():
+        found[i] = at_rest[i] - sum(c * at_rest[k] for k, c in coefficients.items())
+    return found
+
+
+def _samples(model: Model, matrix: ca.SX) -> list[Array]:
+    """The matrix at random points near the start; with random entries where it is not finite."""
+    rng = np.random.default_rng(0)
+    columns = {"x": model.vector("x"), "z": model.vector("z")}
+    columns |= {"u": model.vector("u"), "p": model.vector("p")}
+    at = ca.Function("matrix", [model.t, model.xdot, *columns.values()], [ca.densify(matrix)])
+    starts = {"x": model.initial_state(), "u": model.values("u"), "p": model.values("p")}
+    starts["z"] = np.array([float(v.start) for v in model.z])
+    found: list[Array] = []
+    for _ in range(SAMPLES):
+        beside = [
+            starts[name] * rng.uniform(0.9, 1.1, starts[name].size)
+            + 0.1 * model.nominal(name) * rng.uniform(-1, 1, starts[name].size)
+            for name in columns
+        ]
+        rates = model.nominal("x") * rng.normal(size=len(model.x))
+        found.append(ca.DM(at(rng.uniform(), rates, *beside)).full())
+    finite = [M for M in found if np.isfinite(M).all()]
+    pattern = ca.DM(matrix.sparsity(), 1).full()
+    return finite or [pattern * rng.normal(size=pattern.shape)]
 
 
 @final
@@ -49,9 +168,9 @@ class System:
         inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
             groups take the place of `pivots`.
         orders: pivots of the factors of each matrix by its name, where those that fill least are
-            not sound (`symfric.integrator.equations.pivots`).
+            not sound (`symfric.integrator.equations.matrices`).
         slope: Jacobian of f where it is not to be derived from f.
-        branchless: whether its steps write tanh out (`symfric.integrator.equations.branches`).
+        branchless: whether its steps write tanh out (`symfric.integrator.equations.expressions`).
     """
 
     y: ca.SX
@@ -139,7 +258,7 @@ def system(model: Model, inputs: InputData) -> System:
 
     An implicit model that is linear in x' with a constant matrix keeps that matrix as mass, be it
     singular; any other one gets its rates as additional algebraic unknowns
-    (`symfric.integrator.equations.implicit`), a holonomic one its accelerations.
+    (`symfric.integrator.equations.system`), a holonomic one its accelerations.
 
     Raises:
         ValueError: a model without unknowns, or of an index above 1.

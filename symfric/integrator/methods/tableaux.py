@@ -9,12 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from symfric.integrator.methods.backward_euler import BackwardEuler
-from symfric.integrator.methods.explicit import Explicit, shampine
-from symfric.integrator.methods.exponential import Exponential
+from symfric.integrator.methods.explicit import Explicit, Exponential, shampine
+from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock, through
 from symfric.integrator.methods.method import Array, Method
-from symfric.integrator.methods.radau import Radau, through
-from symfric.integrator.methods.rosenbrock import Rosenbrock
 
 
 def _lower(rows: list[list[float]]) -> Array:

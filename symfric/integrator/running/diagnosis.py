@@ -9,7 +9,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.blocks import blocks
 from symfric.integrator.equations.initial import FLOOR, consistent
 from symfric.integrator.equations.manifold import grows, pulls, singular
-from symfric.integrator.equations.pivots import regular
+from symfric.integrator.equations.matrices import regular
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.integrator import Integrator
 from symfric.model import Model

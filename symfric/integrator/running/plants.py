@@ -7,7 +7,6 @@ order: a loop in C around the generated step, and one in Python around CasADi's 
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from string import Template
 from time import perf_counter
 from typing import Any, cast, final
 
@@ -19,6 +18,7 @@ from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
+from symfric.integrator.running import loop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
 
@@ -92,7 +92,7 @@ SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
 
 
 class _Members(ctypes.Structure):
-    """`symfric_members` of the C below."""
+    """`symfric_members` of members.h."""
 
     _fields_ = (
         *((name, ctypes.c_longlong) for name in ("members", "attempts")),
@@ -197,96 +197,18 @@ def _large(S: Array, h_min: float) -> bool:
 
 def c_source(integrator: Integrator) -> str:
     """C of the step, of what follows a jump, and of the loop around them."""
-    step, follow = integrator.step, integrator.follow
-    nx, n_d = integrator.system.nx, integrator.system.d.numel()
-    nu = integrator.inputs.data.numel()
-    generator = ca.CodeGenerator("symfric_plants.c", {"static_aux": True})
-    generator.add(step)
-    if follow is not None:
-        generator.add(follow.round)
-    own = _FOLLOWS_NOTHING if follow is None else follow.c_source
-    loop = Template(MEMBERS + _LOOP).substitute(
-        columns=step.numel_in(0), given=step.numel_in(1), nu=nu,
-        memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, floor=repr(FLOOR),
-        data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
-        attempts=ATTEMPTS, too_small=STEP_TOO_SMALL, search=SEARCH, again=AGAIN, refused=REFUSED,
-        arg=step.sz_arg(), res=step.sz_res(), iw=max(1, step.sz_iw()), w=max(1, step.sz_w()),
+    follow, nx = integrator.follow, integrator.system.nx
+    n_d, nu = integrator.system.d.numel(), integrator.inputs.data.numel()
+    others = () if follow is None else (follow.round,)
+    attempts = loop.c_source(integrator.step, integrator.tableau.H.shape[0], *others)
+    plants = loop.filled(
+        "plants.c",
+        nu=nu, data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
+        follows=int(follow is not None), search=SEARCH, again=AGAIN, refused=REFUSED,
     )  # fmt: skip
-    return generator.dump() + own + loop
-
-
-_FOLLOWS_NOTHING = """
-static int symfric_follow(double *y, const double *d) { return 0; }
-"""
-
-MEMBERS = """
-typedef struct {
-  long long members, attempts;
-  double dt, h_min;
-  double *S, *R, *u, *begin;
-  long long *count, *ready, *why, *made;
-} symfric_members;
-"""
-
-_LOOP = """
-enum { COLUMNS = $columns, GIVEN = $given, NU = $nu, MEM = $memory, T = $t, H = $h,
-       T_END = $t_end, DATA = $data, HELD = $held };
-
-/* Attempts towards R[T_END]; why they ended. */
-static int symfric_runs(const symfric_members *m, double *S, const double *R, long long *made)
-{
-  double next[COLUMNS], w[$w];
-  casadi_int iw[$iw];
-  const double *arg[$arg];
-  double *res[$res];
-  long long tried = 0;
-  int i;
-  while (S[T] < R[T_END] && tried < m->attempts
-         && S[H] >= m->h_min && S[H] >= $floor * fabs(S[T])) {
-    arg[0] = S;
-    arg[1] = R;
-    res[0] = next;
-    res[1] = 0;
-    symfric_step(arg, res, iw, w, 0);
-    ++tried;
-    for (i = 0; i < COLUMNS; ++i) S[i] = next[i];
-  }
-  *made += tried;
-  if (S[T] >= R[T_END]) return 0;
-  return S[H] >= m->h_min && S[H] >= $floor * fabs(S[T]) ? $attempts : $too_small;
-}
-
-/* New inputs and the time of the next sample; whether algebraic unknowns could follow. */
-static int symfric_takes_over(const symfric_members *m, long long b)
-{
-  double *R = m->R + b * GIVEN;
-  int i;
-  m->count[b] += m->S[b * COLUMNS + T] >= R[T_END];
-  m->made[b] = 0;
-  R[T_END] = m->begin[b] + m->count[b] * m->dt;
-  for (i = 0; i < NU; ++i) R[HELD + i] = m->u[b * NU + i];
-  return m->ready[b] || !symfric_follow(m->S + b * COLUMNS + MEM, R + DATA);
-}
-
-/* All plants go to their next sample; how many did not get there. */
-long long symfric_plants(const symfric_members *m, int begin)
-{
-  long long b, failed = 0;
-  if (begin)
-    for (b = 0; b < m->members * NU; ++b)
-      if (!(m->u[b] - m->u[b] == 0)) return $refused;
-  for (b = 0; b < m->members; ++b) {
-    if (begin && !symfric_takes_over(m, b)) {
-      m->why[b] = $search;
-    } else if (begin || m->why[b] == $again) {
-      m->ready[b] = 0;
-      m->why[b] = symfric_runs(m, m->S + b * COLUMNS, m->R + b * GIVEN, m->made + b);
-    }
-    failed += m->why[b] != 0;
-  }
-  return failed;
-}
-"""
+    return (
+        attempts + ("" if follow is None else follow.c_source) + loop.filled("members.h") + plants
+    )
 
 
 @final
@@ -354,31 +276,11 @@ def look_source(integrator: Integrator) -> str:
     function, nx = integrator.signals, integrator.system.nx
     generator = ca.CodeGenerator("symfric_look.c", {"static_aux": True})
     generator.add(function)
-    loop = Template(MEMBERS + _LOOK).substitute(
+    look = loop.filled(
+        "look.c",
         columns=integrator.step.numel_in(0), given=integrator.step.numel_in(1),
         memory=State.MEMORY, t=State.T, data=Given.d(nx).start, rows=function.numel_out(0),
         arg=function.sz_arg(), res=function.sz_res(), name=function.name(),
         iw=max(1, function.sz_iw()), w=max(1, function.sz_w()),
     )  # fmt: skip
-    return generator.dump() + loop
-
-
-_LOOK = """
-/* The signals of every plant where it stands. */
-void symfric_look(const symfric_members *m, double *out)
-{
-  double w[$w];
-  casadi_int iw[$iw];
-  const double *arg[$arg];
-  double *res[$res];
-  long long b;
-  for (b = 0; b < m->members; ++b) {
-    const double *S = m->S + b * $columns;
-    arg[0] = S + $t;
-    arg[1] = S + $memory;
-    arg[2] = m->R + b * $given + $data;
-    res[0] = out + b * $rows;
-    $name(arg, res, iw, w, 0);
-  }
-}
-"""
+    return generator.dump() + loop.filled("members.h") + look

@@ -1,25 +1,109 @@
-"""One attempt of an adaptive step as ONE CasADi Function, whatever the method.
+"""An attempt of a step, the errors that it watches, and the form in which it is written.
 
-Its state S and what it is given, R, are columns (`layout`). `step(S, R) -> (S_next, D)` tries h,
-and either accepts (t, y advance; D holds the dense output) or rejects (h shrinks).
-`fixed(y, h, d) -> y_next` is the bare step, for derivatives and C code.
+Error control watches sliding velocities and algebraic unknowns, too. A sliding velocity s is the
+difference of two velocities that may be a thousand times larger, so its error is measured on the
+velocity scale w of the law instead. And a step must not carry it across that scale without a look:
+friction that acts near rest only, a peak without a Coulomb level behind it, leaves no trace in a
+step that leaps over it. No stage falls on the peak, no error is estimated, and a block that should
+have been caught goes on. Whatever the estimate says,
+
+    travel <= REACH (w + nearest) / finer
+
+holds for every step, `nearest` being its least |s|, or 0 where s changes sign: steps shrink
+geometrically on the way to rest and cross it in steps of a few w. The parabola through both ends
+and the middle of the dense output serves for s. A method whose steps are differentiated is
+`finer`: the derivative of friction, a peak of width w, has to be seen by several stages, while the
+state only asks for its integral. A model without monitors has none of this.
+
+An attempt is ONE CasADi Function, whatever the method. Its state S and what it is given, R, are
+columns (`layout`). `step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds
+the dense output) or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for
+derivatives and C code.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
 from symfric.foundation.numeric import reciprocal
-from symfric.integrator.equations.blocks import signs
+from symfric.integrator.equations.blocks import blocks, signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
 from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 from symfric.integrator.step.tangent import tangent
-from symfric.integrator.step.watch import FINEST, Watch, watching
+
+REACH = 4.0
+"""Friction that rises over w and falls behind it is seen by the stages of a step this long."""
+
+FINEST = 1e-14
+"""A step this short, relative to the end time, is about to end the run: neither it nor the one
+behind it is asked for."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """The watched expressions of a system over one trial.
+
+    Attributes:
+        before, half, after: their values at the start, in the middle and at the end.
+        nominal: their typical magnitudes.
+        change: (y, direction, d) -> what a change of y does to them, to first order.
+        slips: how many of them, the first ones, are sliding velocities.
+        finer: how many times shorter their ways near rest are than usual.
+    """
+
+    before: Any
+    half: Any
+    after: Any
+    nominal: Any
+    change: ca.Function
+    slips: int
+    finer: float = 1.0
+
+    def error(self, y: Any, error: Any, d: Any, rtol: Any) -> Any:
+        """Mean square sum of what an error of y makes of them, in units of rtol.
+
+        A value is scaled by rtol (nominal + min|value|): where a contact sticks, its sliding
+        velocity is resolved relative to the velocity scale of the law instead of the velocity of
+        the body, or breaking away comes too late or not at all.
+        """
+        smallest = ca.fmin(ca.fabs(self.before), ca.fabs(self.after))
+        return ca.sumsqr(self.change(y, error, d) / (rtol * (self.nominal + smallest)))
+
+    def leap(self) -> Any:
+        """Largest travel of a sliding velocity, in units of what is allowed."""
+        here = range(self.slips)
+        before, half, after, scale = (
+            x[here] for x in (self.before, self.half, self.after, self.nominal)
+        )
+        bow = ca.fabs(half - (before + after) / 2)
+        nearest = ca.fmax(0, ca.fmax(ca.fmin(before, after), -ca.fmax(before, after)) - bow)
+        return ca.mmax((ca.fabs(after - before) + bow) / (REACH / self.finer * (scale + nearest)))
+
+
+def watching(system: System, finer: float = 1.0) -> Callable[[Any, Trial, Any], Watch] | None:
+    """(y, trial, d) -> what is watched over it, so many times `finer`; None where nothing is."""
+    if not system.monitors.numel():
+        return None
+    direction = ca.SX.sym("direction", system.n)
+    along = ca.jtimes(system.monitors, system.y, direction)
+    value = ca.Function("monitor", [system.y, system.d], [system.monitors])
+    change = ca.Function("monitor_error", [system.y, direction, system.d], [along])
+    nominal = ca.Function("monitor_nominal", [system.d], [ca.densify(system.monitor_nominal)])
+
+    def watch(y: Any, trial: Trial, d: Any) -> Watch:
+        bend = sum((0.5**k * row for k, row in enumerate(trial.dense)), start=type(y)(0))
+        half = value((y + trial.end) / 2 + bend / 4, d) if system.slips else type(y)(0)
+        ends = value(y, d), half, value(trial.end, d)
+        return Watch(*ends, nominal(d), change, system.slips, finer)
+
+    return watch
+
 
 SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
 E_FLOOR = 1e-6
@@ -207,3 +291,42 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     if kind is ca.SX:
         outputs = ca.cse(outputs)
     return ca.Function("symfric_step", [S, R], outputs, ["S", "R"], ["S_next", "D"])
+
+
+def written(system: System, method: Method, inline: int) -> tuple[ca.Function, int]:
+    """The attempt, written out unless that takes more than `inline` instructions; how many it has.
+
+    What is large for sure is not written out to be counted: that took half the time of building a
+    long chain.
+    """
+    if least(system, method) <= inline:
+        step = build_step(system, method)
+        count = step.n_instructions()
+        if count <= inline:
+            return step, count
+    step = build_step(system, method, ca.MX)
+    return step, instructions(step)
+
+
+def least(system: System, method: Method) -> int:
+    """Instructions of an attempt's blocks, without what joins them; 0 without blocks."""
+    gamma, chart = method.diagonal, tangent(system)
+    if gamma is None:
+        return 0
+    block = blocks(system if chart is None else chart.reduced, gamma)
+    stages, jacobians, factorisations = method.work(system)
+    every = stages * (block.f.n_instructions() + block.solve.n_instructions())
+    once = jacobians * block.slopes.n_instructions()
+    return every + once + factorisations * block.pack.n_instructions()
+
+
+def instructions(step: ca.Function) -> int:
+    """Operations on numbers in a step that calls blocks."""
+    found = 0
+    for k in range(step.n_instructions()):
+        operation = step.instruction_id(k)
+        if operation == ca.OP_CALL:
+            found += step.instruction_MX(k).which_function().n_instructions()
+        elif operation not in (ca.OP_INPUT, ca.OP_OUTPUT):
+            found += step.instruction_MX(k).nnz()
+    return found

@@ -30,8 +30,8 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from symfric.integrator.equations.lu import factorise
 from symfric.integrator.equations.manifold import Manifold
+from symfric.integrator.equations.matrices import factorise
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Trial
 

@@ -7,6 +7,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import fields, smooth
+from symfric.laws.base.families import Sticking, carried, rests, stick_and_slip
 from symfric.laws.base.law import (
     APPLIED_FORCE,
     Facts,
@@ -16,7 +17,6 @@ from symfric.laws.base.law import (
     Switch,
     one_sided,
 )
-from symfric.laws.base.sticking import Sticking, carried, rests, stick_and_slip
 
 FORMS = ("smooth", "original")
 WITH_MODES = (*FORMS, "event")

@@ -5,7 +5,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar
 from symfric.laws.base import fields
-from symfric.laws.base.curve import Curve, Fall
+from symfric.laws.base.families import Curve, Fall
 from symfric.laws.base.law import Facts
 
 

@@ -8,7 +8,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, exp, tanh
 from symfric.foundation.parameters import option
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.curve import TwoLevels
+from symfric.laws.base.families import TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 FORMS = ("smooth", "original")

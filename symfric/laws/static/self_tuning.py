@@ -11,7 +11,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
 from symfric.foundation.parameters import param
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.curve import TwoLevels
+from symfric.laws.base.families import TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 

@@ -7,7 +7,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, equals, exp, tanh
 from symfric.foundation.parameters import param
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.curve import Curve, Fall, TwoLevels
+from symfric.laws.base.families import Curve, Fall, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from ocp import Phase, Problem, Solution, integral, solve
 from ocp.friction.event_check import motions, verify_exactly
-from ocp.solve import Friction
+from ocp.strategies import Friction
 from symfric import BrownMcPhee, Model, drive
 
 

@@ -8,7 +8,7 @@ import pytest
 from receding import controller, rubbing
 
 from ocp.mpc.closed_loop import ClosedLoop
-from ocp.mpc.gauss_newton import CycleStatus
+from ocp.mpc.design import CycleStatus
 from symfric import ExactCoulomb, LuGre, drive, rabinowicz
 from symfric.model import Model
 

@@ -10,7 +10,7 @@ from ocp.formulation.expressions import at_end, effort, integral, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of
-from ocp.mpc.gauss_newton import CycleStatus
+from ocp.mpc.design import CycleStatus
 from symfric import ExactCoulomb, drive
 
 Q, R = np.diag([3.0, 1.0, 2.0]), np.diag([0.1, 0.2])
@@ -48,7 +48,7 @@ def regulator(N: int, h: float) -> np.ndarray:
 def test_linear_quadratic_problem_is_the_regulator() -> None:
     made = controller_of(quadratic(), 0.05)
     K = regulator(20, 0.05)
-    session = made.start("vm")
+    session = made.start()
     for x in np.random.default_rng(1).normal(size=(3, 3)):
         action = session.step(x)
         np.testing.assert_allclose([action.controls["a"], action.controls["b"]], -K @ x, rtol=1e-7)
@@ -59,9 +59,7 @@ def test_linear_quadratic_problem_is_the_regulator() -> None:
 
 def test_active_bounds_are_those_of_another_solver() -> None:
     bounds = {"a": (-1.0, 0.4), "b": (-2.0, 2.0)}
-    action = (
-        controller_of(quadratic(bounds=bounds), 0.05, tolerance=1e-7).start("vm").step([2, 1, 0.3])
-    )
+    action = controller_of(quadratic(bounds=bounds), 0.05, tolerance=1e-7).start().step([2, 1, 0.3])
     A, B = linear_map(0.05)
     U = ca.MX.sym("U", 2, 20)
     x, cost = ca.DM([2.0, 1.0, 0.3]), 0
@@ -78,21 +76,21 @@ def test_active_bounds_are_those_of_another_solver() -> None:
 
 def test_soft_bound_is_kept_where_it_can_be_and_priced_where_not() -> None:
     made = controller_of(quadratic(bounds={"v": (-0.5, 0.5)}), 0.05)
-    session = made.start("vm")
+    session = made.start()
     kept = session.step([1.0, 0.0, 0.0])
     assert kept.converged
     assert kept.violation < 1e-6
     assert session.plan.X[1:, 1].min() == pytest.approx(-0.5, abs=1e-5)
     session.forget()
     bounded = controller_of(quadratic(bounds={"v": (-0.5, 0.5), "a": (-1, 1), "b": (-1, 1)}), 0.05)
-    priced = bounded.start("vm").step([0.0, 3.0, 0.0])
+    priced = bounded.start().step([0.0, 3.0, 0.0])
     assert priced.converged
     assert priced.violation > 1.0
 
 
 def test_end_of_the_phase_is_met() -> None:
     phase = Phase(linear_model(), T=1.0, end={"x": 0.2, "v": (None, 0.0)})
-    session = controller_of(Problem(phase, effort("a") + effort("b")), 0.05).start("vm")
+    session = controller_of(Problem(phase, effort("a") + effort("b")), 0.05).start()
     assert session.step([1.0, 0.0, 0.0]).converged
     last = session.plan.X[-1]
     assert last[0] == pytest.approx(0.2, abs=1e-5)
@@ -163,7 +161,7 @@ def test_what_a_controller_cannot_take_is_said(problem: object, said: str) -> No
 
 
 def test_wrong_names_and_sizes_are_said() -> None:
-    session = controller().start("vm")
+    session = controller().start()
     with pytest.raises(ValueError, match="all of x, v, got none for v"):
         session.step({"x": 0.0})
     with pytest.raises(ValueError, match="expected one of goal, got gaol; did you mean goal"):

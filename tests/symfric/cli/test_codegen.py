@@ -10,7 +10,7 @@ from robots import SMALL
 
 from symfric.cli import main
 from symfric.cli.codegen import bits, compared, show_verification
-from symfric.codegen.proof.verify import Check, Verification
+from symfric.codegen.verification import Check, Verification
 
 compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 

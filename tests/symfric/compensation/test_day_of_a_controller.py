@@ -6,7 +6,7 @@ import pytest
 from symfric import BoucWen, LuGre, Stribeck
 from symfric.codegen import Block
 from symfric.compensation import compensator, disturbance_observer, gms_observer, lugre_observer
-from symfric.compensation.members import Members
+from symfric.compensation.loop import Members
 from symfric.laws import GMS
 
 BAD = np.array([0.0, np.nan, np.inf, -np.inf, 5e-324, 1e-310, 1e300, -1e300, 1e30, 1e-30, -1e3])

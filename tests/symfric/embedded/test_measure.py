@@ -8,8 +8,8 @@ from cortex import on_target
 from symfric import Dahl, LuGre, VelocityBased
 from symfric.codegen import Block, law_block
 from symfric.embedded import CORES, measure
-from symfric.embedded.inputs import day
-from symfric.embedded.tools import Absent, find_tools
+from symfric.embedded.measure import day
+from symfric.embedded.target import Absent, find_tools
 from symfric.foundation.parameters import Variable
 from symfric.model import Output
 

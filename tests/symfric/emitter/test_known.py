@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.emitter.known import settled
+from symfric.emitter.logic import settled
 from symfric.foundation.graph import SELECT, Graph, graph, rebuild
 from symfric.laws.base import smooth
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from symfric.emitter.schedule import ordered
+from symfric.emitter.statements import ordered
 
 
 def live(order: list[int], takes: list[set[int]], makes: list[set[int]]) -> int:

@@ -7,7 +7,7 @@ from backends import needs_compiler
 from symfric import BrownMcPhee
 from symfric.bench import codegen_runs
 from symfric.fmu import export_fmu
-from symfric.fmu.running import running
+from symfric.fmu.export import running
 from symfric.scenes import ALL_SCENES, Drive
 
 

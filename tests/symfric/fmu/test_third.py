@@ -9,7 +9,7 @@ from units import DISCARD, ERROR, OK, Archive, Third, over
 
 from symfric import BrownMcPhee, LuGre, simulate
 from symfric.codegen import plant_block
-from symfric.codegen.running.runner import run_vm
+from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu import export_fmu
 from symfric.scenes import Drive, Pendulum, SliderCrank

@@ -168,6 +168,11 @@ def own(slip: Contact, rate: ca.SX, **parts: object) -> Model:
     return Model("own", x=(X, V), u=(U,), contacts=(slip,), **ode, **parts)  # pyright: ignore[reportArgumentType]
 
 
+def of_a_squared_force() -> Model:
+    slip = contact("floor", COULOMB, V, 1.0)
+    return own(slip, -(slip.force**2))
+
+
 def of_an_input() -> Model:
     slip = contact("floor", COULOMB, V - U, 1.0)
     return own(slip, -slip.force)
@@ -198,6 +203,7 @@ def of_two_laws_without_modes() -> Model:
 @pytest.mark.parametrize(
     ("make", "expected"),
     [
+        (of_a_squared_force, "accelerations and normal forces affine in the friction forces"),
         (of_an_input, "a sliding velocity without inputs"),
         (of_algebraic_variables, "equations without algebraic variables that depend on friction"),
         (of_implicit_equations, "explicit equations"),

@@ -169,6 +169,8 @@ def test_no_load_runs_or_is_refused_where_the_law_divides_by_it() -> None:
             model = drive(law, N=0.0)
         except ValueError as error:
             refused += 1
+            with pytest.raises(ValueError, match="expected a normal force above 0 N"):
+                Drive(law, N=0.0).model(free=tuple(parameters(law)))
             assert "expected a normal force above 0 N" in str(error), name
             assert law.states, name
             continue
@@ -177,4 +179,5 @@ def test_no_load_runs_or_is_refused_where_the_law_divides_by_it() -> None:
         for v in (0.0, 1e-9, -0.1):
             x[1] = v
             assert ode(0.0, x, [], u, []).is_regular(), (name, v)
+        Drive(law, N=0.0).model(free=tuple(parameters(law)))
     assert refused == 7

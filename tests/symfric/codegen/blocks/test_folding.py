@@ -12,7 +12,7 @@ from symfric import (
     law_from_text,
     parameters,
 )
-from symfric.codegen.blocks.folding import runtime_parameters
+from symfric.codegen.blocks.variables import runtime_parameters
 
 
 @pytest.mark.parametrize(

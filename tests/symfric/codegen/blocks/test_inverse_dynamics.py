@@ -10,7 +10,7 @@ from robots import random_robot, rod
 from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Leuven, LuGre, law_from_text
 from symfric.codegen import Block, generate, law_block, verify
 from symfric.codegen.blocks.inverse_dynamics import gravity_block, inverse_dynamics_block
-from symfric.codegen.writing.header import header
+from symfric.codegen.header import header
 from symfric.emitter.c99 import FLOAT
 from symfric.multibody import (
     GROUND,
@@ -23,7 +23,7 @@ from symfric.multibody import (
     Universal,
     functions,
 )
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.urdf import read_urdf
 from symfric.scenes import Arm, FourBar
 
 EASY = Coulomb(mu_d=1.0, v_eps=0.1)

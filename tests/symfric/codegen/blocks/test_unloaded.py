@@ -6,7 +6,7 @@ from law_cases import CASES, NO_STEP
 
 from symfric import Law, LoadDependent, LuGre, Sum, Viscous
 from symfric.codegen import law_block
-from symfric.codegen.running.runner import run_vm
+from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
 
 BRISTLES = [name for name, law in CASES.items() if law.states and name not in NO_STEP]

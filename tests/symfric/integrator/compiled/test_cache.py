@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from symfric.integrator.compiled import cache as module
-from symfric.integrator.compiled.cache import STALE, Cache, caches, trusted, users_folder
+from symfric.integrator.compiled import compiler as module
+from symfric.integrator.compiled.compiler import STALE, Cache, caches, trusted, users_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of POSIX")
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from symfric.integrator.compiled import background, columns
-from symfric.integrator.compiled.columns import CHAINED, SIDE_BY_SIDE, Columns
-from symfric.integrator.compiled.rows import Rows
+from symfric.integrator.compiled.columns import CHAINED, SIDE_BY_SIDE, Columns, Rows
 
 x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
 

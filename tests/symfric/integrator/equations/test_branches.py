@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import symfric as sf
-from symfric.integrator.equations.branches import LARGE, MIDDLE, branchless, tanh
+from symfric.integrator.equations.expressions import LARGE, MIDDLE, branchless, tanh
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.methods.tableaux import METHODS

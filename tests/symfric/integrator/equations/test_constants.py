@@ -9,8 +9,8 @@ import pytest
 from symfric import LuGre, Viscous, drive, simulate
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled import compiler
-from symfric.integrator.equations import constants
-from symfric.integrator.equations.constants import lifted
+from symfric.integrator.equations import expressions
+from symfric.integrator.equations.expressions import lifted
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.running.integrator import Integrator
 
@@ -62,7 +62,7 @@ def test_coincidences_are_no_structure() -> None:
 
 
 def test_tables_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(constants, "MOST", 3)
+    monkeypatch.setattr(expressions, "MOST_NUMBERS", 3)
     expression = 3 * ca.sin(4 * t) + 5 * ca.cos(6 * t)
     made, symbols, numbers = lifted(expression, t, "u")
     assert (made is expression, symbols.shape, numbers.size) == (True, (0, 1), 0)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric.integrator.equations.lu import SymbolicLU, factorise
+from symfric.integrator.equations.matrices import SymbolicLU, factorise
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric.integrator.equations.pivots import SOUND, backward_error, best_order, regular
+from symfric.integrator.equations.matrices import SOUND, backward_error, best_order, regular
 
 Array = NDArray[np.float64]
 DIAGONAL = ((0, 0), (1, 1))

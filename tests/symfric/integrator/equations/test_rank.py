@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric.integrator.equations.rank import echelon, null_space
+from symfric.integrator.equations.matrices import echelon, null_space
 
 Array = NDArray[np.float64]
 CAPACITORS = np.array([[-1e-6, 1e-6, 0], [1e-6, -1e-6, 0], [0, 0, -2e-6]])

@@ -27,7 +27,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.integrator.step.watch import REACH, Watch
+from symfric.integrator.step.attempt import REACH, Watch
 
 Array = NDArray[np.float64]
 CAPTURED = json.loads((Path(__file__).parents[3] / "golden" / "captured.json").read_text())

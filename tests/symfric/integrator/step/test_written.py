@@ -5,14 +5,13 @@ from typing import Any
 import casadi as ca
 import pytest
 
-import symfric.integrator.step.written as module
+import symfric.integrator.step.attempt as module
 from symfric import BrownMcPhee, rabinowicz
 from symfric.bench.mechanisms import chain
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.step.attempt import build_step
-from symfric.integrator.step.written import instructions, least, written
+from symfric.integrator.step.attempt import build_step, instructions, least, written
 from symfric.model import Model
 
 METHOD = METHODS["rodas5p"]

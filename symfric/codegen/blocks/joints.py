@@ -1,0 +1,193 @@
+"""The joints of a mechanism as parts of a block: their friction, a payload, gravity at run time."""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import final
+
+import casadi as ca
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.from_law import law_block
+from symfric.foundation.numeric import equals, is_number
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import stacked, symbols_of
+from symfric.model import Variables
+from symfric.multibody import GROUND, Body, Mechanism
+from symfric.multibody.forces import Gravity
+from symfric.multibody.joint import Contact, JointFriction
+from symfric.multibody.spatial import Frame, skew, vector
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rubbing:
+    """Friction of one contact over a step.
+
+    Attributes:
+        along: the coordinate that it resists.
+        law: the block of its law alone, whose texts are those of the data sheet.
+        force: friction [N], for a law of the moment [N m].
+        parameters, states: under the names that the law gives them.
+        following: the states after the step.
+        sliding: the states of long sliding.
+    """
+
+    along: str
+    law: Block
+    force: ca.SX
+    parameters: Variables
+    states: Variables
+    following: ca.SX
+    sliding: ca.SX
+
+
+def rubbing(contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing:
+    """The friction of a contact under the normal force `normal` [N], in a step of `h` [s].
+
+    A constant normal force is a parameter N.
+
+    Args:
+        along: the coordinate that it resists.
+        fold: whether all parameters are constants.
+
+    Raises:
+        ValueError: as `law_block`; a law that asks for more than v and N.
+    """
+    law, friction = contact.friction.law, contact.friction
+    if law.inputs:
+        raise ValueError(
+            f"inverse dynamics: joint '{contact.joint}' > friction > law: expected one that needs "
+            f"v and N alone, got {type(law).__name__}, which asks for "
+            f"{', '.join(i.name for i in law.inputs)}"
+        )
+    block = law_block(law, free=() if fold else None, turning=friction.turning)
+    v, N = block.inputs
+    level = () if fold or not ca.depends_on(block.everything, N.symbol) else _level(friction)
+    if level:
+        normal = level[0].symbol
+    sizes = [variable for variable in block.parameters if variable.name == "h"]
+    force, following, sliding = ca.substitute(
+        [
+            ca.SX(block.outputs["F"].expression),
+            ca.SX(block.next),
+            ca.SX(block.resets["init_sliding"][0]) if block.states else ca.SX(0, 1),
+        ],
+        [v.symbol, N.symbol, symbols_of(sizes)],
+        [contact.slip, normal, h if sizes else ca.SX(0, 1)],
+    )
+    parameters = tuple(v for v in block.parameters if v.name != "h")
+    return Rubbing(
+        along=along,
+        law=block,
+        force=force,
+        parameters=(*parameters, *level),
+        states=block.states,
+        following=following,
+        sliding=sliding,
+    )
+
+
+def _level(friction: JointFriction) -> Variables:
+    """The constant normal force of a joint as a parameter, where it has one."""
+    if friction.normal is None or not is_number(friction.normal):
+        return ()
+    start, turning = float(friction.normal), friction.turning
+    doc, unit = ("friction level", "N m") if turning else ("normal force", "N")
+    known = max(start, 1e-3)
+    return (Variable("N", unit, start=start, lower=0.0, upper=1e6, nominal=known, doc=doc),)
+
+
+def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Mechanism, Variables]:
+    """A copy whose body at `place` carries a rigid load, and the load's parameters.
+
+    The two are one body: of the mass m + m_l, with the centre of mass c + r (c_l - c) and the
+    inertia J + J_l + r m (|d|^2 - d d'), d = c_l - c, r = m_l / (m + m_l).
+
+    Args:
+        place: "body", "body.frame", or the name of a frame or a link that occurs once.
+        inertia: whether the load has moments of inertia; otherwise it is a point.
+
+    Returns:
+        The copy; payload_m [kg], payload_c_1 ... 3 [m] in the axes of the frame and, with
+        `inertia`, payload_J_1 ... 6 [kg m^2] about its centre of mass; all of them zero.
+
+    Raises:
+        ValueError: an unknown place, one that several bodies have, the ground.
+    """
+    name, frame = _found(mechanism, place)
+    m = Variable("payload_m", "kg", lower=0.0, upper=1e6, doc="mass of the payload")
+    c = [
+        Variable(f"payload_c_{k}", "m", lower=-1e3, upper=1e3,
+                 doc=f"its centre of mass in {place}")
+        for k in range(1, 4)
+    ]  # fmt: skip
+    J = [
+        Variable(f"payload_J_{k}", "kg m^2", lower=-1e6, upper=1e6,
+                 doc="its inertia about it, xx yy zz xy xz yz")
+        for k in range(1, 7)
+    ]  # fmt: skip
+    load = Body(
+        "payload", m.symbol, [v.symbol for v in J] if inertia else (0.0, 0.0, 0.0),
+        [v.symbol for v in c], ideal=True,
+    )  # fmt: skip
+    changed = copy(mechanism)
+    changed.bodies = [
+        _together(body, load, frame) if body.name == name else body for body in mechanism.bodies
+    ]
+    return changed, (m, *c, *(J if inertia else ()))
+
+
+def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
+    """The body at a place, and the frame on it."""
+    places = dict(mechanism.frames)
+    bodies = [body.name for body in mechanism.bodies]
+    if place in bodies:
+        places[place] = Frame()
+        found = [place]
+    else:
+        found = [known for known in places if place in (known, known.partition(".")[2])]
+    where = "inverse dynamics: payload"
+    if len(found) != 1:
+        expected = "a body or a frame" if not found else "one of " + ", ".join(found)
+        near = [known.partition(".")[2] or known for known in places]
+        hint = f"; there are {', '.join(dict.fromkeys(near))}" if not found else ""
+        raise ValueError(f"{where}: expected {expected}, got {place!r}{hint}")
+    body = found[0].partition(".")[0]
+    if body == GROUND:
+        raise ValueError(f"{where}: expected a body that moves, got '{place}' on the ground")
+    return body, places[found[0]]
+
+
+def _together(body: Body, load: Body, frame: Frame) -> Body:
+    """A body and what it carries at a frame, as one."""
+    c = ca.SX(frame.p) + ca.SX(frame.R) @ load.c
+    J = ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
+    if equals(body.mass, 0.0):
+        return replace(body, mass=load.mass, com=c, inertia=_six(body.J + J), ideal=True)
+    mass = ca.SX(body.mass) + load.mass
+    share, d = load.mass / mass, c - body.c
+    moved = -share * body.mass * (skew(d) @ skew(d))
+    return replace(
+        body, mass=mass, com=body.c + share * d, inertia=_six(body.J + J + moved), ideal=True
+    )
+
+
+def _six(J: ca.SX) -> Sequence[ca.SX]:
+    return [ca.SX(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+
+
+def with_gravity(mechanism: Mechanism) -> tuple[Mechanism, Variables]:
+    """A copy whose gravity is the parameters g_1, g_2, g_3 [m/s^2] in the axes of the ground."""
+    weights = [force for force in mechanism.forces if isinstance(force, Gravity)]
+    start = stacked(vector(force.g) for force in weights[:1])
+    values = [float(start[k]) if weights else 0.0 for k in range(3)]
+    g = tuple(
+        Variable(f"g_{k}", "m/s^2", start=value, lower=-1e3, upper=1e3, nominal=9.81,
+                 doc="gravity in the axes of the base")
+        for k, value in enumerate(values, start=1)
+    )  # fmt: skip
+    changed = copy(mechanism)
+    others = [force for force in mechanism.forces if not isinstance(force, Gravity)]
+    changed.forces = [Gravity("gravity", [v.symbol for v in g]), *others]
+    return changed, g

@@ -1,0 +1,177 @@
+"""Texts of a data sheet: what the docstring of a law tells, and how its steps are made."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from inspect import getdoc
+from re import match, search, split
+from textwrap import dedent
+from typing import final
+
+from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
+from symfric.foundation.parameters import Option, Parametric, options
+from symfric.integrator.methods.explicit import Exponential
+from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock
+from symfric.integrator.methods.method import Method
+
+TELLING = (
+    r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
+)
+"""What a sentence holds that a user of the numbers must know."""
+
+LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
+"""What leans on the sentence before it, or speaks of another form."""
+
+
+@final
+@dataclass(frozen=True)
+class LawText:
+    """Texts about a law, without the words of Python.
+
+    Attributes:
+        title: its name, one line.
+        equations: formulas, line by line.
+        limits: what it cannot do, a sentence each.
+        source: where it is published.
+    """
+
+    title: str
+    equations: str
+    limits: tuple[str, ...]
+    source: str
+
+
+def texts(law: Parametric) -> tuple[LawText, ...]:
+    """The texts of a law and of those that it holds, each once."""
+    return tuple(dict.fromkeys(_all(law)))
+
+
+def equations(obj: Parametric) -> str:
+    """The formulas of a law or a machine and of what it holds, under their titles if several."""
+    found = texts(obj)
+    if len(found) == 1:
+        return found[0].equations
+    return "\n\n".join(f"{text.title}\n{text.equations}".rstrip() for text in found)
+
+
+def _all(law: Parametric) -> Iterator[LawText]:
+    yield _text(law)
+    for item in fields(law):
+        value = getattr(law, item.name)
+        for inner in value if isinstance(value, tuple) else (value,):
+            if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
+                yield from _all(inner)
+
+
+def _text(law: Parametric) -> LawText:
+    paragraphs = (getdoc(type(law)) or type(law).__name__).split("\n\n")
+    paragraphs = (
+        paragraphs[: paragraphs.index("Raises:")] if "Raises:" in paragraphs else paragraphs
+    )
+    formulas = list(_formulas(paragraphs, options(law).values()))
+    prose = "\n".join(p for p in paragraphs[1:] if not p.startswith(("    ", "Raises:")))
+    about, _, source = prose.partition("\nSource: ")
+    chosen = [f"{name}: {option.value}." for name, option in options(law).items()]
+    lines = [dedent(p) for p in formulas] + ["    ".join(chosen).capitalize()] * bool(chosen)
+    return LawText(
+        title=" ".join(paragraphs[0].split()),
+        equations="\n".join(lines).replace("`", ""),
+        limits=tuple(_limits(about)),
+        source=" ".join(source.split()),
+    )
+
+
+def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[str]:
+    """The formulas but for those of another form, whose name stands before them."""
+    others = "|".join(rf'{o.name} = "(?!{o.value}")' for o in forms) or "(?!)"
+    before = ""
+    for paragraph in paragraphs:
+        if not paragraph.startswith("    "):
+            before = " ".join(paragraph.split())
+        elif not search(others, before.rpartition(". ")[2]):
+            lines = paragraph.splitlines()
+            yield "\n".join(line for line in lines if not search(others, line))
+
+
+def _limits(prose: str) -> Iterator[str]:
+    """The sentences that tell what a law cannot do, and over which widths it is smooth."""
+    for sentence in split(r"(?<=\.)(?<!al\.)\s+", " ".join(prose.split())):
+        for clause in split(r";\s+", sentence.removeprefix("Limits: ").replace("`", "")):
+            if search(TELLING, clause) and not search(LEANING, clause):
+                text = clause.strip().rstrip(".")
+                capital = match(r"[a-z]+[ ']", text)
+                yield f"{text[0].upper() if capital else text[0]}{text[1:]}."
+
+
+HELD = "Inputs are held over the step h."
+
+KINDS = {
+    EXACT: """\
+Exact exponential step, whatever its length, for dz/dt = a - b z at held inputs:
+    x     = -b h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
+    z+    = z + h phi1 dz/dt            at the end of the step
+    zm    = z + h phi2 dz/dt            mean over the step
+    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end""",
+    EVENT: """\
+Event step, exact whatever its length: every element sticks up to its limit, which it meets
+within the step, and slips from there on; it sticks again when v turns round.
+    z+, zm  at the end of the step, and mean over it
+    r       = (z+ - z) / h              mean rate,   r+ = dz/dt at z+""",
+    SECOND: """\
+Exponential step of second order, bounded whatever its length, linearised in each state:
+    J     = d(dz/dt)/dz,   x = J h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
+    z+    = z + s h phi1 dz/dt          at the end of the step
+    zm    = z + s h [(1 - s) phi1 + s phi2] dz/dt       mean over the step
+    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end
+s is 1, or the share of the way on which z comes to rest, where it stays, with r+ = 0.""",
+}
+
+FORCES = """\
+    F     = F(v, N, zm, r)              mean over the step
+    F_end = F(v, N, z+, r+)             at its end"""
+
+
+def of_law(kinds: tuple[str, ...], ends: bool) -> str:
+    """How the states of a law step, by the `kinds` of its `Step`.
+
+    Args:
+        ends: the block has the force at the end of the step, too.
+    """
+    forces = FORCES if ends else FORCES.splitlines()[0]
+    return "\n".join([HELD, *(KINDS[kind] for kind in kinds), forces])
+
+
+def of_method(method: Method, algebraic: bool) -> str:
+    """How a method of the integrator makes a fixed step of x' = f(x, u), 0 = g(x, z, u).
+
+    Args:
+        algebraic: there are unknowns z.
+    """
+    unknowns = "\n    x stands for states and algebraic unknowns" if algebraic else ""
+    return (
+        f"Fixed steps by {method.name}, order {method.order}. {HELD}\n"
+        f"{_formula(method)}{unknowns}\n"
+        "Outputs are those at the end of the step. Steps have no error control."
+    )
+
+
+def _formula(method: Method) -> str:
+    """The formula of one step."""
+    match method:
+        case BackwardEuler():
+            return f"    x+ = x + h f(x+, u)    by {method.iterations} Newton iterations from x"
+        case Radau():
+            return (
+                "    X_i = x + h (a_i1 f(X_1, u) + a_i2 f(X_2, u) + a_i3 f(X_3, u)),   x+ = X_3\n"
+                f"    by {method.iterations} simplified Newton iterations"
+            )
+        case Rosenbrock():
+            return (
+                "    [I / (gamma h) - df/dx] k_i = f(x + sum a_ij k_j, u) + sum c_ij k_j / h\n"
+                f"    x+ = x + sum m_i k_i,   i = 1 ... {method.stages}, gamma = {method.gamma:.6g}"
+            )
+        case Exponential():
+            return "    x_i+ = x_i + h phi1(h df_i/dx_i) f_i(x, u),   phi1(a) = (exp(a) - 1) / a"
+        case _:
+            return (
+                "    X_i = x + h sum a_ij f(X_j, u),   x+ = x + h sum b_i f(X_i, u)    (explicit)"
+            )

@@ -1,0 +1,333 @@
+"""Guards in generated C: invalid inputs never crash a step, and always set a bit of its status.
+
+    inputs       outside their range: clamped to it; not finite: their start value, a safe one
+    step size    as inputs, the default in place of what is not finite
+    states       beyond `HUGE` times their nominal value, or not finite: all restart
+    parameters   outside their ranges: the default set is used
+    outputs      not finite after all that: 0, and all states restart
+
+A bit of the status that a step returns (`Status`) reports each change; a number within its range is
+not changed, nor is a state that is too large for the present load, such as a bristle after the load
+fell. Numbers are compared by their bits, as integers: that is as cheap as floats, and works under
+-ffast-math, too, where a compiler assumes that NaN does not exist.
+
+`symfric.codegen.runner.GuardModel` does the same in NumPy, for the comparison with CasADi.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntFlag
+from math import isfinite
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.layout import Member, members, places, prefix
+from symfric.emitter.c99 import Real
+from symfric.foundation.parameters import Variable
+
+Array = NDArray[np.float64]
+
+WIDE = 1e6
+"""An input without bounds is clamped to this many times its nominal value."""
+
+HUGE = 1e10
+"""A state of more than this many times its nominal value is none of a machine."""
+
+SHORTEST, LONGEST = 1e-9, 1e3
+"""Range of a step size that is a parameter [s]."""
+
+TOP = 1e30
+"""No range ends beyond: squares of half of it are numbers in float."""
+
+STEP_SIZE = "h"
+
+
+class Status(IntFlag):
+    """What a step found and mended; 0 if all was well."""
+
+    CLAMPED = 1
+    NOT_FINITE = 2
+    STATE = 4
+    PARAMETER = 8
+    OUTPUT = 16
+
+
+MEANING = {
+    Status.CLAMPED: "an input was outside its range and has been clamped",
+    Status.NOT_FINITE: "an input was not finite and has been replaced, see above",
+    Status.STATE: "a state was not finite or absurd; all have restarted",
+    Status.PARAMETER: "step size clamped, or the default parameters used",
+    Status.OUTPUT: "a result was not finite; outputs are 0, states have restarted",
+}
+
+
+@final
+@dataclass(frozen=True)
+class Range:
+    """What a number may be, closed, and what takes its place where it is none."""
+
+    low: float
+    high: float
+    safe: float
+
+
+def range_of(variable: Variable) -> Range:
+    """The range of an input: its bounds, `WIDE` times its nominal value where it has none.
+
+    The safe value is its start value, 0 unless the model says otherwise.
+    """
+    wide = WIDE * variable.nominal
+    start = float(variable.start)
+    return _range(variable, -wide, wide, min(max(start, variable.lower), variable.upper))
+
+
+def parameter_range(variable: Variable) -> Range:
+    """The range of a parameter: its bounds, `WIDE` times its default where it has none.
+
+    The step size h has `SHORTEST` ... `LONGEST`. A default is always within its range.
+    """
+    start = float(variable.start)
+    if variable.name == STEP_SIZE:
+        return Range(min(SHORTEST, start), max(LONGEST, start), start)
+    wide = WIDE * max(variable.nominal, 1.0)
+    return _range(variable, -wide, wide, start)
+
+
+def _range(variable: Variable, low: float, high: float, safe: float) -> Range:
+    low = variable.lower if isfinite(variable.lower) else min(low, variable.upper, safe)
+    high = variable.upper if isfinite(variable.upper) else max(high, variable.lower, safe)
+    low = 0.0 if abs(low) < 1 / TOP else max(low, -TOP)
+    return Range(low, min(high, TOP), safe)
+
+
+def state_limit(variable: Variable) -> float:
+    """The magnitude beyond which a state counts as lost."""
+    return min(HUGE * max(variable.nominal, abs(float(variable.start))), TOP)
+
+
+def constants(block: Block, real: Real) -> str:
+    """The bits of the status as macros for the header."""
+    stem = prefix(block, real).upper()
+    kinds = [s for s in Status if block.states or s != Status.STATE]
+    kinds = [s for s in kinds if block.parameters or s != Status.PARAMETER]
+    width = max(len(s.name or "") for s in kinds)
+    meaning = dict(MEANING)
+    if not block.states:
+        meaning[Status.OUTPUT] = "a result was not finite; outputs are 0"
+    return "".join(
+        f"#define {stem}_{s.name:<{width}} {s.value}u /* {meaning[s]} */\n" for s in kinds
+    )
+
+
+def bit(block: Block, real: Real, status: Status) -> str:
+    """The macro of one bit."""
+    return f"{prefix(block, real).upper()}_{status.name}"
+
+
+def helpers(block: Block, real: Real, text: str) -> str:
+    """The static functions that `text`, the guarded functions of a block, calls."""
+    name = prefix(block, real)
+    own = {"unfit": _unfit(block, real), "lost": _lost(block, real)}
+    general = HELPERS.format(
+        name=name,
+        real=real.name,
+        whole=f"uint{8 * real.size}_t",
+        magnitude="UINT32_C(0x7FFFFFFF)" if real.size == 4 else "UINT64_C(0x7FFFFFFFFFFFFFFF)",
+        infinite="UINT32_C(0x7F800000)" if real.size == 4 else "UINT64_C(0x7FF0000000000000)",
+    )
+    general_parts = dict(
+        zip(("bits", "beyond", "outside", "mended"), general.split("\n\n"), strict=True)
+    )
+    needed: list[str] = []
+    for what, body in reversed((general_parts | own).items()):
+        if f"{name}_{what}(" in text + "".join(needed):
+            needed.insert(0, body + "\n\n")
+    return "".join(needed)
+
+
+HELPERS = """\
+/* Numbers are compared by their bits: as cheap, and NaN is found under -ffast-math, too. */
+static {whole} {name}_bits({real} x)
+{{
+    {whole} found;
+    memcpy(&found, &x, sizeof found);
+    return found;
+}}
+
+/* Whether |x| is above limit, infinite or NaN. */
+static bool {name}_beyond({real} x, {real} limit)
+{{
+    return ({name}_bits(x) & {magnitude}) > {name}_bits(limit);
+}}
+
+/* Whether x is outside low ... high, 0 <= low, or NaN; -0 is 0. */
+static bool {name}_outside({real} x, {real} low, {real} high)
+{{
+    const {whole} span = {name}_bits(high) - {name}_bits(low);
+    return {name}_bits(x) - {name}_bits(low) > span && x != low;
+}}
+
+/* x clamped to low ... high, or safe where it is not finite; says so by bits of the status. */
+static {real} {name}_mended(
+    {real} x, {real} low, {real} high, {real} safe,
+    unsigned int clamped, unsigned int not_finite, unsigned int *status)
+{{
+    if (({name}_bits(x) & {magnitude}) >= {infinite}) {{
+        *status |= not_finite;
+        return safe;
+    }}
+    if (x < low) {{
+        *status |= clamped;
+        return low;
+    }}
+    if (x > high) {{
+        *status |= clamped;
+        return high;
+    }}
+    return x;
+}}"""
+
+
+def _outside(name: str, real: Real, place: str, low: float, high: float) -> str:
+    """The condition that the number at `place` is outside its range, or NaN."""
+    least, most = real.literal(low), real.literal(high)
+    if low >= 0.0:
+        return f"{name}_outside({place}, {least}, {most})"
+    if low == -high:
+        return f"{name}_beyond({place}, {most})"
+    widest = real.literal(max(-low, abs(high)))
+    return f"{name}_beyond({place}, {widest}) || {place} < {least} || {place} > {most}"
+
+
+def mended(block: Block, real: Real, variable: Variable, group: str, status: str) -> list[str]:
+    """Statements that bring a local, an input or the step size, into its range.
+
+    Args:
+        group: "in" or "param".
+        status: the pointer to the status.
+    """
+    name, local = prefix(block, real), variable.name
+    if group == "in":
+        within, kinds = range_of(variable), (Status.CLAMPED, Status.NOT_FINITE)
+    else:
+        within, kinds = parameter_range(variable), (Status.PARAMETER, Status.PARAMETER)
+    numbers = ", ".join(real.literal(x) for x in (within.low, within.high, within.safe))
+    said = ", ".join(bit(block, real, kind) for kind in kinds)
+    return [
+        f"if ({_outside(name, real, local, within.low, within.high)}) {{",
+        f"    {local} = {name}_mended({local}, {numbers}, {said}, {status});",
+        "}",
+    ]
+
+
+def fit_parameters(block: Block, real: Real, status: str) -> list[str]:
+    """Statements that put the default parameters in the place of those that are out of range."""
+    name = prefix(block, real)
+    if all(v.name == STEP_SIZE for v in block.parameters):
+        return []
+    return [
+        f"if (param != &{name}_default && {name}_unfit(param)) {{",
+        f"    param = &{name}_default;",
+        f"    {_said(block, real, Status.PARAMETER, status)}",
+        "}",
+    ]
+
+
+def found_states(block: Block, real: Real, status: str) -> list[str]:
+    """Statements that let the states restart if one of them is lost."""
+    if not block.states:
+        return []
+    name = prefix(block, real)
+    return [
+        f"if ({name}_lost(state)) {{",
+        f"    *state = {name}_start;",
+        f"    {_said(block, real, Status.STATE, status)}",
+        "}",
+    ]
+
+
+def finite_outputs(block: Block, real: Real, status: str) -> list[str]:
+    """Statements that put 0 in the place of outputs that are not finite."""
+    name, said = prefix(block, real), _said(block, real, Status.OUTPUT, status)
+    most = real.literal(float(np.finfo(np.float32 if real.size == 4 else np.float64).max))
+    if block.is_function:
+        (shown,) = block.outputs
+        bad = f"if ({name}_beyond({shown}, {most})) {{"
+        return [bad, f"    {said}", f"    return {real.literal(0.0)};", "}", f"return {shown};"]
+    shown = places(block, "out")
+    if not shown:
+        return []
+    restart = [f"    *state = {name}_start;"] if block.states else []
+    return [
+        f"if ({' || '.join(f'{name}_beyond(out->{place}, {most})' for place in shown)}) {{",
+        *(f"    out->{place} = {real.literal(0.0)};" for place in shown),
+        *restart,
+        f"    {said}",
+        "}",
+    ]
+
+
+def _said(block: Block, real: Real, kind: Status, status: str) -> str:
+    """The statement that adds a bit to the status that a pointer shows."""
+    place = status.removeprefix("&") if status.startswith("&") else f"*{status}"
+    return f"{place} |= {bit(block, real, kind)};"
+
+
+def _unfit(block: Block, real: Real) -> str:
+    """The function that tells whether a parameter is out of its range."""
+    name = prefix(block, real)
+    ranges = {v.name: parameter_range(v) for v in block.parameters}
+    limits = [ranges[v.name] for v in block.parameters]
+    rows = [m for m in members(block).get("param", ()) if m.name != STEP_SIZE]
+    conditions = [(m, [(r.low, r.high) for r in limits[m.first : m.first + m.count]]) for m in rows]
+    return _any(
+        f"/* Whether a parameter is outside its range. */\n"
+        f"static bool {name}_unfit(const {name}_param_t *param)",
+        name, real, "param", conditions,
+    )  # fmt: skip
+
+
+def _lost(block: Block, real: Real) -> str:
+    """The function that tells whether a state is no number of a machine."""
+    name = prefix(block, real)
+    limits = [state_limit(v) for v in block.states]
+    rows = members(block).get("state", ())
+    conditions = [(m, [(-x, x) for x in limits[m.first : m.first + m.count]]) for m in rows]
+    return _any(
+        f"/* Whether a state is absurd or not finite. */\n"
+        f"static bool {name}_lost(const {name}_state_t *state)",
+        name, real, "state", conditions,
+    )  # fmt: skip
+
+
+def _any(
+    head: str,
+    name: str,
+    real: Real,
+    group: str,
+    rows: Sequence[tuple[Member, Sequence[tuple[float, float]]]],
+) -> str:
+    """A function that is true if one of the members is outside its range; arrays by loops."""
+    single: list[str] = []
+    loops: list[str] = []
+    for member, ranges in rows:
+        if member.size and len(set(ranges)) == 1:
+            place = f"{group}->{member.name}[i]"
+            loops += [
+                f"    for (i = 0; i < {member.size}; i++) {{",
+                f"        if ({_outside(name, real, place, *ranges[0])}) {{",
+                "            return true;",
+                "        }",
+                "    }",
+            ]
+            continue
+        single += [
+            _outside(name, real, f"{group}->{place}", *limits)
+            for place, limits in zip(member.places, ranges, strict=True)
+        ]
+    joined = "\n        || ".join(single) if single else "false"
+    count = ["    int i;"] if loops else []
+    return "\n".join([head, "{", *count, *loops, f"    return {joined};", "}"])

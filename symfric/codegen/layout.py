@@ -1,0 +1,237 @@
+"""Names and structs of a block in one floating point type, and pieces of C that files share.
+
+Names begin with block and type: struct types `NAME_f32_state_t` (likewise param, in, out), default
+parameters `NAME_f32_default`, functions `NAME_f32_init`, `NAME_f32_step`; `f64` for double, so that
+both types live in one program. Nothing is allocated and no data but the constant defaults exist,
+so one block serves any number of joints.
+
+Numbers of alike elements that stand next to each other, such as the states F_1 ... F_10, are one
+array member, `float F[10]`. In memory a struct is the flat column of the block's variables.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from string import Template
+from textwrap import wrap
+from typing import final
+
+import numpy as np
+
+from symfric.codegen.blocks.block import GROUPS, Block
+from symfric.emitter.arrays import Arrays
+from symfric.emitter.c99 import Real
+from symfric.emitter.rolling import Array
+
+
+@final
+@dataclass(frozen=True)
+class Member:
+    """One member of a struct.
+
+    Attributes:
+        name: C identifier.
+        unit: of each number.
+        doc: what it is, "" where nobody has said.
+        first: row of its first number in the flat struct.
+        size: 0 for a single number, else how many an array holds.
+    """
+
+    name: str
+    unit: str
+    doc: str
+    first: int
+    size: int = 0
+
+    @property
+    def declared(self) -> str:
+        """As in a declaration: `F[10]`."""
+        return f"{self.name}[{self.size}]" if self.size else self.name
+
+    @property
+    def count(self) -> int:
+        """How many numbers it holds."""
+        return max(self.size, 1)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Its numbers as C writes them: `F[0]`, `F[1]`, ..."""
+        if not self.size:
+            return (self.name,)
+        return tuple(f"{self.name}[{i}]" for i in range(self.size))
+
+
+def prefix(block: Block, real: Real) -> str:
+    """What all names of a block in one type begin with; also the name of its files."""
+    return f"{block.name}_{real.suffix}"
+
+
+def members(block: Block) -> dict[str, tuple[Member, ...]]:
+    """Struct -> its members; empty structs are left out."""
+    variables = {"state": block.states, "param": block.parameters, "in": block.inputs}
+    flat = {group: [(v.name, v.unit, v.doc) for v in of] for group, of in variables.items()}
+    flat["out"] = [(name, output.unit, output.doc) for name, output in block.outputs.items()]
+    if block.is_function:
+        del flat["in"], flat["out"]
+    return {group: tuple(_members(block, group, rows)) for group, rows in flat.items() if rows}
+
+
+def _members(block: Block, group: str, rows: Sequence[tuple[str, str, str]]) -> Iterator[Member]:
+    first = {a.first: a for a in block.arrays if a.group == group}
+    i = 0
+    while i < len(rows):
+        name, unit, doc = rows[i]
+        if i in first:
+            name, size = first[i].name, first[i].size
+            same = all(row[2] == doc for row in rows[i : i + size])
+            doc = f"{doc}, of each element".removeprefix(", ") if same else "of each element"
+            yield Member(name, unit, doc, i, size)
+            i += size
+        else:
+            yield Member(name, unit, doc, i)
+            i += 1
+
+
+def places(block: Block, group: str) -> tuple[str, ...]:
+    """The numbers of a struct in the block's order, as C writes them behind `state->`."""
+    return tuple(place for member in members(block).get(group, ()) for place in member.places)
+
+
+def indexed(block: Block, results: Sequence[str], guards: bool) -> Arrays:
+    """What loops may index: the arrays of the structs in the order of `GROUPS`.
+
+    Args:
+        results: the structs that the results of the function are written to.
+        guards: inputs are mended in locals, one by one; no loop may read them past these.
+    """
+    mended = {"in"} if guards else set[str]()
+
+    def of(groups: Sequence[str]) -> tuple[Array, ...]:
+        return tuple(
+            Array(number, member.first, member.size, f"{group}->{member.name}")
+            for number, group in enumerate(groups)
+            for member in members(block).get(group, ())
+            if member.size and group not in mended
+        )
+
+    return Arrays(of(GROUPS[:3]), of(results))
+
+
+WIDTH = 100
+
+TEMPLATES = Path(__file__).with_name("templates")
+"""Folder of the fixed text of generated files."""
+
+
+class _AtTemplate(Template):
+    """Text with places @name, since $ has a meaning in CMake."""
+
+    delimiter = "@"
+
+
+def filled(template: Path, **values: object) -> str:
+    """Text of a template file with a value in each place @name."""
+    return _AtTemplate(template.read_text(encoding="utf-8")).substitute(values)
+
+
+def banner(block: Block, file: str) -> list[str]:
+    """First lines of a file: who made it, and whose it is."""
+    return [
+        f"{file}: C99 made by symfric {version('symfric')} with CasADi {version('casadi')}, "
+        f"model {block.fingerprint}.",
+        "This generated code is yours. SPDX-License-Identifier: MIT-0",
+    ]
+
+
+def block_comment(lines: Sequence[str]) -> str:
+    """Lines of text as one comment."""
+    return "/* " + "\n".join(f" * {comment(line)}".rstrip() for line in lines)[3:] + "\n */"
+
+
+def comment(text: str) -> str:
+    """Text that cannot end the comment it stands in."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
+def folded(line: str, margin: str) -> str:
+    """A long line broken at blanks, further in than it begins."""
+    margin += " " * (len(line) - len(line.lstrip(" ")))
+    return "\n".join(
+        wrap(
+            line.lstrip(" "),
+            WIDTH,
+            initial_indent=margin,
+            subsequent_indent=margin + "    ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    )
+
+
+def number(value: float, real: Real) -> str:
+    """`value` rounded to the type as C: a literal, or a macro of math.h for what is not finite."""
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = float(np.float32(value)) if real.size == 4 else value
+    if math.isnan(rounded):
+        return "NAN"
+    if math.isinf(rounded):
+        return "-INFINITY" if rounded < 0 else "INFINITY"
+    return real.literal(rounded)
+
+
+def braces(values: Iterable[float], real: Real) -> str:
+    """Numbers as the initialiser of an array."""
+    return "{" + ", ".join(number(float(value), real) for value in values) + "}"
+
+
+def declarations(block: Block, real: Real) -> list[str]:
+    """Variables `state`, `param`, `in`, `out` of a step, those that there are."""
+    name = prefix(block, real)
+    found = [f"{name}_{group}_t {group};" for group in GROUPS if group in members(block)]
+    if block.is_function:
+        found += [f"{real.name} in[{len(block.inputs)}];"] if block.inputs else []
+        found += [f"{real.name} out;"]
+    return found
+
+
+def called(
+    block: Block,
+    real: Real,
+    guards: bool,
+    pointers: Mapping[str, str],
+    inputs: Sequence[str],
+    status: str = "&status",
+) -> str:
+    """The call of one step.
+
+    Args:
+        pointers: to each struct, by group.
+        inputs: arguments of a function of scalars.
+        status: pointer to the status, to which a guarded function of scalars adds its bits.
+    """
+    structs = [pointers[group] for group in GROUPS if group in members(block)]
+    if block.is_function:
+        arguments = [*inputs, *structs, *([status] if guards else [])]
+        return f"{prefix(block, real)}({', '.join(arguments)})"
+    return f"{prefix(block, real)}_step({', '.join(structs)})"
+
+
+def step(block: Block, real: Real, guards: bool) -> list[str]:
+    """The statements of one step on the variables of `declarations`; with guards sets `status`."""
+    call = called(
+        block, real, guards, {group: f"&{group}" for group in GROUPS}, fields(block, "in")
+    )
+    if block.is_function:
+        return [*["status = 0u;"] * guards, f"out = {call};"]
+    return [f"{'status = ' * guards}{call};"]
+
+
+def fields(block: Block, group: str) -> list[str]:
+    """The numbers of a group as C writes them: `state.z`, `in.v`, of a function `in[0]`, `out`."""
+    if block.is_function and group == "in":
+        return [f"in[{i}]" for i in range(len(block.inputs))]
+    if block.is_function and group == "out":
+        return ["out"]
+    return [f"{group}.{place}" for place in places(block, group)]

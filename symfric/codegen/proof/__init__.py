@@ -1,1 +1,0 @@
-"""Proof that generated C computes what CasADi computes."""

@@ -1,0 +1,187 @@
+"""Rounding to a type: the operations of a block in NumPy, one by one, in that type."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.codegen.blocks.block import Block
+from symfric.foundation.graph import SELECT, Graph, graph
+
+Array = NDArray[Any]
+
+
+def _twice(x: Array) -> Array:
+    return x + x
+
+
+OPERATIONS: dict[int, Callable[..., Any]] = {
+    ca.OP_ADD: np.add,
+    ca.OP_SUB: np.subtract,
+    ca.OP_MUL: np.multiply,
+    ca.OP_DIV: np.divide,
+    ca.OP_NEG: np.negative,
+    ca.OP_SQ: np.square,
+    ca.OP_TWICE: _twice,
+    ca.OP_INV: np.reciprocal,
+    ca.OP_SIGN: np.sign,
+    ca.OP_LT: np.less,
+    ca.OP_LE: np.less_equal,
+    ca.OP_EQ: np.equal,
+    ca.OP_NE: np.not_equal,
+    ca.OP_NOT: np.logical_not,
+    ca.OP_AND: np.logical_and,
+    ca.OP_OR: np.logical_or,
+    ca.OP_FABS: np.abs,
+    ca.OP_FMIN: np.fmin,
+    ca.OP_FMAX: np.fmax,
+    ca.OP_SQRT: np.sqrt,
+    ca.OP_FLOOR: np.floor,
+    ca.OP_CEIL: np.ceil,
+    ca.OP_COPYSIGN: np.copysign,
+    ca.OP_EXP: np.exp,
+    ca.OP_EXPM1: np.expm1,
+    ca.OP_LOG: np.log,
+    ca.OP_LOG1P: np.log1p,
+    ca.OP_POW: np.power,
+    ca.OP_CONSTPOW: np.power,
+    ca.OP_SIN: np.sin,
+    ca.OP_COS: np.cos,
+    ca.OP_TAN: np.tan,
+    ca.OP_ASIN: np.arcsin,
+    ca.OP_ACOS: np.arccos,
+    ca.OP_ATAN: np.arctan,
+    ca.OP_ATAN2: np.arctan2,
+    ca.OP_SINH: np.sinh,
+    ca.OP_COSH: np.cosh,
+    ca.OP_TANH: np.tanh,
+    ca.OP_ASINH: np.arcsinh,
+    ca.OP_ACOSH: np.arccosh,
+    ca.OP_ATANH: np.arctanh,
+    ca.OP_HYPOT: np.hypot,
+    ca.OP_FMOD: np.fmod,
+}
+"""Those of C99 that NumPy has, by CasADi's numbers."""
+
+
+def in_type(
+    function: ca.Function,
+    arguments: list[Array],
+    kind: str,
+    random: np.random.Generator | None = None,
+) -> Array | None:
+    """The results of a function, below each other, with every operation rounded to a type.
+
+    Args:
+        function: of SX, with dense arguments and results.
+        arguments: rows of numbers, shape (rows, size of the argument).
+        kind: NumPy's name of the type, such as "f4".
+        random: rounds each result that is not exact up or down by chance, one of the last bits on
+            both sides of it, instead of to the nearest. What differs between runs is rounding.
+            Source: Vignes, Mathematics and Computers in Simulation 35 (1993), CESTAC.
+
+    Returns:
+        Shape (rows, results), in double; None where NumPy lacks an operation (erf, remainder).
+    """
+    source, found = graph(function), list[Array]()
+    count = len(arguments[0])
+    with np.errstate(all="ignore"):
+        for node in source.nodes:
+            given = [found[i] for i in node.args]
+            if node.op == ca.OP_INPUT:
+                value = arguments[node.entry[0]][:, node.entry[1]]
+            elif node.op == ca.OP_CONST:
+                value = np.full(count, node.value)
+            elif node.op in (SELECT, ca.OP_IF_ELSE_ZERO):
+                value = np.where(given[0] != 0, given[1], given[2] if len(given) > 2 else 0.0)
+            elif node.op not in OPERATIONS:
+                return None
+            elif random is None:
+                value = OPERATIONS[node.op](*given)
+            else:
+                exact = np.asarray(OPERATIONS[node.op](*(x.astype(float) for x in given)), float)
+                value = _up_or_down(exact, kind, random)
+            found.append(np.asarray(value).astype(kind))
+    return np.column_stack([found[i] for row in source.results for i in row]).astype(float)
+
+
+def _up_or_down(exact: Array, kind: str, random: np.random.Generator) -> Array:
+    """Numbers of the type on a side of each number taken by chance, or the number where it is one.
+
+    The double nearest to a result of an operation on floats stands for the result itself.
+    """
+    nearest = exact.astype(kind)
+    beyond = np.where(exact > nearest, np.inf, -np.inf).astype(kind)
+    other = (exact != nearest) & (random.random(exact.shape) < 0.5)
+    return np.where(other, np.nextafter(nearest, beyond), nearest)
+
+
+SAMPLES = 64
+"""Times that a step is done, the first rounded to nearest and the others up or down by chance."""
+
+AT_ONCE = 2048
+"""Steps that are held in memory together."""
+
+DECISIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
+PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
+
+
+def functions(block: Block) -> list[ca.Function]:
+    """What makes the columns of a row: the step and the further initialisations."""
+    return [block.step, *(block.reset(name) for name in block.resets)]
+
+
+def modes(block: Block) -> NDArray[np.bool_]:
+    """Which columns hold a mode, shape (columns,): a number that only decisions choose.
+
+    It is the result of a comparison, or one of some constants and modes that comparisons pick.
+    A state is one if its next value is, in the step and in every initialisation.
+    """
+    sources, count = [graph(function) for function in functions(block)], len(block.states)
+    states = np.ones(count, bool)
+    while True:
+        found = [_discrete(source, states) for source in sources]
+        left = states & np.all([columns[:count] for columns in found], axis=0)
+        if (left == states).all():
+            return np.concatenate(found)
+        states = left
+
+
+def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which rows of the results only decisions choose, where these of the states are modes."""
+    found: list[bool] = []
+    for node in source.nodes:
+        if node.op == ca.OP_INPUT:
+            found.append(node.entry[0] == 0 and bool(states[node.entry[1]]))
+        elif node.op in (SELECT, ca.OP_IF_ELSE_ZERO):
+            found.append(all(found[i] for i in node.args[1:]))
+        else:
+            known = node.op in DECISIONS or node.op == ca.OP_CONST
+            found.append(known or (node.op in PASSING and all(found[i] for i in node.args)))
+    return np.array([found[i] for row in source.results for i in row], bool)
+
+
+def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array | None:
+    """What CasADi's operations make of some steps in float, shape (SAMPLES, steps, columns).
+
+    Args:
+        states, parameters, inputs: before and in every step, shape (steps, ...).
+
+    Returns:
+        The same at each call; None where NumPy lacks an operation of the block.
+    """
+    random, parts = np.random.default_rng(0), list[Array]()
+    size = max(1, AT_ONCE // SAMPLES)
+    for first in range(0, len(inputs), size):
+        given = [a[first : first + size].astype("f4") for a in (states, parameters, inputs)]
+        many = [np.tile(a, (SAMPLES - 1, 1)) for a in given]
+        columns: list[Array] = []
+        for function in functions(block):
+            nearest, others = in_type(function, given, "f4"), in_type(function, many, "f4", random)
+            if nearest is None or others is None:
+                return None
+            columns.append(np.vstack([nearest, others]))
+        parts.append(np.hstack(columns).reshape(SAMPLES, len(given[0]), -1))
+    return np.concatenate(parts, axis=1)

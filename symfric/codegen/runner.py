@@ -1,0 +1,262 @@
+"""Running a block on the same inputs twice: as generated C, and in CasADi's virtual machine.
+
+Both give one row a step: the states after it, the outputs, the states that each reset would make of
+the inputs, and with guards the status.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.codegen.blocks.block import GROUPS, Block
+from symfric.codegen.guards import STEP_SIZE, Range, Status, parameter_range, range_of, state_limit
+from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, prefix
+from symfric.emitter.c99 import Real
+from symfric.foundation.compiler import CompileError
+from symfric.foundation.graph import graph
+from symfric.foundation.programs import PATIENCE, ProgramError, finished
+
+Array = NDArray[np.float64]
+
+PER_STEP = 1e-3
+"""Seconds that a step may take."""
+
+
+def program(block: Block, real: Real, guards: bool = True) -> str:
+    """A C program that reads inputs from standard input and writes a row a step, all binary.
+
+    With a second argument on its command line it reads the parameters before the inputs.
+    """
+    name = prefix(block, real)
+    types = {group: f"{name}_{group}_t" for group in members(block)}
+    own = {group: f"&{group}" for group in GROUPS} | {"param": "param"}
+    call = called(block, real, guards, own, fields(block, "in"))
+    if block.is_function:
+        types |= {"out": real.name}
+        calls = [*["status = 0u;"] * guards, f"out = {call};", _write("out")]
+    else:
+        calls = [f"{'status = ' * guards}{call};"]
+        calls += [_write(g) for g in ("state", "out") if g in types]
+    for reset in block.resets:
+        rest = [own[group] for group in ("param", "in") if group in types]
+        calls += [f"{name}_{reset}({', '.join(['&other', *rest])});", _write("other")]
+    declarations = [f"{kind} {group};" for group, kind in types.items() if group != "param"]
+    if block.inputs:
+        calls.insert(0, _read("in"))
+    if block.parameters:
+        calls.insert(0, f"if (argc > 2) {{ {_read('given')} }}")
+        declarations.append(f"{types['param']} given = {name}_default;")
+        declarations.append(f"const {types['param']} *param = argc > 2 ? &given : &{name}_default;")
+    if block.resets:
+        declarations.append(f"{types['state']} other;")
+    if guards:
+        declarations += ["unsigned int status;", f"{real.name} said;"]
+        calls += [f"said = ({real.name})status;", _write("said")]
+    if block.is_function and block.inputs:
+        declarations.append(f"{real.name} in[{len(block.inputs)}];")
+    if block.states:
+        declarations.append(f"{name}_init(&state, &{name}_start);")
+    return filled(
+        TEMPLATES / "steps.c",
+        name=name,
+        declarations="\n".join(f"    {line}" for line in declarations),
+        body="\n".join(f"        {line}" for line in calls),
+    )
+
+
+def _write(what: str) -> str:
+    return f"fwrite(&{what}, sizeof {what}, 1, stdout);"
+
+
+def _read(what: str) -> str:
+    return f"if (fread(&{what}, sizeof {what}, 1, stdin) != 1) {{ return 1; }}"
+
+
+def run_c(
+    block: Block,
+    real: Real,
+    executable: Path,
+    inputs: Array,
+    parameters: Array | None = None,
+    *,
+    guards: bool = True,
+) -> Array:
+    """Rows (steps, columns) that the compiled `program` makes of `inputs` (steps, inputs).
+
+    Args:
+        parameters: of every step, shape (steps, parameters); the defaults of the C without them.
+
+    Raises:
+        CompileError: the program does not run here, or ends too early.
+    """
+    kind = np.float32 if real.size == 4 else np.float64
+    given = inputs if parameters is None else np.column_stack([parameters, inputs])
+    command = [str(executable), str(len(inputs)), *(["own"] if parameters is not None else [])]
+    with np.errstate(over="ignore", under="ignore"):
+        numbers = given.astype(kind).tobytes()
+    try:
+        limit = PATIENCE + PER_STEP * len(inputs)
+        done = finished(command, numbers, limit=limit, name="the program that was compiled")
+    except ProgramError as error:
+        raise CompileError(str(error)) from None
+    columns = len(signals(block, guards=guards))
+    if done.status != 0 or len(done.output) != len(inputs) * columns * real.size:
+        raise CompileError(f"the program ended too early, with status {done.status}")
+    return np.frombuffer(done.output, kind).reshape(len(inputs), columns).astype(float)
+
+
+def run_vm(
+    block: Block,
+    real: Real,
+    inputs: Array,
+    states: Array | None = None,
+    parameters: Array | None = None,
+    *,
+    guards: bool = True,
+) -> Array:
+    """The same rows from CasADi in double, with inputs and parameters rounded to `real`.
+
+    The guards are those of `GuardModel`.
+
+    Args:
+        states: shape (steps, states): every step but the first begins from the row before.
+        parameters: of every step, shape (steps, parameters); the defaults without them.
+    """
+    model = GuardModel(block, real)
+    inputs, said = model.typed(inputs), np.zeros(len(inputs), np.int64)
+    if guards:
+        inputs, said = model.inputs(inputs)
+    p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
+    following, y = np.zeros_like(x), np.zeros(len(block.outputs))
+    step = bound(block.step, (x, p, u), (following, y))
+    others = [np.zeros_like(x) for _ in block.resets]
+    calls = [
+        bound(block.reset(reset), (x, p, u), (other,))
+        for reset, other in zip(block.resets, others, strict=True)
+    ]
+    rows = np.zeros((len(inputs), len(signals(block, guards=guards))))
+    for k, (row, now) in enumerate(zip(rows, inputs, strict=True)):
+        u[:] = now
+        if states is not None and k:
+            x[:] = states[k - 1]
+        if parameters is not None:
+            p[:] = model.typed(parameters[k])
+            if guards:
+                p[:], bits = model.parameters(p)
+                said[k] |= bits
+        if guards and model.lost(x):
+            x[:] = model.start
+            said[k] |= Status.STATE
+        step()
+        for call in calls:
+            call()
+        if guards and not np.isfinite(y).all():
+            following[:], y[:] = model.start, 0.0
+            said[k] |= Status.OUTPUT
+        row[:] = np.concatenate([following, y, *others, said[k : k + 1] if guards else ()])
+        x[:] = following
+    return rows
+
+
+def bound(
+    function: ca.Function, arguments: Sequence[Array], results: Sequence[Array]
+) -> Callable[[], None]:
+    """A call without copies: CasADi reads and writes the arrays themselves."""
+    buffer: Any
+    buffer, evaluate = function.buffer()
+    for i, array in enumerate(arguments):
+        if array.size:
+            buffer.set_arg(i, array.data)
+    for i, array in enumerate(results):
+        if array.size:
+            buffer.set_res(i, array.data)
+
+    def call(alive: object = (function, buffer)) -> None:
+        evaluate()
+
+    return call
+
+
+def signals(block: Block, *, guards: bool = True) -> list[str]:
+    """Names of the columns."""
+    states = [v.name for v in block.states]
+    later = [f"{r}.{name}" for r in block.resets for name in states]
+    return states + list(block.outputs) + later + ["status"] * guards
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GuardModel:
+    """What the guards of a block do, on rows of numbers of one type."""
+
+    block: Block
+    real: Real
+
+    def typed(self, values: Sequence[Any] | Array) -> Array:
+        """Numbers rounded to the type, as doubles."""
+        kind = np.float32 if self.real.size == 4 else np.float64
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            return np.asarray(values, dtype=float).astype(kind).astype(float)
+
+    @cached_property
+    def start(self) -> Array:
+        """Start values of the states."""
+        return self.typed([v.start for v in self.block.states])
+
+    @cached_property
+    def default(self) -> Array:
+        """Parameters as the block has them by default, in its type."""
+        return self.typed([v.start for v in self.block.parameters])
+
+    def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Inputs (steps, inputs) as a guarded step sees them, and the status of every step."""
+        found, status = rows.copy(), np.zeros(len(rows), np.int64)
+        for i in self._used:
+            found[:, i], bits = self._mended(rows[:, i], range_of(self.block.inputs[i]))
+            status |= bits
+        return found, status
+
+    def lost(self, states: Array) -> bool:
+        """Whether the states (states,) restart before a step."""
+        return not bool((np.abs(states) <= self._limits).all())
+
+    def parameters(self, values: Array) -> tuple[Array, int]:
+        """Parameters (parameters,) as a guarded step sees them, and the status."""
+        low, high, is_size = self._ranges
+        unfit = ~((values >= low) & (values <= high))
+        found = values.copy()
+        if unfit[~is_size].any():
+            found[~is_size] = self.default[~is_size]
+        for i in np.flatnonzero(unfit & is_size):
+            found[i] = np.clip(values[i], low[i], high[i])
+            found[i] = found[i] if np.isfinite(values[i]) else self.default[i]
+        return found, int(Status.PARAMETER) if unfit.any() else 0
+
+    @cached_property
+    def _used(self) -> tuple[int, ...]:
+        """Inputs that the step depends on; no other is looked at."""
+        nodes = graph(self.block.step).nodes
+        return tuple(n.entry[1] for n in nodes if n.op == ca.OP_INPUT and n.entry[0] == 2)
+
+    @cached_property
+    def _limits(self) -> Array:
+        return self.typed([state_limit(v) for v in self.block.states])
+
+    @cached_property
+    def _ranges(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        ranges = [parameter_range(v) for v in self.block.parameters]
+        low, high = (self.typed([getattr(r, side) for r in ranges]) for side in ("low", "high"))
+        return low, high, np.array([v.name == STEP_SIZE for v in self.block.parameters], bool)
+
+    def _mended(self, column: Array, within: Range) -> tuple[Array, NDArray[np.int64]]:
+        low, high, safe = self.typed([within.low, within.high, within.safe])
+        finite = np.isfinite(column)
+        found = np.where(finite, np.clip(column, low, high), safe)
+        kinds = np.where(finite, int(Status.CLAMPED), int(Status.NOT_FINITE))
+        return found, np.where(finite & (found == column), 0, kinds).astype(np.int64)

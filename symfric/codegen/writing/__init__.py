@@ -1,1 +1,0 @@
-"""Header and source file of a block."""

@@ -1,0 +1,349 @@
+"""Expressions rewritten operation by operation, and the pace of expressions in time alone.
+
+Tanh: which way the one of the C library goes depends on its argument, a processor guesses it wrong,
+and a small step spends a third of its time there. Written out in the graph, both engines do the
+same operations, and vectors of members can, too.
+
+Quotients by one divisor are products with its reciprocal: a division costs as much as ten others.
+Compilers do so only where they may round otherwise than the virtual machine does.
+
+Numbers as data: another amplitude then means no other equations. Each number becomes a symbol where
+it is read; what is left is the structure. Exponents of constant powers stay, as they are structure:
+x^2 is x x, and x^0.5 has no slope at 0. Limits: what CasADi leaves out is no number any more:
+sin(t) for 1 sin(t), 0 for 0 sin(t).
+
+Pace: while a machine rests, steps grow until they are longer than a pulse that is still to come,
+and no stage falls on it. A function of time is known, however, and cheap: it is looked at on a
+grid, and the span cut in halves until each piece is straight. Where pieces become much shorter or
+much longer from one to the next, a step has to end. A sine has one pace and no such times.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from math import isfinite
+from typing import Any, NamedTuple, cast
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import reciprocal
+from symfric.integrator.compiled.columns import Columns
+
+Rule = Callable[[int, list[ca.SX]], ca.SX | None]
+"""(number of an instruction, its operands) -> what stands for it; None for itself."""
+
+
+def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list[ca.SX]:
+    """Results of an SX `function` at `arguments`, columns of symbols, rewritten by `rule`."""
+    symbols = [ca.vertsplit(ca.vec(argument)) for argument in arguments]
+    found = [[ca.SX(0)] * function.nnz_out(i) for i in range(function.n_out())]
+    work: dict[int, ca.SX] = {}
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        at, to = function.instruction_input(k), function.instruction_output(k)
+        if operation == ca.OP_OUTPUT:
+            found[to[0]][to[1]] = work[at[0]]
+        elif operation == ca.OP_INPUT:
+            work[to[0]] = symbols[at[0]][at[1]]
+        elif operation == ca.OP_CONST:
+            work[to[0]] = ca.SX(function.instruction_constant(k))
+        else:
+            operands = [work[i] for i in at]
+            value = rule(k, operands)
+            if value is None:
+                new = ca.SX.unary if len(at) == 1 else ca.SX.binary
+                value = new(operation, *operands)
+            work[to[0]] = value
+    return [
+        ca.SX(function.sparsity_out(i), ca.vertcat(ca.SX(0, 1), *v)) for i, v in enumerate(found)
+    ]
+
+
+MIDDLE = 0.7
+"""Up to here tanh x = x + x^3 U(x^2)/V(x^2), equal to 1e-17; beyond, 1 - 2/(e^2|x| + 1) loses less
+than a bit to cancellation."""
+U = (-0.3333333333333333, -0.02049522886753235, -0.00019901990913769401)
+V = (1.0, 0.46148568660258626, 0.023286572463946293, 0.00020636437984939814)
+"""Of the rational function that interpolates (tanh x / x - 1) / x^2 at Chebyshev nodes in x^2."""
+
+LARGE = 300
+"""Functions with more instructions stay as they are: tanh is little of them, and reading them takes
+time."""
+
+
+def tanh(x: ca.SX) -> ca.SX:
+    """Tanh x to 3.5e-16, relative; odd, NaN for NaN; the same operations for all x.
+
+    It has derivatives, right but long: those are better taken of tanh itself, before.
+    """
+    size = ca.fabs(x)
+    square = x * x
+    near = x + x * square * (_polynomial(U, square) / _polynomial(V, square))
+    far = ca.copysign(1 - 2 / (ca.exp(2 * size) + 1), x)
+    return ca.if_else(size < MIDDLE, near, far)
+
+
+def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
+    value = ca.SX(coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        value = value * x + coefficient
+    return value
+
+
+def branchless(function: ca.Function, most: int = LARGE) -> ca.Function:
+    """The SX `function` with every tanh written out; itself where it has none, or is large.
+
+    Args:
+        function: of columns, or matrices.
+        most: instructions that it may have.
+    """
+    count = function.n_instructions()
+    if count > most or ca.OP_TANH not in map(function.instruction_id, range(count)):
+        return function
+
+    def rule(k: int, operands: list[ca.SX]) -> ca.SX | None:
+        return tanh(operands[0]) if function.instruction_id(k) == ca.OP_TANH else None
+
+    arguments = function.sx_in()
+    results = rewritten(function, arguments, rule)
+    return ca.Function(function.name(), arguments, results, function.name_in(), function.name_out())
+
+
+def divided_once(expression: ca.SX) -> ca.SX:
+    """`expression` with divisors that are constant, or divide several times, inverted once."""
+    arguments = ca.symvar(expression)
+    function = ca.Function("f", arguments, [expression])
+    count = function.n_instructions()
+    operations = [function.instruction_id(k) for k in range(count)]
+    if ca.OP_DIV not in operations:
+        return expression
+    operands = [function.instruction_input(k) for k in range(count)]
+    places = [function.instruction_output(k) for k in range(count)]
+    divisors = _divisors(operations, operands, places)
+    often = Counter(divisors.values())
+    inverse: dict[int, ca.SX] = {}
+
+    def rule(k: int, operands: list[ca.SX]) -> ca.SX | None:
+        if k not in divisors:
+            return None
+        divisor = divisors[k]
+        if often[divisor] == 1 and operations[divisor] != ca.OP_CONST:
+            return None
+        if divisor not in inverse:
+            inverse[divisor] = reciprocal(operands[1])
+        return operands[0] * inverse[divisor]
+
+    return rewritten(function, arguments, rule)[0]
+
+
+def _divisors(
+    operations: list[int], operands: list[list[int]], places: list[list[int]]
+) -> dict[int, int]:
+    """Number of each division -> number of the instruction that made its divisor."""
+    made: dict[int, int] = {}
+    found: dict[int, int] = {}
+    for k, operation in enumerate(operations):
+        if operation == ca.OP_DIV:
+            found[k] = made[operands[k][1]]
+        if operation != ca.OP_OUTPUT:
+            made[places[k][0]] = k
+    return found
+
+
+Array = NDArray[np.float64]
+MOST_NUMBERS = 1000
+"""Expressions with more numbers are tables, and stay as they are."""
+
+
+def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Array]:
+    """A scalar expression with symbols for its numbers, these symbols, and the numbers.
+
+    Evaluated there it gives the same bits: the operations are the same, in the same order.
+
+    Args:
+        expression: in the symbols `known`.
+        known: column of symbols.
+        name: how the new symbols begin.
+    """
+    as_it_is = expression, ca.SX(0, 1), np.zeros(0)
+    function = ca.Function("lift", [known], [expression])
+    numbers, symbols = list[float](), list[ca.SX]()
+    work: dict[int, ca.SX | float] = {}
+
+    def number(value: float) -> ca.SX:
+        numbers.append(value)
+        symbols.append(ca.SX.sym(f"{name}_c{len(symbols)}"))
+        return symbols[-1]
+
+    def read(place: int) -> ca.SX:
+        value = work[place]
+        return number(value) if isinstance(value, float) and isfinite(value) else ca.SX(value)
+
+    made = ca.SX(expression)
+    for k in range(function.n_instructions()):
+        op = function.instruction_id(k)
+        places, to = function.instruction_input(k), function.instruction_output(k)
+        if op == ca.OP_OUTPUT:
+            made = read(places[0])
+        elif op == ca.OP_INPUT:
+            work[to[0]] = ca.SX(known[places[1]])
+        elif op == ca.OP_CONST:
+            work[to[0]] = float(function.instruction_constant(k))
+        elif op == ca.OP_CONSTPOW:
+            work[to[0]] = _applied(op, read(places[0]), ca.SX(work[places[1]]))
+        elif op == ca.OP_TWICE:  # what CasADi makes of 2 x
+            two, other = number(2.0), read(places[0])
+            work[to[0]] = two * other
+        elif len(places) in (1, 2) and len(to) == 1:
+            work[to[0]] = _applied(op, *(read(place) for place in places))
+        else:
+            return as_it_is
+    if len(numbers) > MOST_NUMBERS:
+        return as_it_is
+    return made, ca.vertcat(ca.SX(0, 1), *symbols), np.array(numbers)
+
+
+def _applied(op: int, *arguments: ca.SX) -> ca.SX:
+    """One operation of CasADi's."""
+    SX = cast(Any, ca.SX)
+    return ca.SX(SX.unary(op, *arguments) if len(arguments) == 1 else SX.binary(op, *arguments))
+
+
+DEPTH = 13
+"""The grid has 2^13 intervals; what is shorter than one of them may stay unseen."""
+
+STRAIGHT = 1e-3
+"""How far a straight piece may be off, relative to the range of the function."""
+
+LEVELS = 3
+"""Halvings between neighbours that are a change of pace: error control sees to less."""
+
+
+PULSE = 10.0
+"""Height of a pulse within a jump, over that of the jump."""
+BRIEF = 16
+"""Intervals of the grid that stages of one step may lie on both sides of."""
+MOST_JUMPS = 64
+"""A function with more jumps than this is looked at on the grid only."""
+HALVINGS = 60
+"""Halvings of an interval of the grid, down to rounding."""
+
+QUICKEST = 1.0
+"""Percent of the span that set the pace of a function: more than what a few jumps take."""
+
+
+def onsets(function: str, t_start: float, t_end: float) -> tuple[float, ...]:
+    """Times [s] inside the span at which a function of time, a serialised SX, changes its pace.
+
+    A jump between two times of the grid may hide a pulse, as the rate of a ramp of a picosecond
+    does: the middle of such a pulse is one of the times.
+    """
+    look = _looked(function, t_start, t_end)
+    if look is None:
+        return ()
+    grid = np.linspace(t_start, t_end, 2**DEPTH + 1)
+    return tuple(sorted((*grid[changes(look.level)].tolist(), *look.pulses)))
+
+
+def pace(function: str, t_start: float, t_end: float) -> float:
+    """Length [s] of the straight pieces of a function of time where it is quickest.
+
+    A fiftieth to a hundredth of the period of a sine; inf for a straight line.
+    """
+    look = _looked(function, t_start, t_end)
+    halvings = 0.0
+    if look is not None:
+        halvings = float(np.percentile(look.level, 100 - QUICKEST, method="lower"))
+    return (t_end - t_start) / 2.0**halvings if halvings else np.inf
+
+
+class _Look(NamedTuple):
+    """A function of time on the grid: `levels`, and the times [s] of short pulses."""
+
+    level: NDArray[np.intp]
+    pulses: tuple[float, ...]
+
+
+@lru_cache(64)
+def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
+    """The look at a function of time; None for a constant."""
+    expression = ca.SX.deserialize(function)
+    time = ca.symvar(expression)
+    if not time:
+        return None
+    grid = np.linspace(t_start, t_end, 2**DEPTH + 1)
+    columns = Columns(ca.Function("input", time, [ca.densify(expression)]))
+
+    def values_at(times: Array) -> Array:
+        (found,) = columns([times[:, None]])
+        return np.nan_to_num(found[:, 0])
+
+    values = values_at(grid)
+    level = levels(values)
+    peaks = (*grid[_peaks(level, values)].tolist(), *pulses(values_at, grid, values))
+    return _Look(level, peaks)
+
+
+def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> tuple[float, ...]:
+    """Times [s] in the middle of pulses within jumps of a function that has `values` on `grid`.
+
+    The start and the end of a jump are found by bisection. It hides a pulse if the function is
+    `PULSE` times as far away in the middle as the jump is high.
+    """
+    jumps = np.flatnonzero(np.abs(np.diff(values)) > STRAIGHT * np.ptp(values))
+    if not 0 < jumps.size <= MOST_JUMPS:
+        return ()
+    before, after = values[jumps], values[jumps + 1]
+    near = STRAIGHT * np.abs(after - before)
+    edges: list[Array] = []
+    for side, (known, unlike) in enumerate(((before, jumps), (after, jumps + 1))):
+        same, other = grid[unlike].copy(), grid[jumps + 1 - side].copy()
+        for _ in range(HALVINGS):
+            middle = (same + other) / 2
+            alike = np.abs(values_at(middle) - known) <= near
+            same, other = np.where(alike, middle, same), np.where(alike, other, middle)
+        edges.append(other)
+    middle = (edges[0] + edges[1]) / 2
+    high = np.abs(values_at(middle) - before) > PULSE * np.abs(after - before)
+    return tuple(middle[high].tolist())
+
+
+def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
+    """Grid points at the peaks of pulses of up to `BRIEF` intervals, which stages may miss."""
+    deepest = np.flatnonzero(level == DEPTH)
+    found: list[int] = []
+    for run in np.split(deepest, np.flatnonzero(np.diff(deepest) > 1) + 1):
+        if 1 < run.size <= BRIEF:
+            a, b = int(run[0]), int(run[-1]) + 1
+            height = np.abs(values[a : b + 1] - values[a])
+            if height.max() > PULSE * height[-1]:
+                found.append(a + int(height.argmax()))
+    return found
+
+
+def levels(values: Array) -> NDArray[np.intp]:
+    """How often each interval of a grid of 2^k + 1 values is halved until its piece is straight."""
+    cells = values.size - 1
+    depth = cells.bit_length() - 1
+    allowed = STRAIGHT * np.ptp(values)
+    found = np.full(cells, depth)
+    for level in range(depth - 1, -1, -1):
+        width = cells >> level
+        ends = values[::width]
+        line = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(width) / width)
+        straight = (np.abs(values[:-1].reshape(-1, width) - line) <= allowed).all(axis=1)
+        found.reshape(-1, width)[straight] = level
+    return found
+
+
+def changes(level: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Grid points at which the level has changed by `LEVELS` since the last such point."""
+    found: list[int] = []
+    last = level[0]
+    for i in np.flatnonzero(np.diff(level)) + 1:
+        if abs(level[i] - last) >= LEVELS:
+            found.append(int(i))
+            last = level[i]
+    return np.array(found, dtype=np.intp)
