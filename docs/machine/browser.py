@@ -2,8 +2,8 @@
 
 Each page is shown narrow, on a tablet, wide, dark and in print, and refused for what `look.js`
 finds (wider than the screen, cut, unreadable, without a text for those who do not see it), for an
-error on its console and for anything it asks of the network. The search must find something. `--shots
-FOLDER` keeps a picture of each page in each of these; names behind it choose pages.
+error on its console and for anything it asks of the network. The search must find something.
+`--shots FOLDER` keeps a picture of each page in each of these; names behind it choose pages.
 """
 
 import base64
