@@ -24,7 +24,7 @@ from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
 STAGE = Path("..", "shared", "data", "EMPS")
-"""Where the measured stage is looked for: the EMPS benchmark beside the working folder."""
+"""Where the measured stage is looked for: the EMPS benchmark next to the working folder."""
 
 RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
 """Record to identify from and record to validate on."""

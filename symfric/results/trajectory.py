@@ -155,7 +155,7 @@ class Trajectory(Signals):
         express: an expression of the model at any times, shape (rows, n).
         model: the model that was simulated.
         happened: (time [s], name) of every event.
-        differentiate: derivatives of all signals at any times, where they were asked for.
+        differentiate: derivatives of all signals at any times, where they were requested.
         delays: derivatives of the times of `happened`, likewise.
         pull_back: gradient of a weighted sum of signals at `t`, likewise.
         keep: what a file and a pickle hold of it.
