@@ -15,17 +15,15 @@ from ocp.formulation.phase import (
     Span,
 )
 from ocp.formulation.problem import Problem
-from ocp.friction.arc_models import CAUGHT, FIRST, PULLED, STOPPED, breaks_away
 from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.mode_models import SIDES
 from ocp.friction.sequence import Leg, flat, placed, shown, tracks_of
-from ocp.friction.transfer import Known, points_in
-from ocp.result.motion import Motion, motion_of
-from ocp.result.solution import Mode, Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics
-from ocp.solvers.prepared import Option
-from ocp.solving.one_solve import Clock
+from ocp.friction.transfer import CAUGHT, FIRST, PULLED, STOPPED, Known, breaks_away, points_in
+from ocp.solving.methods import Ipopt
+from ocp.solving.motion import Motion, motion_of
+from ocp.solving.outcome import Iterate, Outcome, Report, SolverStatistics
+from ocp.solving.prepared import Clock, Option
+from ocp.solving.solution import Mode, Solution
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.solvers.outcome import Progress, Report, outside, worst_of
+from ocp.solving.outcome import Progress, Report, outside, worst_of
 from ocp.transcription.program import Place, Program
 from symfric.foundation.status import Status
 
