@@ -39,7 +39,7 @@ from symfric.foundation import checks
 from symfric.foundation.shown import Shown, Table
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
-from symfric.laws.cost import cost
+from symfric.laws.composed.populations import cost
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

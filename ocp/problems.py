@@ -22,7 +22,7 @@ from symfric.laws import BrownMcPhee
 from symfric.model import Model, Output
 from symfric.model.contact import Contact
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, Revolute
-from symfric.scenes.drive import drive
+from symfric.scenes.blocks import drive
 
 
 @final

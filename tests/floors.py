@@ -9,12 +9,6 @@ FLOORS: dict[str, set[str]] = {
     "symfric.laws": {"symfric.foundation"},
     "symfric.model": {"symfric.foundation"},
     "symfric.multibody": {"symfric.foundation", "symfric.laws", "symfric.model"},
-    "symfric.multibody.urdf": {
-        "symfric.foundation",
-        "symfric.laws",
-        "symfric.model",
-        "symfric.multibody",
-    },
     "symfric.scenes": {
         "symfric.foundation",
         "symfric.laws",
@@ -78,12 +72,6 @@ FLOORS: dict[str, set[str]] = {
         "symfric.integrator.methods",
         "symfric.integrator.running",
         "symfric.integrator.step",
-    },
-    "symfric.integrator.peers": {
-        "symfric.foundation",
-        "symfric.model",
-        "symfric.integrator.equations",
-        "symfric.integrator.running",
     },
     "symfric.integrator": {"symfric.foundation", "symfric.model", "symfric.results"},
     "symfric.figures": {

@@ -17,7 +17,7 @@ from symfric.foundation.brief import brief
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
 from symfric.laws import Law
-from symfric.laws.steady import steady_force
+from symfric.laws.composed.populations import steady_force
 from symfric.scenes import Drive
 
 

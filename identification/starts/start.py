@@ -21,7 +21,7 @@ from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
-from symfric.scenes.drive import Drive
+from symfric.scenes.blocks import Drive
 
 Array = NDArray[np.float64]
 

@@ -44,7 +44,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Output
-from symfric.multibody.mass import null_direction
+from symfric.multibody.applied import null_direction
 
 MINORS = 8
 """Coordinates of a loop at most; its tangent is made of their minors."""

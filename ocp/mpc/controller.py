@@ -18,7 +18,10 @@ from ocp.mpc.horizon import Horizon, horizon_of
 from ocp.mpc.session import BACKENDS, Session
 from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
-from symfric.codegen.compiler import compile_object, needed_symbols
+from symfric.codegen.runner import (
+    compile_object,
+    needed_symbols,
+)
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler

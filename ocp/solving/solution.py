@@ -21,8 +21,7 @@ from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
 from symfric.foundation.status import Status
-from symfric.results import tables
-from symfric.results.stored import Format
+from symfric.results.stored import Format, module
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -304,7 +303,7 @@ class Solution:
         Raises:
             ImportError: no pandas.
         """
-        pandas = tables.module("to_dataframe", "pandas")
+        pandas = module("to_dataframe", "pandas")
         parts = {m.name: pandas.DataFrame({"t": m.t, **m.signals}) for m in self.motions}
         frame = pandas.concat(parts, names=["scenario"]).droplevel(1).set_index("t", append=True)
         frame = frame if len(parts) > 1 else frame.droplevel("scenario")

@@ -18,9 +18,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.timing import FASTEST, compile_time
+from symfric.bench.table import FASTEST, compile_time
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.arguments import chosen
+from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import (
     consistent,
@@ -30,10 +31,9 @@ from symfric.integrator.equations.initial import (
 )
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.peers.casadi_integrators import peer
+from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.outputs import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State

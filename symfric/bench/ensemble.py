@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symfric.bench import table
 from symfric.bench.contenders import Solve, casadi
-from symfric.bench.timing import best_time, interleaved
+from symfric.bench.table import best_time, interleaved
 from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda import on_device
 from symfric.integrator.cuda.device import DeviceError
@@ -21,8 +21,8 @@ from symfric.integrator.equations.initial import first_guess, first_step, smalle
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.program import program
 from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.running.built import built
 from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.integrator import built
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
 from symfric.laws import BrownMcPhee, Law, LuGre
@@ -230,11 +230,16 @@ def _one_by_one(
 
     def run() -> tuple[Array, Array]:
         now, attempts = S.copy(), np.zeros(members)
+        work = integrator.borrow()
+        work.over(np.array([0.0, end]), np.zeros((0, 1)))
+        work.loop.h_min = smallest_step(end)
         for m in range(members):
-            stop = Stop.FULL
+            work.S[:], work.R[:], stop = S[m], R[m], Stop.FULL
             while stop is Stop.FULL:
-                _, made, stop = engine.run(now[m], R[m], 64, MOST, smallest_step(end))
+                _, made, stop = engine.march(work, MOST)
                 attempts[m] += made
+            now[m] = work.S
+        integrator.give_back(work)
         return now, attempts
 
     return run

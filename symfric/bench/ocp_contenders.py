@@ -34,7 +34,7 @@ DEGREE = 3
 @final
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """What a solver found.
+    """The solution of a solver.
 
     Attributes:
         cost: J as the solver says.
@@ -243,7 +243,7 @@ def _meet(o: ca.Opti, span: Span, s: float, x: ca.MX) -> None:
 
 
 def has_rockit() -> bool:
-    """Whether rockit is installed."""
+    """True if rockit is installed."""
     return find_spec("rockit") is not None
 
 

@@ -19,11 +19,11 @@ from ocp.problems import cart_pendulum, guide
 from ocp.solving.methods import Ipopt
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
-from symfric.bench.timing import interleaved
+from symfric.bench.table import interleaved
 from symfric.foundation.compiler import find_compiler
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Model
-from symfric.scenes.drive import drive
+from symfric.scenes.blocks import drive
 
 INTERVALS = (50, 200, 1000, 5000)
 

@@ -24,7 +24,7 @@ from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
 STAGE = Path("..", "shared", "data", "EMPS")
-"""Where the measured stage is looked for: the EMPS benchmark beside the working folder."""
+"""Where the measured stage is looked for: the EMPS benchmark next to the working folder."""
 
 RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
 """Record to identify from and record to validate on."""
@@ -35,7 +35,7 @@ DISTANCE, LIMIT = 0.05, 200.0
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one part of the demo left behind."""
+    """Files and numbers of one part of the demo."""
 
     title: str
     says: str

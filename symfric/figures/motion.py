@@ -18,7 +18,7 @@ from symfric.integrator.equations.inputs import Input
 from symfric.laws import AnyLaw, Law, Population, law_name
 from symfric.model import Event, Model, Output
 from symfric.scenes.base import contact
-from symfric.scenes.drive import Drive
+from symfric.scenes.blocks import Drive
 
 REST = 1e6
 """Time of rest before a motion [s], so that all contacts are old."""

@@ -30,8 +30,8 @@ from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.loop import search_source
 from symfric.integrator.running.run import PACES
-from symfric.integrator.running.search import search_source
 from symfric.integrator.step.attempt import build_fixed
 from symfric.integrator.step.layout import GROWTH_MEMORY
 from symfric.integrator.step.pieces import all_macros, routine

@@ -1,15 +1,38 @@
-"""Simulate a model with an integrator of others, as a second opinion."""
+"""Simulate a model with an integrator of others, as a second opinion.
+
+The stabilised form of a mechanism has positions and velocities on the constraints:
+
+    q' = q_rate + phi_q' eta,   M a + phi_q' lam = Q,   phi(q) = 0,   phi_q q_rate = 0
+
+The accelerations a, the multipliers lam and eta and the normal forces are algebraic unknowns; eta
+is zero along the exact solution. The form of index 1 holds phi_q a + gamma = 0 alone, so that
+constraints drift away under it.
+
+Limits: of index 2, so the methods of this package, which take index 1, do not apply.
+Source: Gear, Leimkuhler, Gupta, J. Comput. Appl. Math. 12-13, 1985.
+
+CasADi's own implicit integrators as a second opinion: rosenbrock, SUNDIALS' cvodes and idas.
+
+Mechanisms are integrated in the form of index 1, whose constraints drift, or with idas in the
+stabilised form of index 2 ("ggl"). Nothing is projected: the norms of the
+constraints among the results show what each of them makes of it.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from re import sub
 from time import perf_counter
+from typing import Any, final
 
-from numpy.typing import ArrayLike
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.status import SolveError
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import (
     check_flags,
     check_model,
@@ -18,15 +41,241 @@ from symfric.integrator.arguments import (
     result_times,
     tolerances,
 )
-from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Input, input_data
-from symfric.integrator.outcome import trajectory_of
-from symfric.integrator.peers.casadi_integrators import PEERS, integrate_by_peer
-from symfric.integrator.running.built import built
+from symfric.integrator.equations.initial import consistent, first_guess, first_step
+from symfric.integrator.equations.inputs import Input, InputData, input_data
+from symfric.integrator.equations.system import System
+from symfric.integrator.running.dense import Dense, Outputs, hermite
 from symfric.integrator.running.doubts import doubts
+from symfric.integrator.running.integrator import built
+from symfric.integrator.running.record import Run
+from symfric.integrator.running.run import Tolerances
+from symfric.integrator.stored import trajectory_of
 from symfric.model import Model
 from symfric.results.statistics import Statistics
 from symfric.results.trajectory import Trajectory
+
+
+def stabilised(system: System) -> System:
+    """`system` with multipliers eta as last unknowns and the constraints on two levels.
+
+    Raises:
+        ValueError: it is no mechanism.
+    """
+    manifold = system.manifold
+    if manifold is None:
+        raise ValueError(
+            "simulate_by_peer: expected rosenbrock or sundials for a model that is no mechanism, "
+            "got ggl"
+        )
+    n, m = manifold.n, manifold.m
+    eta = ca.SX.sym("eta", m)
+    both = ca.densify(manifold.defect(system.y, system.d))
+    phi, phi_dot = both[:m], both[m:]
+    f = ca.SX(system.f)
+    f[:n] += ca.jacobian(phi, system.y[:n]).T @ eta
+    f[list(system.pivots[1])] = phi
+    return replace(
+        system,
+        y=ca.vertcat(system.y, eta),
+        f=ca.vertcat(f, phi_dot),
+        mass=ca.diagcat(system.mass, ca.SX(m, m)),
+        timed=False,
+        names=(*system.names, *(f"{system.names[i]}_eta" for i in system.pivots[1])),
+    )
+
+
+Array = NDArray[np.float64]
+PEERS = ("sundials", "rosenbrock", "ggl")
+CHUNKS = 32
+COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
+STEPS_PER_INTERVAL = 100_000
+"""SUNDIALS would otherwise spend minutes in front of a singularity."""
+HINTS = {
+    1: "look for a discontinuity or a NaN there, or loosen rtol",
+    2: "its corrector seldom converges below rtol = 1e-8 in this form of index 2, loosen rtol; "
+    "or look for a discontinuity there",
+}
+"""What to try when CasADi's integrator stops, by the index of the equations."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Peer:
+    """A system for `casadi.integrator`, its differential states scaled by nominal values."""
+
+    system: System
+    inputs: InputData
+    p: Array
+    plugin: str
+    dae: dict[str, ca.SX]
+    options: dict[str, Any]
+    index: int = 1
+
+    def over(self, grid: Array, y: Array | None = None) -> tuple[ca.Function, Array]:
+        """Integrator from grid[0] over grid[1:], and the input data for it.
+
+        Args:
+            grid: times [s].
+            y: consistent unknowns at the first of them; index 2 needs them.
+        """
+        first = self.inputs.interval((grid[:-1] + grid[1:]) / 2)
+        extra: dict[str, Any] = {}
+        if self.plugin == "rosenbrock":
+            first, counts = np.unique(first, return_counts=True)
+            extra["control_group_size"] = counts.tolist()
+        if self.index == 2 and y is not None:
+            extra = self._begin(grid, y, self.inputs.values[:, first[0]])
+        solver = ca.integrator(
+            "solver",
+            self.plugin,
+            self.dae,
+            float(grid[0]),
+            grid[1:].tolist(),
+            {**self.options, **extra},
+        )
+        return solver, self.inputs.values[:, first]
+
+    def _begin(self, grid: Array, y: Array, data: Array) -> dict[str, Any]:
+        """A start that spares idas a search for consistent values, which index 2 makes singular."""
+        rates, nominal = rates_of(self.system)
+        f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+        slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
+        # its own guess of a first step is so long that tight tolerances are never met
+        return {
+            "init_xdot": slope.tolist(),
+            "step0": first_step(float(grid[-1] - grid[0])),
+        }
+
+
+def rates_of(system: System) -> tuple[list[int], Array]:
+    """Which unknowns are differential states, and their nominal values."""
+    still = {*system.algebraic[1], *(system.manifold.basis if system.manifold else ())}
+    rates = [i for i in range(system.n) if i not in still]
+    nominal = np.ones(system.n)
+    nominal[: system.nx] = system.nominal
+    return rates, nominal[rates]
+
+
+def peer(system: System, inputs: InputData, p: Array, tolerances: Tolerances, name: str) -> Peer:
+    """Semi-explicit DAE of `system` for CasADi, with time as its own variable.
+
+    Args:
+        system, inputs, p, tolerances: what is integrated, and how well.
+        name: "sundials" (cvodes, or idas where there are algebraic unknowns), "rosenbrock" or
+            "ggl", which is idas on the stabilised form of index 2.
+
+    Raises:
+        ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for
+            what is no mechanism.
+    """
+    if name == "ggl":
+        system = stabilised(system)
+    rows, columns = system.algebraic
+    rates, nominal = rates_of(system)
+    mass = ca.DM(system.mass)[rates, rates]
+    if rows != columns or mass.nnz() != len(rates):
+        raise ValueError(
+            "simulate_by_peer: expected a diagonal mass matrix, got coupled rates; use simulate"
+        )
+    scale = ca.DM(nominal)
+    scaled = ca.SX.sym("x", len(rates))
+    f = ca.substitute(system.f, system.y[rates], scale * scaled)
+    n_p = p.size
+    plugin = "rosenbrock" if name == "rosenbrock" else ("idas" if columns else "cvodes")
+    options: dict[str, Any] = {
+        "reltol": tolerances.rtol,
+        "abstol": float(np.min(tolerances.atol / system.nominal)),
+        "max_num_steps": min(tolerances.max_steps, STEPS_PER_INTERVAL),
+    }
+    if plugin != "rosenbrock":
+        # without it SUNDIALS adjoints of several parameters are silently wrong (casadi#4383)
+        options["quad_err_con"] = True
+    if name == "ggl":
+        # multipliers of index 2 carry an error / h, which no step size brings below a tolerance
+        options |= {"suppress_algebraic": True, "calc_ic": False}
+    ode = f[rates] / (scale * ca.diag(mass))
+    dae = {
+        "x": scaled,
+        "z": system.y[columns],
+        "p": system.d[:n_p],
+        "u": system.d[n_p:],
+        "ode": ca.densify(ode),
+        "alg": f[rows],
+    }
+    return Peer(system, inputs, p, plugin, dae, options, 2 if name == "ggl" else 1)
+
+
+def integrate_by_peer(
+    system: System,
+    inputs: InputData,
+    y0: Array,
+    p: Array,
+    times: Array,
+    tolerances: Tolerances,
+    name: str,
+) -> tuple[Run, dict[str, int]]:
+    """Integrate with CasADi over `times`; a failure keeps what came before it."""
+    problem = peer(system, inputs, p, tolerances, name)
+    (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
+    y = consistent(system, "simulate_by_peer", y0, np.concatenate([p, inputs.values[:, 0]]))
+    y = np.concatenate([y, np.zeros(problem.system.n - system.n)])
+    grid = np.unique(np.concatenate([inputs.breaks, times]))
+    outputs = Outputs.at(times, system.n)
+    run = Run(float(grid[0]), y[: system.n], outputs, engine=f"casadi {problem.plugin}")
+    found, counts = y[:, None], dict.fromkeys(COUNTS, 0)
+    pieces = [np.arange(1, grid.size)]
+    while pieces:
+        piece = pieces.pop(0)
+        solver, data = problem.over(grid[[piece[0] - 1, *piece]], found[:, -1])
+        try:
+            result = solver(x0=found[rates, -1] / nominal, z0=found[columns, -1], p=p, u=data)
+        except RuntimeError as error:
+            if piece.size == grid.size - 1 > 1:
+                # again in pieces, so that everything before the failure is kept
+                pieces = np.array_split(piece, min(CHUNKS, piece.size))
+                continue
+            last = [line for line in str(error).splitlines() if line.strip()][-1]
+            last = sub(r"^.*\.cpp:\d+: |\. Consult .*$", "", last.strip())
+            run.stop(
+                Status.SOLVER_FAILED,
+                f"simulate_by_peer: {problem.plugin} stopped after "
+                f"t = {grid[piece[0] - 1]:g} s ({last}); {HINTS[problem.index]}",
+            )
+            break
+        part = np.zeros((problem.system.n, piece.size))
+        part[rates] = result["xf"].full() * nominal[:, None]
+        part[columns] = result["zf"].full()
+        found = np.hstack([found, part])
+        for name, value in _counts(solver).items():
+            counts[name] += value
+    dense = _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n])
+    run.keep(dense)
+    outputs.fill(dense, last=True)
+    return run, counts
+
+
+def _counts(solver: ca.Function) -> dict[str, int]:
+    stats = solver.stats()
+    jacobians = int(stats.get("n_jac", stats.get("nlinsetups", 0)))
+    return {
+        "steps": int(stats.get("n_steps", stats.get("nsteps", 0))),
+        "rejections": int(stats.get("n_reject", stats.get("netfails", 0))),
+        "evaluations": int(stats.get("n_rhs", stats.get("nfevals", 0))),
+        "jacobians": jacobians,
+        "factorisations": jacobians,
+    }
+
+
+def _dense(system: System, inputs: InputData, p: Array, grid: Array, y: Array) -> Dense:
+    """Cubic interpolation of the rates' columns on the grid, linear of the algebraic ones."""
+    if grid.size < 2:
+        return Dense(grid, np.nextafter(grid, np.inf), y.T, y.T, np.zeros((1, 2, system.n)))
+    d = np.vstack([np.tile(p[:, None], (1, grid.size)), inputs.values[:, inputs.interval(grid)]])
+    f = ca.Function("f", [system.y, system.d], [system.f])
+    slope = f.map(grid.size)(y, d).full()
+    columns = system.algebraic[1]
+    slope[columns] = np.gradient(y[columns], grid, axis=1) if columns else slope[columns]
+    return hermite(grid, y, slope)
 
 
 def simulate_by_peer(
@@ -55,7 +304,7 @@ def simulate_by_peer(
         t_end: last time [s].
         peer: "sundials" is cvodes, or idas where there are algebraic variables; "rosenbrock" is
             CasADi's Rosenbrock 5(4); "ggl" is idas with the constraints of a mechanism on positions
-            and velocities (`symfric.integrator.peers.ggl`).
+            and velocities (`stabilised`).
         t_start, x0, u, p, rtol, atol, t_eval, samples, max_steps, throw: as in `simulate`.
 
     Returns:

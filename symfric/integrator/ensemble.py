@@ -28,15 +28,32 @@ from symfric.integrator.arguments import (
     tolerances,
 )
 from symfric.integrator.equations.initial import first_steps
-from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
-from symfric.integrator.many.given import MemberInput, Members, members_of
-from symfric.integrator.many.one_by_one import Recipe, solve_elsewhere, solve_one_by_one, suited
+from symfric.integrator.many.chunk import (
+    EXECUTORS,
+    Chunk,
+    Job,
+    Recipe,
+    Solved,
+    digest,
+    pool_of,
+    solve_chunk,
+    solve_elsewhere,
+    solve_one_by_one,
+    solved,
+    suited,
+)
+from symfric.integrator.many.given import (
+    MemberInput,
+    Members,
+    all_later,
+    ends_of,
+    members_of,
+    units_of,
+)
 from symfric.integrator.many.store import Store
-from symfric.integrator.many.workers import EXECUTORS, pool_of, solved
 from symfric.integrator.methods.tableaux import key_of
-from symfric.integrator.running.built import built
 from symfric.integrator.running.doubts import of_members
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
 from symfric.model import Model
@@ -131,9 +148,9 @@ def simulate_many(
     """
     check_model("simulate_many", model)
     check_flags("simulate_many", progress)
-    ends = _ends(t_end)
+    ends = ends_of(t_end)
     t_start, last, rtol = check_span("simulate_many", model, t_start, float(np.max(ends)), rtol)
-    _all_later(ends, t_start)
+    all_later(ends, t_start)
     formula = chosen("simulate_many", method, rtol)
     _check(model, backend, executor, real)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
@@ -185,7 +202,7 @@ def _ensemble(
     model: Model, looks: Array, given: Members, store: Store, ended: BaseException | None
 ) -> Ensemble:
     """The result, of as many members as there are."""
-    units = {n: unit for n, unit in _units(model).items() if n in (given.varied | given.fixed)}
+    units = {n: unit for n, unit in units_of(model).items() if n in (given.varied | given.fixed)}
     reach = {
         v.name: in_results(v.kind, ends)
         for v, ends in zip(model.x, store.reach.transpose(2, 1, 0), strict=True)
@@ -230,14 +247,6 @@ def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
     return SolveError(said, found.status, found)
 
 
-def _units(model: Model) -> dict[str, str]:
-    """Units of what may be given."""
-    found = {v.name: v.unit for v in model.p} | {"t_end": "s"}
-    for what, group in (("x0", model.x), ("u", model.u)):
-        found |= {f"{what}.{v.name}": v.unit for v in group}
-    return found
-
-
 def _size(pick: slice) -> int:
     return pick.stop - pick.start
 
@@ -255,26 +264,6 @@ def _check(model: Model, backend: str, executor: object, real: str) -> None:
         raise checks.refused("simulate_many: executor", what, executor)
     if isinstance(executor, str):
         checks.choice("simulate_many: executor", executor, EXECUTORS)
-
-
-def _ends(t_end: float | ArrayLike) -> float | Array:
-    """The end of all members, or of each one [s]."""
-    number = checks.as_number(t_end)
-    if number is not None or isinstance(t_end, str | type):
-        return checks.number("simulate_many: t_end", t_end, unit="s")
-    what = "a number of seconds, or a sequence with that of each member"
-    ends = checks.array("simulate_many: t_end", t_end, what=what)
-    if not ends.size:
-        raise ValueError("simulate_many: expected at least one member, got empty arrays")
-    return ends
-
-
-def _all_later(ends: float | Array, t_start: float) -> None:
-    if np.min(ends) <= t_start:
-        raise ValueError(
-            f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
-            f"member {np.argmin(ends)}"
-        )
 
 
 def _points(integrator: Integrator, given: Members) -> tuple[tuple[Array, Array], ...]:

@@ -1,45 +1,190 @@
-"""Simulate a model: one call for every method and engine."""
+"""Simulate a model: one call for every method and engine.
+
+Loops over parameters call with the same settings again and again, and a short run takes less time
+than the checks of its arguments.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.memory import remember
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
     another,
     check_flags,
     check_model,
+    check_span,
     check_times,
+    chosen,
+    result_times,
     stopping,
+    tolerances,
+    warn_of_loose,
 )
-from symfric.integrator.derivatives.seeds import seeds
-from symfric.integrator.differentiated import Differentiated
+from symfric.integrator.derivatives.path import seeds
+from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Input, InputData, input_data, paced
-from symfric.integrator.measured import difference, differences_of_derivatives
+from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import FOR_DERIVATIVES
-from symfric.integrator.outcome import trajectory_of
-from symfric.integrator.running.built import built
 from symfric.integrator.running.doubts import doubts
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.record import Run
-from symfric.integrator.running.run import Tolerances, integrate
-from symfric.integrator.settings import settings
-from symfric.integrator.stored import Basis, Stored
+from symfric.integrator.running.run import Tolerances, integrate, own_scale
+from symfric.integrator.stored import Basis, Stored, trajectory_of
 from symfric.model import Model
 from symfric.results.statistics import Statistics
 from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+PLAIN: frozenset[type] = frozenset((float, int, bool, str, type(None)))
+REMEMBERED, MOST_TIMES = 16, 10_000
+"""Settings kept per model, the oldest goes first; and how many times of results one may have."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """Checked settings of a model.
+
+    Attributes:
+        t_start, t_end: span [s].
+        formula: the method.
+        allowed: tolerances; its `atol` is that of the model's states.
+        times: of the result [s]; not to be handed out, others share them.
+    """
+
+    t_start: float
+    t_end: float
+    formula: Method
+    allowed: Tolerances
+    times: Array
+
+
+def settings(
+    model: Model,
+    t_start: float,
+    t_end: float,
+    rtol: float,
+    atol: float | None,
+    samples: int,
+    method: str,
+    event_tolerance: float,
+    max_steps: int | None,
+    max_step: float | None,
+) -> Settings:
+    """Check how `simulate` is to run; arguments as there.
+
+    Raises:
+        ValueError: bad input.
+
+    Warns:
+        UserWarning: a loose tolerance.
+    """
+    asked = (
+        t_start, t_end, rtol, atol, samples, method, event_tolerance, max_steps, max_step
+    )  # fmt: skip
+    known: dict[Hashable, Settings] = model.memory.setdefault("settings", {})
+    # 1.0 and True are equal, and only one of them is a time
+    key = (*asked, *map(type, asked))
+    if not PLAIN.issuperset(key[len(asked) :]):
+        return _checked(model, *asked)  # arrays and expressions of a number are numbers, no keys
+    found = known.get(key)
+    if found is not None:
+        warn_of_loose("simulate", found.allowed.rtol, stacklevel=4)
+        return found
+    found = _checked(model, *asked)
+    if found.times.size <= MOST_TIMES:
+        remember(known, key, found, REMEMBERED)
+    return found
+
+
+def _checked(
+    model: Model,
+    t_start: float,
+    t_end: float,
+    rtol: float,
+    atol: float | None,
+    samples: int,
+    method: str,
+    event_tolerance: float,
+    max_steps: int | None,
+    max_step: float | None,
+) -> Settings:
+    t_start, t_end, rtol = check_span("simulate", model, t_start, t_end, rtol, stacklevel=6)
+    formula = chosen("simulate", method, rtol)
+    times = result_times("simulate", t_start, t_end, None, samples)
+    nominal = model.nominal("x")
+    allowed = tolerances("simulate", rtol, atol, nominal, event_tolerance, max_steps, max_step)
+    return Settings(t_start, t_end, formula, allowed, times)
+
+
+NOTHING = 1e-9
+"""Derivatives smaller than this in nominal values are rounding of none."""
+
+
+def difference(model: Model, one: Trajectory, other: Trajectory) -> float:
+    """Largest difference of a state over both runs, relative to its magnitude.
+
+    That is its nominal value, or its largest value where that is larger or tiny (`own_scale`).
+    """
+    n = min(one.t.size, other.t.size)
+    worst = 0.0
+    for v in model.x:
+        a, b = one[v.name][:n], other[v.name][:n]
+        size, nominal = np.abs(b).max(), np.array(v.nominal)
+        scale = np.maximum(size, own_scale(size, nominal))
+        worst = max(worst, float(np.abs(a - b).max() / scale))
+    return worst
+
+
+def differences_of_derivatives(
+    model: Model, names: Sequence[str], one: Trajectory, other: Trajectory
+) -> dict[str, float]:
+    """For each name, the largest difference of the derivative of a state over both runs.
+
+    It is relative to the largest value of that derivative. Derivatives jump at events: where one
+    run has an event behind it that the other has still before it, they are not compared.
+
+    Returns:
+        Name -> relative difference; NaN for all of them where an event has no derivative, which
+        `Trajectory.sensitivities` then says.
+    """
+    try:
+        found, finer = one.sensitivities, other.sensitivities
+    except ValueError:
+        return dict.fromkeys(names, float("nan"))
+    n = min(one.t.size, other.t.size)
+    same = _on_the_same_side(one, other)[:n]
+    known = {v.name: v for v in model.p} | {f"x0.{v.name}": v for v in model.x}
+    worst = dict.fromkeys(names, 0.0)
+    for name in names:
+        for v in model.x:
+            a, b = found[name][v.name][:n], finer[name][v.name][:n]
+            size = max(float(np.abs(b).max()), NOTHING * v.nominal / known[name].nominal)
+            off = float(np.abs(a - b)[same].max(initial=0.0)) / size
+            worst[name] = max(worst[name], off)
+    return worst
+
+
+def _on_the_same_side(one: Trajectory, other: Trajectory) -> NDArray[np.bool_]:
+    """Times of `one` with equally many events of both runs before; all where numbers differ."""
+    times = [np.array([t for t, _ in run.happened]) for run in (one, other)]
+    if times[0].size != times[1].size:
+        return np.ones(one.t.size, dtype=bool)
+    before = [np.searchsorted(found, one.t, side="right") for found in times]
+    return before[0] == before[1]
 
 
 def simulate(
@@ -74,8 +219,8 @@ def simulate(
         x0: start values of states by name; the others start where the model says (bristles in
             steady sliding).
         u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time,
-            which is looked at on a grid of 8193 times for pulses that a step could leap over: name
-            those that are shorter in `times`.
+            sampled at 8193 times and within its jumps to detect short pulses; list those in
+            `times` that lie between two samples and leave no jump.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
         atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol, and

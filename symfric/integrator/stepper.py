@@ -9,9 +9,8 @@ from symfric.integrator.arguments import BACKENDS, check_model, check_span, chos
 from symfric.integrator.equations.initial import smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.plant import Numbers, Plant
-from symfric.integrator.running.built import built
 from symfric.integrator.running.crossings import Memory
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.plants import SAMPLES, Plants
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State

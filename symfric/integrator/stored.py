@@ -1,8 +1,8 @@
-"""Runs as data: in files that last, and in pickles."""
+"""The result of a run: a trajectory, and its data in files that last and in pickles."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from os import PathLike
 from typing import Any, final
 
@@ -14,18 +14,16 @@ from symfric.foundation.status import Status
 from symfric.foundation.typed import agree
 from symfric.integrator.arguments import BACKENDS
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.derivatives.path import Path
-from symfric.integrator.derivatives.seeds import Seeds
-from symfric.integrator.differentiated import Differentiated
+from symfric.integrator.derivatives.path import Path, Seeds
+from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.tableaux import METHODS, key_of
-from symfric.integrator.running.built import built
-from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.dense import Dense, Outputs
 from symfric.integrator.running.events import Jumps
-from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.outputs import Outputs
+from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.record import Run
 from symfric.model import Model
+from symfric.model.kinds import in_results
 from symfric.results.statistics import Statistics
 from symfric.results.stored import Format
 from symfric.results.trajectory import Trajectory
@@ -188,8 +186,6 @@ class Stored:
 
     def unpacked(self) -> Trajectory:
         """The run again."""
-        from symfric.integrator.outcome import trajectory_of  # noqa: PLC0415  (which knows this)
-
         found = self.reached.shape[1]
         run = Run(
             float(self.steps.t0[0]),
@@ -295,3 +291,72 @@ def load_run(
             format, or classes that are not known.
     """
     return RUN.load(path, own).unpacked()
+
+
+def trajectory_of(
+    integrator: Integrator | Later,
+    inputs: InputData,
+    run: Run,
+    p: Array,
+    count: Callable[[], Statistics],
+    backend: str = "vm",
+) -> Trajectory:
+    """The trajectory of a run.
+
+    Args:
+        integrator, inputs, p: what was run.
+        run: what came of it; of the times of its outputs those that were reached.
+        count: what it took.
+        backend: what evaluates signals: "vm", else whatever is predicted to be fastest.
+
+    Foreign integrators let the constraints of mechanisms drift, and their results show it; ours
+    hold them to the tolerance between steps, and exactly at results.
+    """
+    model, outputs = integrator.model, run.outputs
+    names, drifts = model.signals, run.engine.startswith("casadi")
+    times, engine = outputs.times, "vm" if backend == "vm" else "auto"
+    if outputs.found < times.size:
+        times = times[: outputs.found]
+
+    def unknowns(at: Array) -> Array:
+        return outputs.reached.copy() if at is times else run.at(at)
+
+    def states(at: Array) -> dict[str, Array]:
+        y, columns = unknowns(at), None if drifts else integrator.states
+        if columns is not None:
+            y = columns([y.T, data(at)], backend=engine)[0].T
+        return {v.name: in_results(v.kind, row) for v, row in zip(model.x, y, strict=False)}
+
+    def data(at: Array) -> Array:
+        return np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
+
+    def rows(columns: Columns, at: Array) -> Array:
+        (values,) = columns([at, unknowns(at).T, data(at)], backend=engine)
+        return np.ascontiguousarray(values.T)
+
+    def evaluate(at: Array) -> dict[str, Array]:
+        columns = integrator.plain_signal_columns if drifts else integrator.signal_columns
+        return dict(zip(names, rows(columns, at), strict=True))
+
+    def express(expression: ca.SX, at: Array) -> Array:
+        plain = partial(integrator.of_time, "signals")
+        return rows(Columns((plain if drifts else integrator.refined)(expression)), at)
+
+    return Trajectory(
+        model.name,
+        times,
+        dict(names),
+        run.status,
+        run.message,
+        count,
+        (run.t, run.reached),
+        lambda: np.append(run.dense.t0, run.dense.t1[-1]),
+        states,
+        evaluate,
+        express,
+        model,
+        tuple(run.happened),
+        keep=None
+        if isinstance(integrator, Later)  # it is stored already
+        else partial(Stored.of, integrator, inputs, run, p, backend),
+    )

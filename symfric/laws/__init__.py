@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from symfric.laws.composed.populations import GenericAsperity as GenericAsperity
     from symfric.laws.composed.populations import Population as Population
     from symfric.laws.composed.populations import RandomBristles as RandomBristles
+    from symfric.laws.composed.populations import steady_force as steady_force
+    from symfric.laws.composed.populations import steady_inputs as steady_inputs
     from symfric.laws.composed.wrap import Lagged as Lagged
     from symfric.laws.composed.wrap import LoadNormalised as LoadNormalised
     from symfric.laws.composed.wrap import TemperatureDependent as TemperatureDependent
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
     from symfric.laws.dynamic.dwell import Armstrong as Armstrong
     from symfric.laws.dynamic.dwell import Gonthier as Gonthier
     from symfric.laws.dynamic.dwell import RateAndState as RateAndState
-    from symfric.laws.dynamic.exact_coulomb import ExactCoulomb as ExactCoulomb
     from symfric.laws.dynamic.lugre import ElastoPlastic as ElastoPlastic
     from symfric.laws.dynamic.lugre import LuGre as LuGre
     from symfric.laws.dynamic.lugre import LuGreNormalised as LuGreNormalised
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from symfric.laws.dynamic.maxwell_slip import MaxwellSlip as MaxwellSlip
     from symfric.laws.dynamic.maxwell_slip import Slider as Slider
     from symfric.laws.dynamic.stick_slip import Bristle2D as Bristle2D
+    from symfric.laws.dynamic.stick_slip import ExactCoulomb as ExactCoulomb
     from symfric.laws.dynamic.stick_slip import HaessigFriedland as HaessigFriedland
     from symfric.laws.dynamic.stick_slip import StickSlip as StickSlip
     from symfric.laws.static.applied_force import Awrejcewicz as Awrejcewicz
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
     from symfric.laws.static.applied_force import Wojewoda as Wojewoda
     from symfric.laws.static.coulomb import Coulomb as Coulomb
     from symfric.laws.static.coulomb import PowerLawViscous as PowerLawViscous
+    from symfric.laws.static.coulomb import Table as Table
     from symfric.laws.static.coulomb import Viscous as Viscous
     from symfric.laws.static.exponential import Andersson as Andersson
     from symfric.laws.static.exponential import Benson as Benson
@@ -64,9 +67,11 @@ if TYPE_CHECKING:
     from symfric.laws.static.exponential import SteadyStateLuGre as SteadyStateLuGre
     from symfric.laws.static.exponential import Stribeck as Stribeck
     from symfric.laws.static.exponential import Tustin as Tustin
-    from symfric.laws.static.joints import BAM as BAM
-    from symfric.laws.static.joints import Bittencourt as Bittencourt
-    from symfric.laws.static.joints import Capstan as Capstan
+    from symfric.laws.static.machines import BAM as BAM
+    from symfric.laws.static.machines import Bittencourt as Bittencourt
+    from symfric.laws.static.machines import Capstan as Capstan
+    from symfric.laws.static.machines import QuarterCarGeneral as QuarterCarGeneral
+    from symfric.laws.static.machines import QuarterCarSimple as QuarterCarSimple
     from symfric.laws.static.piecewise import Ambrosio as Ambrosio
     from symfric.laws.static.piecewise import BengisuAkay as BengisuAkay
     from symfric.laws.static.piecewise import Exudyn as Exudyn
@@ -75,8 +80,6 @@ if TYPE_CHECKING:
     from symfric.laws.static.piecewise import Step5 as Step5
     from symfric.laws.static.piecewise import Threlfall as Threlfall
     from symfric.laws.static.piecewise import VelocityBased as VelocityBased
-    from symfric.laws.static.quarter_car import QuarterCarGeneral as QuarterCarGeneral
-    from symfric.laws.static.quarter_car import QuarterCarSimple as QuarterCarSimple
     from symfric.laws.static.self_tuning import BrittleSelfTuning as BrittleSelfTuning
     from symfric.laws.static.self_tuning import RuiWang as RuiWang
     from symfric.laws.static.self_tuning import SelfTuning as SelfTuning
@@ -86,8 +89,5 @@ if TYPE_CHECKING:
     from symfric.laws.static.smooth_peak import PoppStelter as PoppStelter
     from symfric.laws.static.smooth_peak import SimscapeBreakaway as SimscapeBreakaway
     from symfric.laws.static.smooth_peak import Specker as Specker
-    from symfric.laws.static.table import Table as Table
-    from symfric.laws.steady import steady_force as steady_force
-    from symfric.laws.steady import steady_inputs as steady_inputs
 
 hand_out(__name__)

@@ -8,14 +8,13 @@ from symfric.laws.base.law import Law, check_law
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
 from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
-from symfric.laws.dynamic import dahl, dwell, exact_coulomb, lugre, maxwell_slip, stick_slip
+from symfric.laws.dynamic import dahl, dwell, lugre, maxwell_slip, stick_slip
 from symfric.laws.static import (
     applied_force,
     coulomb,
     exponential,
-    joints,
+    machines,
     piecewise,
-    quarter_car,
     self_tuning,
     smooth_peak,
 )
@@ -52,11 +51,11 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "awrejcewicz": applied_force.Awrejcewicz,
     "leine_switch": applied_force.LeineSwitch,
     "wojewoda": applied_force.Wojewoda,
-    "quarter_car_general": quarter_car.QuarterCarGeneral,
-    "quarter_car_simple": quarter_car.QuarterCarSimple,
-    "bittencourt": joints.Bittencourt,
-    "bam": joints.BAM,
-    "capstan": joints.Capstan,
+    "quarter_car_general": machines.QuarterCarGeneral,
+    "quarter_car_simple": machines.QuarterCarSimple,
+    "bittencourt": machines.Bittencourt,
+    "bam": machines.BAM,
+    "capstan": machines.Capstan,
 }
 """Memoryless laws by name, the widely used ones first."""
 
@@ -77,7 +76,7 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
     "bouc_wen": dahl.BoucWen,
     "rate_and_state": dwell.RateAndState,
     "armstrong": dwell.Armstrong,
-    "exact_coulomb": exact_coulomb.ExactCoulomb,
+    "exact_coulomb": stick_slip.ExactCoulomb,
 }
 """Every law with states that stands alone, by name."""
 

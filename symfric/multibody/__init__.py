@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from symfric.multibody.forces import JointSpringDamper as JointSpringDamper
     from symfric.multibody.forces import SpringDamper as SpringDamper
     from symfric.multibody.forces import UserForce as UserForce
-    from symfric.multibody.friction import JointFriction as JointFriction
     from symfric.multibody.functions import functions as functions
     from symfric.multibody.joint import Joint as Joint
+    from symfric.multibody.joint import JointFriction as JointFriction
     from symfric.multibody.joints import ALL_JOINTS as ALL_JOINTS
     from symfric.multibody.joints import Cylindrical as Cylindrical
     from symfric.multibody.joints import Distance as Distance
@@ -38,6 +38,6 @@ if TYPE_CHECKING:
     from symfric.multibody.spatial import GROUND as GROUND
     from symfric.multibody.spatial import Body as Body
     from symfric.multibody.spatial import Frame as Frame
-    from symfric.multibody.urdf.read import read_urdf as read_urdf
+    from symfric.multibody.urdf import read_urdf as read_urdf
 
 hand_out(__name__)

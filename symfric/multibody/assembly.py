@@ -27,10 +27,9 @@ from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
-from symfric.multibody.applied import Rest, rests
+from symfric.multibody.applied import Rest, rests, solve_mass
 from symfric.multibody.equations import Equations, normals_with
-from symfric.multibody.friction import Contact as Rubbing
-from symfric.multibody.mass import solve_mass
+from symfric.multibody.joint import Contact as Rubbing
 from symfric.multibody.results import Put, constraint_units, multiplier_units
 from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
 from symfric.multibody.topology import Topology

@@ -15,8 +15,7 @@ from symfric.foundation.symbols import strays
 from symfric.model import Variables
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force
-from symfric.multibody.friction import JointFriction
-from symfric.multibody.joint import Joint
+from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.spatial import GROUND, Body
 from symfric.multibody.topology import Topology, body_of
 

@@ -19,8 +19,7 @@ from symfric.multibody.dynamics import (
     normalisations,
 )
 from symfric.multibody.forces import Axial, Force, Gravity, Load
-from symfric.multibody.friction import Contact
-from symfric.multibody.joint import Joint
+from symfric.multibody.joint import Contact, Joint
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, Turns, kinematics
 from symfric.multibody.spatial import vector
 from symfric.multibody.topology import Topology, body_of, frame_at

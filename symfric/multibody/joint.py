@@ -6,19 +6,210 @@ angular velocity w_PC_C = H_w q' in components of C, where Euler parameters have
 the velocity p_PC' = H_v q' in those of P. The constraints are
 expressions of the pose that vanish for every q; they close a loop, where the joint has no
 coordinates. The axis of a joint is z of both frames.
+
+Friction laws act on bodies here, with the only minus sign.
+
+The reaction of a joint on its child, force F and moment T about the joint point in the axes of the
+child's frame, presses the bearing at two stations a apart on z:
+
+    f_x2 = -T_y / a,  f_y2 = T_x / a,  f_x1 = -F_x - f_x2,  f_y1 = -F_y - f_y2
+
+    cylindrical: N = |f_1| + |f_2|
+    revolute:    N = |f_1| + |f_2| + |F_z|                   (thrust face)
+    prismatic:   N = |f_x1 + T_z/b| + |f_y1| + |f_x2| + |f_y2| + |T_z/b|    (guide of width b)
+    universal:   of each of its two axes as a revolute joint; the cross between them is massless
+    spherical:   N = |F|
+    joints that only close loops: see `symfric.multibody.joints`
+
+Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it. The ball
+of a spherical joint slips with v = R w, a vector in the axes of the socket, the parent's frame: the
+moment is -R F(v, N), with F along v for laws without states and bristles that are vectors, see
+`Isotropic`.
+Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Self
+from math import inf
+from typing import Any, ClassVar, Self, final
 
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.numeric import Scalar, is_number
+from symfric.foundation.checks import as_number
+from symfric.foundation.numeric import Scalar, is_number, is_symbolic
+from symfric.foundation.units import turned
+from symfric.foundation.variable import take_si
+from symfric.laws import Law
+from symfric.laws.base.law import FORCE, check_law
+from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 from symfric.model.sketch import Symbol
-from symfric.multibody.friction import JointFriction
+
+OFFERED = (FORCE,)
+"""What a joint gives a law besides v and N, but in a ball."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointFriction:
+    """A friction law in a joint; in a universal joint the same in both of its bearings.
+
+    A normal force that falls below zero, through an input, a parameter or a negative preload, is
+    an error at its time, not friction that drives.
+
+    Laws with true rest (`ExactCoulomb`, `Karnopp`, `LeineSwitch`, `Awrejcewicz`) get the force F_e
+    that the contact must carry from the constraints, see `symfric.multibody.applied`. By modes,
+    what stops rests, and what rests breaks away where |F_e| passes the static level; after each
+    change of mode the whole mechanism is solved again, and what then cannot hold breaks away at
+    the same instant, what would slide the wrong way rests again. So several valid states of rest
+    and sliding, which mu_s > mu_d leaves, are told apart by what happened before; at the start
+    what is overloaded breaks away. The contacts of a loop of one degree of freedom rest and break
+    away together, where all of them are at their static levels; smooth laws with mu_s > mu_d break
+    away a little earlier there, as the contact that moves most passes its peak first, and tend to
+    the same motion where mu_s = mu_d.
+    Limits: not in a ball, nor where a drive prescribes the sliding; in a loop of several degrees of
+    freedom as many as are independent. Forms that jump without modes (`Karnopp`, `LeineSwitch` with
+    form = "original") end a run at the jump. What else a `Sum` has must vanish at rest.
+
+    Attributes:
+        law: any friction law of v, N and F_e; in a spherical joint an isotropic one of v and N,
+            `SpatialSlip`.
+        radius: of the bearing or ball [m], for friction about an axis or a point.
+        length: distance a of the two bearing stations [m], the first at the origin of the frame,
+            the second along its +z; None: moments do not load the bearing.
+        width: width b of a guide that takes the moment about z [m]; None: it does not load it.
+        preload: normal force in addition to the reactions [N].
+        normal: constant normal force [N] instead of reactions; then no unknown is added.
+        turning: the law is one of the joint's rate [rad/s] and its force a moment [N m], of the
+            level `normal` [N m]; without a radius. So robots' files give friction.
+        eps: width of |f|, sqrt(f^2 + eps^2) - eps [N]. Laws that divide by the normal force
+            (bristles) need a preload above zero if the reactions can vanish.
+    """
+
+    law: Law
+    radius: Scalar | None = None
+    length: Scalar | None = None
+    width: Scalar | None = None
+    preload: Scalar = 0.0
+    normal: Scalar | None = None
+    eps: Scalar = 1e-4
+    turning: bool = False
+
+    def __post_init__(self) -> None:
+        check_law("friction", self.law)
+        take_si("friction", self, "radius", "length", "width", "preload", "normal", "eps")
+
+    def problems(self, rubs: Sequence[str]) -> Iterator[str]:
+        """What is wrong for a joint in which friction acts in the directions `rubs`."""
+        if not rubs:
+            yield "expected a joint in which something rubs, such as a hinge, a guide or a ball"
+        offered = () if "ball" in rubs else OFFERED
+        if strange := [i.name for i in self.law.inputs if i.name not in offered]:
+            yield (
+                f"law: expected one that needs no more than {', '.join(('v', 'N', *offered))}, got "
+                f"{type(self.law).__name__}, which needs {', '.join(strange)}; "
+                f"a {'ball' if 'ball' in rubs else 'joint'} has no such input"
+            )
+        elif "ball" in rubs and (reason := anisotropy(self.law)):
+            yield (
+                f"law: expected an isotropic one, got {type(self.law).__name__}; a ball slips in "
+                f"any direction, and {reason}"
+            )
+        turns = any(direction != "slide" for direction in rubs)
+        if self.turning:
+            if "slide" in rubs or "ball" in rubs:
+                yield "turning: expected a joint that turns about an axis only"
+            if self.radius is not None:
+                yield f"radius: expected none with turning, got {self.radius!r}"
+            if self.normal is None:
+                yield "normal: expected the level [N m] of friction that turns, got none"
+        elif turns and self.radius is None:
+            yield "radius: expected the bearing's radius [m], got none"
+        limits = {
+            "radius": (self.radius, True), "length": (self.length, True),
+            "width": (self.width, True), "preload": (self.preload, False),
+            "normal": (self.normal, False), "eps": (self.eps, True),
+        }  # fmt: skip
+        for name, (value, strict) in limits.items():
+            if is_symbolic(value) or (value is None and name not in ("preload", "eps")):
+                continue
+            size = as_number(value)
+            if size is None or not (0 < size < inf or (size == 0 and not strict)):
+                yield f"{name}: expected a number {'>' if strict else '>='} 0, got {value!r}"
+
+    @property
+    def arm(self) -> Scalar:
+        """The bearing's radius [m]; 1 for friction along z only, and for a law of the moment."""
+        return 1.0 if self.radius is None else self.radius
+
+    def magnitude(self, *components: ca.SX) -> ca.SX:
+        """Smooth length of a force with these components [N]."""
+        squares = sum((f * f for f in components), start=self.eps * self.eps)
+        return ca.sqrt(squares) - self.eps
+
+    def stations(self, F: ca.SX, T: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """Bearing forces f_x1, f_y1, f_x2, f_y2 [N]."""
+        if self.length is None:
+            return -F[0], -F[1], ca.SX(0), ca.SX(0)
+        fx2, fy2 = -T[1] / self.length, T[0] / self.length
+        return -F[0] - fx2, -F[1] - fy2, fx2, fy2
+
+    def normal_force(self, rubs: Sequence[str], F: ca.SX, T: ca.SX) -> ca.SX:
+        """Sum of the bearing forces [N] under the reaction F, T.
+
+        Components are those of the child's frame, of a universal joint those of the bearing.
+        """
+        if self.normal is not None:
+            return ca.SX(self.normal)
+        fx1, fy1, fx2, fy2 = self.stations(F, T)
+        forces: list[tuple[ca.SX, ...]]
+        if "ball" in rubs:
+            forces = [(F[0], F[1], F[2])]
+        elif rubs != ("slide",):
+            thrust = ca.SX(0) if "slide" in rubs else F[2]
+            forces = [(fx1, fy1), (fx2, fy2), (thrust,)]
+        else:
+            f3 = ca.SX(0) if self.width is None else T[2] / self.width
+            forces = [(fx1 + f3,), (fy1,), (fx2,), (fy2,), (f3,)]
+        pressing = [f for f in forces if not ca.vertcat(*f).is_zero()]
+        return sum((self.magnitude(*f) for f in pressing), start=ca.SX(self.preload))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Friction of a joint in one of the directions in which it rubs.
+
+    Attributes:
+        name: of its results.
+        joint: the joint it belongs to.
+        direction: "slide", "turn", "x", "y" or "ball".
+        friction: law and geometry.
+        law: the law, for a ball in its form for vectors.
+        pressed: what its normal force is called; directions of one bearing share it.
+        slip: sliding velocity [m/s], shape (1, 1), of a ball (3, 1).
+        F: symbols of the friction force [N], of the same shape.
+    """
+
+    name: str
+    joint: str
+    direction: str
+    friction: JointFriction
+    law: Law | SpatialSlip
+    pressed: str
+    slip: ca.SX
+    F: ca.SX
+
+    def unit(self, of_sliding: str) -> str:
+        """A unit of the law: that of sliding, or of turning."""
+        return turned(of_sliding) if self.friction.turning else of_sliding
+
+    @property
+    def load(self) -> ca.SX:
+        """Force [N] along or moment [N m] about its axis on the child; of a ball a vector."""
+        return -self.F if self.direction == "slide" else -self.friction.arm * self.F
+
 
 HINTS = {
     "axis": "the axis of a joint is the z axis of both frames, m.frame('arm.pin', z=(0, 1, 0))",
@@ -48,8 +239,8 @@ class Keywords:
 
 
 Pair = tuple[ca.SX, ca.SX]
-FORCE = ("Fx", "Fy", "Fz")
-COMPONENTS = (*FORCE, "Mx", "My", "Mz")
+FORCE_NAMES = ("Fx", "Fy", "Fz")
+COMPONENTS = (*FORCE_NAMES, "Mx", "My", "Mz")
 
 
 def unit(k: int) -> ca.SX:

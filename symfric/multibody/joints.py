@@ -11,8 +11,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.model.sketch import Symbol
-from symfric.multibody.friction import JointFriction
-from symfric.multibody.joint import FORCE, Joint, Pair, unit
+from symfric.multibody.joint import FORCE_NAMES, Joint, JointFriction, Pair, unit
 from symfric.multibody.spatial import euler_g, rotation, rotation_x, rotation_y, rotation_z
 
 
@@ -60,7 +59,7 @@ class Distance(Closing):
     """
 
     constrains = 1
-    transmits = FORCE
+    transmits = FORCE_NAMES
     symbol = Symbol(line="rod", anchored=True)
 
     length: Scalar = 1.0
@@ -87,7 +86,7 @@ class PointOnLine(Closing):
     constrains = 2
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
-    transmits = FORCE
+    transmits = FORCE_NAMES
     symbol = Symbol("o", axes=(("a", 2),), anchored=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -177,7 +176,7 @@ class Revolute(Joint):
     constrains = 5
     rubs = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
-    transmits = (*FORCE, "Mx", "My")
+    transmits = (*FORCE_NAMES, "Mx", "My")
     symbol = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
@@ -252,7 +251,7 @@ class Spherical(Joint):
     constrains = 3
     rubs = ("ball",)
     quaternion = 0
-    transmits = FORCE
+    transmits = FORCE_NAMES
     symbol = Symbol("o", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
@@ -277,7 +276,7 @@ class Universal(Joint):
     constrains = 4
     rubs = ("x", "y")
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1}
-    transmits = (*FORCE, "Mx", "Mz")
+    transmits = (*FORCE_NAMES, "Mx", "Mz")
     symbol = Symbol("o", axes=(("a", 0), ("b", 1)), anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:

@@ -33,9 +33,8 @@ from symfric.multibody.prepare import (
     without_inertia,
     written,
 )
-from symfric.multibody.results import results
-from symfric.multibody.sketch import shown as shown_of
-from symfric.multibody.sketch import sketch, thumbnail
+from symfric.multibody.results import results, sketch, thumbnail
+from symfric.multibody.results import shown as shown_of
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
 

@@ -11,8 +11,8 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
+from symfric.laws.base.families import FINEST, rests
 from symfric.laws.base.law import FORCE, Switch
-from symfric.laws.base.sticking import FINEST, rests
 from symfric.model import Event, Variables, kinds
 from symfric.multibody.applied import (
     Rest,
@@ -22,7 +22,7 @@ from symfric.multibody.applied import (
     switches_at,
 )
 from symfric.multibody.equations import Equations
-from symfric.multibody.friction import Contact
+from symfric.multibody.joint import Contact
 
 
 @final

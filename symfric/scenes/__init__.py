@@ -10,26 +10,26 @@ if TYPE_CHECKING:
     from symfric.scenes.base import contact as contact
     from symfric.scenes.base import friction_states as friction_states
     from symfric.scenes.base import other_law as other_law
+    from symfric.scenes.blocks import CoupledBlocks as CoupledBlocks
+    from symfric.scenes.blocks import Drive as Drive
+    from symfric.scenes.blocks import Rabinowicz as Rabinowicz
+    from symfric.scenes.blocks import drive as drive
+    from symfric.scenes.blocks import rabinowicz as rabinowicz
     from symfric.scenes.catalogue import ALL_SCENES as ALL_SCENES
     from symfric.scenes.catalogue import MECHANISMS as MECHANISMS
-    from symfric.scenes.drive import Drive as Drive
-    from symfric.scenes.drive import drive as drive
     from symfric.scenes.linkages import DoublePendulum as DoublePendulum
     from symfric.scenes.linkages import FourBar as FourBar
+    from symfric.scenes.linkages import MechanismScene as MechanismScene
     from symfric.scenes.linkages import Pendulum as Pendulum
     from symfric.scenes.linkages import PendulumBox as PendulumBox
-    from symfric.scenes.mechanism import MechanismScene as MechanismScene
+    from symfric.scenes.linkages import SliderCrank as SliderCrank
     from symfric.scenes.presets import Numbers as Numbers
     from symfric.scenes.presets import Preset as Preset
-    from symfric.scenes.rabinowicz import CoupledBlocks as CoupledBlocks
-    from symfric.scenes.rabinowicz import Rabinowicz as Rabinowicz
-    from symfric.scenes.rabinowicz import rabinowicz as rabinowicz
     from symfric.scenes.rigs import Prescribed as Prescribed
     from symfric.scenes.rigs import QuarterCar as QuarterCar
     from symfric.scenes.rotating import Clutch as Clutch
     from symfric.scenes.rotating import DrillString as DrillString
     from symfric.scenes.rotating import Nip as Nip
-    from symfric.scenes.slider_crank import SliderCrank as SliderCrank
     from symfric.scenes.spatial import Arm as Arm
     from symfric.scenes.spatial import FourMass as FourMass
     from symfric.scenes.spatial import Robot as Robot

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar, final
 from symfric.scenes.base import Scene
 
 if TYPE_CHECKING:
-    from symfric.scenes.mechanism import MechanismScene
+    from symfric.scenes.linkages import MechanismScene
 
 S = TypeVar("S", bound=Scene, covariant=True)
 
@@ -38,7 +38,7 @@ _MECHANISMS = {
     "double_pendulum": "linkages DoublePendulum",
     "pendulum_box": "linkages PendulumBox",
     "four_mass": "spatial FourMass",
-    "slider_crank": "slider_crank SliderCrank",
+    "slider_crank": "linkages SliderCrank",
     "four_bar": "linkages FourBar",
     "arm": "spatial Arm",
 }
@@ -47,10 +47,10 @@ MECHANISMS: "Catalogue[MechanismScene]" = Catalogue(_MECHANISMS)
 
 ALL_SCENES: Catalogue[Scene] = Catalogue(
     {
-        "rabinowicz": "rabinowicz Rabinowicz",
-        "drive": "drive Drive",
+        "rabinowicz": "blocks Rabinowicz",
+        "drive": "blocks Drive",
         "quarter_car": "rigs QuarterCar",
-        "coupled_blocks": "rabinowicz CoupledBlocks",
+        "coupled_blocks": "blocks CoupledBlocks",
         "drill_string": "rotating DrillString",
         "clutch": "rotating Clutch",
         "nip": "rotating Nip",

@@ -13,12 +13,11 @@ from symfric.foundation.parameters import Variable, option, param, parameters, w
 from symfric.laws import GMS, Dahl, ElastoPlastic, Leuven, LuGre, SteadyStateLuGre, Stribeck
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE
-from symfric.laws.static.quarter_car import QuarterCarGeneral, tilt
+from symfric.laws.static.machines import QuarterCarGeneral, tilt
 from symfric.model import Model, Monitor, Output, Variables
 from symfric.model.sketch import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import GivenInput, Scene, contact
-from symfric.scenes.drawn import Block, drawn
+from symfric.scenes.base import Block, GivenInput, Scene, contact, drawn
 from symfric.scenes.presets import Numbers, Preset
 
 

@@ -17,8 +17,7 @@ from symfric.laws.base import smooth
 from symfric.model import Model, Output, Variables
 from symfric.model.sketch import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import GivenInput, Scene, contact, structure
-from symfric.scenes.drawn import Block, drawn
+from symfric.scenes.base import Block, GivenInput, Scene, contact, drawn, structure
 from symfric.scenes.presets import Numbers, Preset
 
 

@@ -19,10 +19,10 @@ from symfric.multibody import (
     Revolute,
     SpringDamper,
 )
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.urdf import read_urdf
 from symfric.scenes import fields
 from symfric.scenes.base import other_law
-from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.linkages import MechanismScene
 from symfric.scenes.presets import Numbers, Preset
 
 UP, SIDE, OUT = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)

@@ -15,7 +15,7 @@ from identification.residuals.shooting import Shooting
 from identification.unknowns.spec import above, log, tied
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Coulomb, Dahl, LuGre, Stribeck, Sum, Viscous
-from symfric.laws.steady import steady_force
+from symfric.laws.composed.populations import steady_force
 from symfric.scenes import Drive
 
 TRUTH = {"mu_s": 3.0, "mu_d": 2.0, "v_s": 0.01, "sigma_2": 4.0}

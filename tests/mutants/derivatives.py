@@ -15,7 +15,7 @@ DERIVATIVES = (
         "delay = -np.hstack", "delay = np.hstack", TESTS,
     ),
     Mutant(
-        "a step that begins and ends with an event begins at a fixed time", f"{FOLDER}/links.py",
+        "a step that begins and ends with an event begins at a fixed time", f"{FOLDER}/together.py",
         "fall[1:] = -(1 - theta)[", "fall[1:] = 0 * (1 - theta)[", TESTS,
     ),
     Mutant(
@@ -23,7 +23,7 @@ DERIVATIVES = (
         "q[1:] -= theta[:, None] * p", "q[1:] -= p", TESTS,
     ),
     Mutant(
-        "weights within a step that moves stay where they are", f"{FOLDER}/adjoint.py",
+        "weights within a step that moves stay where they are", f"{FOLDER}/sensitivity.py",
         "falls = (1 - since / path.size[k])", "falls = (0 - since / path.size[k])", TESTS,
     ),
 )  # fmt: skip

@@ -2,8 +2,8 @@
 
 from mutants.mutant import Mutant
 
-LOOP, MEMBERS = "symfric/integrator/cuda/members.h", "symfric/integrator/cuda/members.py"
-CUPY, DOOR = "symfric/integrator/cuda/cupy_device.py", "symfric/integrator/cuda/on_device.py"
+LOOP, MEMBERS = "symfric/integrator/cuda/members.h", "symfric/integrator/cuda/on_device.py"
+CUPY, DOOR = "symfric/integrator/cuda/device.py", "symfric/integrator/cuda/on_device.py"
 T_DEVICE = ("tests/symfric/integrator/cuda/test_on_device.py",)
 T_CUPY = ("tests/symfric/integrator/cuda/test_cupy_device.py",)
 

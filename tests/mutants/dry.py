@@ -31,7 +31,7 @@ DRY = (
         "return (1 - w) * F_e + w * slip", ("tests/symfric/laws/test_driving.py",),
     ),
     Mutant(
-        "a law says that it is unverified, and not what that means", "symfric/laws/base/facts.py",
+        "a law says that it is unverified, and not what that means", "symfric/laws/base/law.py",
         'said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"', "said = self.confidence",
         ("tests/symfric/laws/test_contract.py",),
     ),

@@ -11,7 +11,7 @@ T_STORED = ("tests/symfric/integrator/test_stored.py",)
 T_SHOWN = ("tests/symfric/foundation/test_shown.py",)
 DOUBTS = "symfric/integrator/running/doubts.py"
 T_DOUBTS = ("tests/symfric/integrator/running/test_doubts.py",)
-HOLDING = "symfric/model/holding.py"
+HOLDING = "symfric/model/forces.py"
 T_HOLDING = ("tests/symfric/model/test_holding.py",)
 T_ACCELERATIONS = ("tests/symfric/model/test_accelerations.py",)
 
@@ -116,7 +116,7 @@ HELD = (
         ("tests/symfric/laws/composed/test_normalised.py",),
     ),
     Mutant(
-        "friction that adds energy is not said", "symfric/integrator/running/gains.py",
+        "friction that adds energy is not said", "symfric/integrator/running/doubts.py",
         "steady[worst] * slip[worst] < 0", "steady[worst] * slip[worst] > 0", T_DOUBTS,
     ),
     Mutant(
@@ -156,5 +156,15 @@ HELD = (
     Mutant(
         "normal forces may depend on friction by any function", HOLDING,
         "if ca.depends_on(slopes, F):", "if False:", T_HOLDING,
+    ),
+    Mutant(
+        "pulses within jumps of a function of time are leapt over",
+        "symfric/integrator/equations/expressions.py", "return tuple(middle[high].tolist())",
+        "return ()", ("tests/symfric/integrator/equations/test_onsets.py",),
+    ),
+    Mutant(
+        "peaks of short pulses are not hit", "symfric/integrator/equations/expressions.py",
+        "if height.max() > PULSE * height[-1]:", "if False:",
+        ("tests/symfric/integrator/equations/test_onsets.py",),
     ),
 )  # fmt: skip

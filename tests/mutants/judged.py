@@ -112,11 +112,11 @@ JUDGED = (
         '"damping": -0.5', '"damping": -1.0', T_JUDGED,
     ),
     Mutant(
-        "the first larger step is the largest", CHOICE + "fixed_step.py",
+        "the first larger step is the largest", CHOICE + "measured.py",
         "for factor in (5.0, 2.0):", "for factor in (2.0, 5.0):", T_STEPS,
     ),
     Mutant(
-        "inputs of a step are those at its start", CHOICE + "fixed_step.py",
+        "inputs of a step are those at its start", CHOICE + "measured.py",
         "np.multiply(k + 0.5, h", "np.multiply(k, h", T_STEPS,
     ),
     Mutant(
@@ -139,7 +139,7 @@ JUDGED = (
         of("drill_string"),
     ),
     Mutant(
-        "the second block rubs as the first", SCENES + "rabinowicz.py",
+        "the second block rubs as the first", SCENES + "blocks.py",
         '(self.law_of("block_2"), self.m_2)', "(self.law, self.m_2)", of("coupled_blocks"),
     ),
     Mutant(

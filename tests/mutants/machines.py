@@ -5,7 +5,7 @@ from mutants.mutant import Mutant
 PRESETS = "symfric/scenes/presets.py"
 JING_MI = "symfric/scenes/jing_mi.py"
 CLUTCH = "symfric/scenes/rotating.py"
-BLOCKS = "symfric/scenes/rabinowicz.py"
+BLOCKS = "symfric/scenes/blocks.py"
 DRILL = "symfric/scenes/rotating.py"
 NIP = "symfric/scenes/rotating.py"
 GIVEN = "symfric/scenes/rigs.py"

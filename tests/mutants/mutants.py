@@ -32,16 +32,16 @@ from mutants.written import WRITTEN
 STEP = "symfric/integrator/step/attempt.py"
 WATCH = "symfric/integrator/step/attempt.py"
 EVENTS = "symfric/integrator/running/events.py"
-SEARCH = "symfric/integrator/running/search.py"
+SEARCH = "symfric/integrator/running/search.c"
 CROSSINGS = "symfric/integrator/running/crossings.py"
-ISOLATION = "symfric/integrator/running/isolation.py"
+ISOLATION = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/emitter/emit.py"
 STATEMENTS = "symfric/emitter/statements.py"
 COLLOCATION = "ocp/transcription/collocation.py"
 
-LOOP = "symfric/integrator/running/loop.py"
+LOOP = "symfric/integrator/running/march.c"
 T_OUTPUTS = ("tests/symfric/integrator/running/test_outputs.py",)
 T_STEP = ("tests/symfric/integrator/step/test_attempt.py",)
 T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
@@ -281,7 +281,7 @@ DIFFERENTIAL_ALGEBRAIC = (
 )  # fmt: skip
 
 MEMORY = "symfric/foundation/memory.py"
-BUILT = "symfric/integrator/running/built.py"
+BUILT = "symfric/integrator/running/integrator.py"
 KEPT = "symfric/integrator/compiled/compiler.py"
 COMPILED = "symfric/integrator/compiled/compiler.py"
 T_BUILT = ("tests/symfric/integrator/running/test_built.py",)
@@ -330,7 +330,7 @@ CACHES = (
         ("tests/symfric/integrator/running/test_bits.py",),
     ),
     Mutant(
-        "outputs at a jump are those before it", "symfric/integrator/running/outputs.py",
+        "outputs at a jump are those before it", "symfric/integrator/running/dense.py",
         'side="right" if last else "left"', 'side="right"', T_OUTPUTS,
     ),
     Mutant(
@@ -347,11 +347,11 @@ CACHES = (
     ),
     Mutant(
         "algebraic unknowns stay behind in compiled code", LOOP,
-        "if ({call}) return 7;", "if (0 && {call}) return 7;",
+        "if (symfric_follow(L->S + MEM, L->R + GIVEN - $data)) return 7;", "",
         ("tests/symfric/integrator/running/test_bits.py::test_only_a_far_jump_is_searched_for",),
     ),
     Mutant(
-        "settings of another kind are taken as checked", "symfric/integrator/settings.py",
+        "settings of another kind are taken as checked", "symfric/integrator/simulate.py",
         "key = (*asked, *map(type, asked))", "key = asked",
         ("tests/symfric/integrator/test_settings.py",),
     ),

@@ -4,9 +4,9 @@ from mutants.mutant import Mutant
 
 FOLLOWING = "symfric/integrator/equations/following.py"
 CONSTANTS = "symfric/integrator/equations/expressions.py"
-PLANT, LOOPS = "symfric/integrator/plant.py", "symfric/integrator/running/plants.py"
-EVENTFUL = "symfric/integrator/running/eventful_plants.py"
-LANES = "symfric/integrator/many/plants.py"
+PLANT, LOOPS = "symfric/integrator/plant.py", "symfric/integrator/running/plants.c"
+EVENTFUL = "symfric/integrator/running/plants.py"
+LANES = "symfric/integrator/many/plants.c"
 T_FOLLOWING = ("tests/symfric/integrator/equations/test_following.py",)
 T_CONSTANTS = ("tests/symfric/integrator/equations/test_constants.py",)
 T_STEPPER = ("tests/symfric/integrator/test_stepper.py",)
@@ -37,11 +37,11 @@ PLANTS = (
     ),
     Mutant(
         "plant: the sample moves on where the plant did not", LOOPS,
-        "m->count[b] += m->S[b * COLUMNS + T] >= R[T_END];", "m->count[b] += 1;", T_STEPPER,
+        "m->count[b] += m->S[b * (MEM + N) + T] >= R[T_END];", "m->count[b] += 1;", T_STEPPER,
     ),
     Mutant(
         "plant: unknowns do not follow inputs", LOOPS,
-        "return m->ready[b] || !symfric_follow(m->S + b * COLUMNS + MEM, R + DATA);",
+        "return m->ready[b] || !symfric_follow(m->S + b * (MEM + N) + MEM, R + DATA);",
         "return 1;", T_STEPPER,
     ),
     Mutant(

@@ -21,14 +21,14 @@ T_STORED = tuple(
 )
 FORMAT = "symfric/results/stored.py"
 T_FILES = ("tests/symfric/integrator/test_stored.py::test_foreign_and_damaged_files_are_refused",)
-OVER = "symfric/results/ensemble_pictures.py"
+OVER = "symfric/results/pictures.py"
 T_STUDIES = ("tests/symfric/results/test_studies.py",)
-MEASURED = "symfric/integrator/measured.py"
+MEASURED = "symfric/integrator/simulate.py"
 T_MEASURED = ("tests/symfric/integrator/test_measured.py",)
 RECORD = "symfric/integrator/running/record.py"
 DIAGNOSIS = "symfric/integrator/running/diagnosis.py"
 T_DIAGNOSIS = ("tests/symfric/integrator/running/test_diagnosis.py",)
-ENSEMBLE = "symfric/integrator/ensemble.py"
+GIVEN = "symfric/integrator/many/given.py"
 
 WRITTEN = (
     Mutant(
@@ -146,7 +146,7 @@ WRITTEN = (
         'if False:\n        return ""', T_DIAGNOSIS,
     ),
     Mutant(
-        "inputs of an ensemble have no units", ENSEMBLE,
+        "inputs of an ensemble have no units", GIVEN,
         'for what, group in (("x0", model.x), ("u", model.u)):',
         'for what, group in (("x0", model.x),):', T_STUDIES,
     ),

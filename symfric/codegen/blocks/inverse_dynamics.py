@@ -18,8 +18,8 @@ from symfric.foundation.symbols import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
 from symfric.multibody.equations import Equations
-from symfric.multibody.friction import Contact
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.joint import Contact
+from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
 

@@ -15,7 +15,7 @@ from symfric.foundation.symbols import stacked, symbols_of
 from symfric.model import Variables
 from symfric.multibody import GROUND, Body, Mechanism
 from symfric.multibody.forces import Gravity
-from symfric.multibody.friction import Contact, JointFriction
+from symfric.multibody.joint import Contact, JointFriction
 from symfric.multibody.spatial import Frame, skew, vector
 
 

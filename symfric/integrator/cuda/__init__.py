@@ -3,14 +3,14 @@
 Everything but the launches is what the other backends have: members start on the CPU, fail with the
 same sentences, stop and go on where algebraic unknowns have to be searched for, and go chunk by
 chunk to memory or to a folder. The own emitter writes attempt, signals and the jump of algebraic
-unknowns in C (`step.in_c`); `members.h` goes with them from input interval to input interval. A
+unknowns in C (`step.pieces`); `members.h` goes with them from input interval to input interval. A
 thread whose member is done takes the next one, so that the threads of a warp stay together until no
 member is left; a launch ends after a number of attempts that takes a quarter of a second, and the
 members that are under way go on in the next one.
 
 What is tested where. The text of the kernel is C and CUDA C++ alike. Compiled for a processor it
 gives, through the same driver, the bits of the virtual machine for every scene without modes
-(`tests/symfric/integrator/cuda`); NVRTC compiles it without a graphics processor (`nvrtc`), which
+(`tests/symfric/integrator/cuda`); NVRTC compiles it without a graphics processor (`device`), which
 shows what it refuses, and how many registers a thread takes; the calls of CuPy are checked by a
 module in its place. On a device nothing is contracted to fused multiply-adds, so that only the last
 digits of exp, sin, pow and the like are others than those tested. It has not run on a graphics

@@ -1,23 +1,25 @@
-"""Derivatives of what was computed: the accepted steps, differentiated with their sizes held fixed.
+"""Derivatives of a run: forwards, and backwards by one sweep.
 
-The step-size controller takes no part (internal numerical differentiation), so the derivatives are
-those of the discrete solution and exact to rounding. An event moves with what is differentiated:
-the step that it cuts ends, and the next one begins, where the dense output has the event
-(`saltation`); all other steps end at fixed times. How fast the solution goes there is taken from
-the equations, from which dense output differs by its error, or more over a jump of the force.
+The accepted steps are differentiated with their sizes held fixed. The step-size controller takes no
+part (internal numerical differentiation), so the derivatives are those of the discrete solution and
+exact to rounding. An event moves with what is differentiated: the step that it cuts ends, and the
+next one begins, where the dense output has the event (`saltation`); all other steps end at fixed
+times. How fast the solution goes there is taken from the equations, from which dense output differs
+by its error, or more over a jump of the force.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.links import Links, links
-from symfric.integrator.derivatives.path import Jump, Path
+from symfric.integrator.derivatives.path import Jump, Path, Seeds
 from symfric.integrator.derivatives.saltation import at_start
-from symfric.integrator.derivatives.seeds import Seeds
+from symfric.integrator.derivatives.together import Links, links
 from symfric.integrator.running.dense import Dense
 
 Array = NDArray[np.float64]
@@ -151,3 +153,133 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
     (found,) = derivatives(path.integrator).of_signals(which)(rows, backend=path.backend)
     # CasADi stores column by column
     return np.ascontiguousarray(found.T).reshape(len(which.names), -1, times.size)
+
+
+def gradient(
+    path: Path, which: Seeds, times: Array, weights: Mapping[int, Array]
+) -> dict[str, float]:
+    """Derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution, exact to rounding.
+
+    Args:
+        path: the run.
+        which: what to differentiate with respect to.
+        times: t_j [s], increasing, shape (m,).
+        weights: number of a signal -> its weights, shape (m,); no others need a derivative.
+    """
+    s, used = path.integrator.system, tuple(weights)
+    if not used:
+        return dict.fromkeys(which.names, 0.0)
+    every = np.array([*weights.values()]).T
+    rows = [times, path.unknowns(times), path.data_at(times), every]
+    by_y, of_d = derivatives(path.integrator).weighted(used)(rows, backend=path.backend)
+    looks, by_data = _Looks(path, times, by_y), of_d.sum(axis=0)
+    start, more = _swept_back(path, looks)
+    found = start[: s.nx] @ which.start + which.through(by_data + more)
+    return dict(zip(which.names, found.tolist(), strict=True))
+
+
+def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
+    """Adjoints of the start, before it is made consistent, and of d."""
+    n, made = path.integrator.system.n, derivatives(path.integrator)
+    steps = [a[::-1] for a in (*path.steps, looks.weights)]
+    if path.linked:
+        every = links(path)
+        first, behind = every.start, every.of[::-1]
+        tables = (every.share, every.fall, every.by_state, every.by_data)
+        flat = ((table.reshape(table.shape[0], -1), behind) for table in tables)
+        steps += [looks.ahead(every)[::-1], *flat]
+    else:
+        first = at_start(path)
+    before, of_data = made.reverse(path.linked)(steps, np.zeros(n + path.linked), path.backend)
+    adjoint = before[-1] if path.linked else np.append(before[-1], 0.0)
+    return first.by_state.T @ adjoint, of_data.sum(axis=0) + first.by_data.T @ adjoint
+
+
+@final
+class _Looks:
+    """Weights of the solution at times, carried to the steps.
+
+    Args:
+        path: the run.
+        times: t_j [s], increasing, shape (m,).
+        by_y: weights of y there, shape (m, n).
+
+    Attributes:
+        weights: of start, end and dense output of each step, a row each.
+    """
+
+    def __init__(self, path: Path, times: Array, by_y: Array) -> None:
+        t0, (steps, rows, n) = path.dense.t0, path.dense.D.shape
+        self.path, self.times, self.by_y = path, times, by_y
+        self.step = np.searchsorted(t0[1:], times, side="right")
+        theta = (times - t0[self.step]) / path.size[self.step]
+        total = np.zeros((steps, rows + 2, n))
+        shares = path.shares(theta)[:, :, None] * by_y[:, None, :]
+        if times.size > 1:
+            first = np.append(0, np.flatnonzero(self.step[1:] != self.step[:-1]) + 1)
+            total[self.step[first]] = np.add.reduceat(shares, first)
+        else:
+            total[self.step] = shares
+        self.weights = total.reshape(steps, -1)
+
+    def ahead(self, every: Links) -> Array:
+        """What a later start of each step adds to the sum through the places of times in it.
+
+        Of steps that jumps come before; others start at fixed times.
+        """
+        path, found = self.path, np.zeros(self.path.dense.t0.size)
+        moves = np.append(path.pieces[0].opening != (None,), every.of[:-1] > 0)
+        inside = np.flatnonzero(moves[self.step])
+        k = self.step[inside]
+        since = self.times[inside] - path.dense.t0[k]
+        slopes = path.dense.rates(k, since / (path.dense.t1 - path.dense.t0)[k])
+        falls = (1 - since / path.size[k]) * (slopes * self.by_y[inside]).sum(axis=1)
+        np.subtract.at(found, k, falls)
+        return found
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Differentiated:
+    """Derivatives along the steps of a run.
+
+    Attributes:
+        make: what was run; made when it is first needed.
+        which: by what it is differentiated.
+        names: of the signals.
+        t: times of the result [s].
+    """
+
+    make: Callable[[], Path]
+    which: Seeds
+    names: tuple[str, ...]
+    t: Array
+
+    @cached_property
+    def path(self) -> Path:
+        """What was run."""
+        return self.make()
+
+    @cached_property
+    def solution(self) -> Slopes:
+        """Derivatives of the unknowns."""
+        return forward(self.path, self.which)
+
+    def at(self, times: Array) -> dict[str, dict[str, Array]]:
+        """Derivatives of all signals: name -> signal -> values, shape (times,)."""
+        values = of_signals(self.path, self.which, self.solution.dense, times)
+        return {
+            seed: dict(zip(self.names, rows, strict=True))
+            for seed, rows in zip(self.which.names, values, strict=True)
+        }
+
+    def pull_back(self, weights: Mapping[str, Array]) -> dict[str, float]:
+        """Derivatives of a weighted sum of signals at `t`."""
+        used = {self.names.index(name): w for name, w in weights.items() if w.any()}
+        return gradient(self.path, self.which, self.t, used)
+
+    def delays(self) -> dict[str, Array]:
+        """Derivatives of the times of events."""
+        jumps = [len(jump.which) for jump in self.path.jumps]
+        times = np.repeat(self.solution.times, jumps, axis=0)
+        return dict(zip(self.which.names, times.T, strict=True))

@@ -22,7 +22,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from math import isfinite
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import casadi as ca
 import numpy as np
@@ -221,17 +221,30 @@ LEVELS = 3
 """Halvings between neighbours that are a change of pace: error control sees to less."""
 
 
+PULSE = 10.0
+"""Height of a pulse within a jump, over that of the jump."""
+BRIEF = 16
+"""Intervals of the grid that stages of one step may lie on both sides of."""
+MOST_JUMPS = 64
+"""A function with more jumps than this is looked at on the grid only."""
+HALVINGS = 60
+"""Halvings of an interval of the grid, down to rounding."""
+
 QUICKEST = 1.0
 """Percent of the span that set the pace of a function: more than what a few jumps take."""
 
 
 def onsets(function: str, t_start: float, t_end: float) -> tuple[float, ...]:
-    """Times [s] inside the span at which a function of time, a serialised SX, changes its pace."""
-    level = _looked(function, t_start, t_end)
-    if level is None:
+    """Times [s] inside the span at which a function of time, a serialised SX, changes its pace.
+
+    A jump between two times of the grid may hide a pulse, as the rate of a ramp of a picosecond
+    does: the middle of such a pulse is one of the times.
+    """
+    look = _looked(function, t_start, t_end)
+    if look is None:
         return ()
     grid = np.linspace(t_start, t_end, 2**DEPTH + 1)
-    return tuple(grid[changes(level)].tolist())
+    return tuple(sorted((*grid[changes(look.level)].tolist(), *look.pulses)))
 
 
 def pace(function: str, t_start: float, t_end: float) -> float:
@@ -239,22 +252,75 @@ def pace(function: str, t_start: float, t_end: float) -> float:
 
     A fiftieth to a hundredth of the period of a sine; inf for a straight line.
     """
-    level = _looked(function, t_start, t_end)
-    halvings = 0.0 if level is None else float(np.percentile(level, 100 - QUICKEST, method="lower"))
+    look = _looked(function, t_start, t_end)
+    halvings = 0.0
+    if look is not None:
+        halvings = float(np.percentile(look.level, 100 - QUICKEST, method="lower"))
     return (t_end - t_start) / 2.0**halvings if halvings else np.inf
 
 
+class _Look(NamedTuple):
+    """A function of time on the grid: `levels`, and the times [s] of short pulses."""
+
+    level: NDArray[np.intp]
+    pulses: tuple[float, ...]
+
+
 @lru_cache(64)
-def _looked(function: str, t_start: float, t_end: float) -> NDArray[np.intp] | None:
-    """`levels` of a function of time on the grid; None for a constant."""
+def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
+    """The look at a function of time; None for a constant."""
     expression = ca.SX.deserialize(function)
     time = ca.symvar(expression)
     if not time:
         return None
     grid = np.linspace(t_start, t_end, 2**DEPTH + 1)
-    look = Columns(ca.Function("input", time, [ca.densify(expression)]))
-    (values,) = look([grid[:, None]])
-    return levels(np.nan_to_num(values[:, 0]))
+    columns = Columns(ca.Function("input", time, [ca.densify(expression)]))
+
+    def values_at(times: Array) -> Array:
+        (found,) = columns([times[:, None]])
+        return np.nan_to_num(found[:, 0])
+
+    values = values_at(grid)
+    level = levels(values)
+    peaks = (*grid[_peaks(level, values)].tolist(), *pulses(values_at, grid, values))
+    return _Look(level, peaks)
+
+
+def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> tuple[float, ...]:
+    """Times [s] in the middle of pulses within jumps of a function that has `values` on `grid`.
+
+    The start and the end of a jump are found by bisection. It hides a pulse if the function is
+    `PULSE` times as far away in the middle as the jump is high.
+    """
+    jumps = np.flatnonzero(np.abs(np.diff(values)) > STRAIGHT * np.ptp(values))
+    if not 0 < jumps.size <= MOST_JUMPS:
+        return ()
+    before, after = values[jumps], values[jumps + 1]
+    near = STRAIGHT * np.abs(after - before)
+    edges: list[Array] = []
+    for side, (known, unlike) in enumerate(((before, jumps), (after, jumps + 1))):
+        same, other = grid[unlike].copy(), grid[jumps + 1 - side].copy()
+        for _ in range(HALVINGS):
+            middle = (same + other) / 2
+            alike = np.abs(values_at(middle) - known) <= near
+            same, other = np.where(alike, middle, same), np.where(alike, other, middle)
+        edges.append(other)
+    middle = (edges[0] + edges[1]) / 2
+    high = np.abs(values_at(middle) - before) > PULSE * np.abs(after - before)
+    return tuple(middle[high].tolist())
+
+
+def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
+    """Grid points at the peaks of pulses of up to `BRIEF` intervals, which stages may miss."""
+    deepest = np.flatnonzero(level == DEPTH)
+    found: list[int] = []
+    for run in np.split(deepest, np.flatnonzero(np.diff(deepest) > 1) + 1):
+        if 1 < run.size <= BRIEF:
+            a, b = int(run[0]), int(run[-1]) + 1
+            height = np.abs(values[a : b + 1] - values[a])
+            if height.max() > PULSE * height[-1]:
+                found.append(a + int(height.argmax()))
+    return found
 
 
 def levels(values: Array) -> NDArray[np.intp]:

@@ -185,3 +185,32 @@ def input_of(inputs: InputData, data: Array, end: float) -> InputData:
     last = int(np.searchsorted(inputs.breaks, end)) - 1
     breaks = np.append(inputs.breaks[: last + 1], end)
     return replace(inputs, breaks=breaks, values=np.ascontiguousarray(data[:, : last + 1]))
+
+
+def ends_of(t_end: float | ArrayLike) -> float | Array:
+    """The end of all members, or of each one [s]."""
+    number = checks.as_number(t_end)
+    if number is not None or isinstance(t_end, str | type):
+        return checks.number("simulate_many: t_end", t_end, unit="s")
+    what = "a number of seconds, or a sequence with that of each member"
+    ends = checks.array("simulate_many: t_end", t_end, what=what)
+    if not ends.size:
+        raise ValueError("simulate_many: expected at least one member, got empty arrays")
+    return ends
+
+
+def all_later(ends: float | Array, t_start: float) -> None:
+    """Refuse ends that are not behind the start."""
+    if np.min(ends) <= t_start:
+        raise ValueError(
+            f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
+            f"member {np.argmin(ends)}"
+        )
+
+
+def units_of(model: Model) -> dict[str, str]:
+    """Units of what may be given."""
+    found = {v.name: v.unit for v in model.p} | {"t_end": "s"}
+    for what, group in (("x0", model.x), ("u", model.u)):
+        found |= {f"{what}.{v.name}": v.unit for v in group}
+    return found

@@ -16,8 +16,11 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.running.dense import from_records
+from symfric.integrator.running.dense import Outputs, pieces_of
 from symfric.integrator.running.engine import Stop, VmEngine
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.loop import Work, filled
+from symfric.integrator.running.plants import AGAIN, REFUSED, SEARCH, Advance, Plants, loaded
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -26,6 +29,10 @@ ROWS, ATTEMPTS = 2048, 2000
 PAIRED = 2500
 """Steps of fewer instructions run in two groups of lanes at once; those of more keep the processor
 busy alone."""
+LEAST_PLANTS = 8
+"""Plants from which lanes pay."""
+MOST_INSTRUCTIONS = 10_000
+"""Steps of more instructions take compilers too long as vectors."""
 
 
 @final
@@ -78,98 +85,81 @@ class Members(Protocol):
 @final
 @dataclass(frozen=True, eq=False)
 class VmMembers:
-    """Members in CasADi's virtual machine; needs no compiler."""
+    """Members in CasADi's virtual machine, by the engine of single runs; needs no compiler."""
 
     engine: VmEngine
     signals: Columns
     follow: Following | None
-    searches: bool
 
     @classmethod
     def of(cls, step: str, signals: str, follow: Follow) -> "VmMembers":
         """From the serialised Functions of the step, of the signals and of what follows jumps."""
-        engine = VmEngine.of(ca.Function.deserialize(step))
+        engine = VmEngine.of(ca.Function.deserialize(step), follows=bool(follow))
         how = None
         if follow and follow[0]:
             how = Following(ca.Function.deserialize(follow[0]), follow[1])
-        return cls(engine, Columns(ca.Function.deserialize(signals)), how, bool(follow))
+        return cls(engine, Columns(ca.Function.deserialize(signals)), how)
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch."""
-        shape = (S.shape[0], stretch.times.shape[1], self.signals.function.numel_out(0))
-        found = np.full(shape, np.nan)
-        reason = np.zeros(S.shape[0], dtype=np.int64)
-        reach = np.stack([S[:, State.Y]] * 2, axis=1)
-        for m in range(S.shape[0]):
-            one = _Member(self, stretch, m, S[m], R[m].copy(), int(made[m]))
-            reason[m] = one.whole(found[m], reach[m])
-            made[m] = one.made
+        members, n = S.shape[0], S.shape[1] - State.MEMORY
+        step, n_d = self.engine.step, self.signals.function.numel_in(2)
+        found = np.full(
+            (members, stretch.times.shape[1], self.signals.function.numel_out(0)), np.nan
+        )
+        reason, reach = np.zeros(members, dtype=np.int64), np.stack([S[:, State.Y]] * 2, axis=1)
+        work = Work(n, step.numel_in(1), step.numel_out(1) // n, ROWS)
+        for m in range(members):
+            work.S[:], work.R[:] = S[m], R[m]
+            at, y, made[m], reason[m] = self._member(work, stretch, m, int(made[m]), reach[m])
+            S[m] = work.S
+            d = np.tile(work.R[work.R.size - n_d :], (at.size, 1))
+            d[:, n_d - work.data.shape[0] :] = work.data[:, work.interval(at)].T
+            first = int(
+                np.count_nonzero(stretch.times[m % stretch.times.shape[0]] < stretch.breaks[0])
+            )
+            found[m, first : first + at.size] = self.signals([at, y, d])[0]
         return found, reason, reach
 
+    def _member(
+        self, work: Work, stretch: Stretch, m: int, made: int, reach: Array
+    ) -> tuple[Array, Array, int, Stop]:
+        """Advance a member.
 
-@final
-class _Member:
-    """One member in the virtual machine, under way."""
-
-    def __init__(
-        self, members: VmMembers, stretch: Stretch, m: int, S: Array, R: Array, made: int
-    ) -> None:
-        self.members, self.stretch, self.S, self.R, self.made = members, stretch, S, R, made
-        self.end, self.h_min = float(stretch.ends[m]), float(stretch.h_min[m])
-        self.data = stretch.data[m if stretch.data.shape[0] > 1 else 0]
-        self.times = stretch.times[m if stretch.times.shape[0] > 1 else 0]
-
-    def whole(self, found: Array, reach: Array) -> Stop:
-        """Advance over all intervals; fills the signals, least and greatest unknowns."""
-        n_data, breaks, signals = self.data.shape[0], self.stretch.breaks, self.members.signals
-        S, R, stop = self.S, self.R, Stop.END
-        for k in range(breaks.size - 1):
-            last = k + 2 == breaks.size or breaks[k + 1] >= self.end
-            R[Given.T_END] = self.end if last else breaks[k + 1]
-            R[R.size - n_data :] = self.data[:, k]
-            if (k or self.stretch.follow) and not self.followed():
-                return Stop.SEARCH
-            from_t, y0 = S[State.T], S[State.Y].copy()
-            records, stop = self.attempts()
-            ends = from_records(records, y0.size).y1
+        Returns:
+            Times that it reached, unknowns there, attempts made, why it stopped.
+        """
+        breaks, end = stretch.breaks, stretch.ends[m]
+        breaks = np.concatenate([breaks[:1], breaks[1:][breaks[1:] < end], [end]])
+        times, data = (rows[m % rows.shape[0]] for rows in (stretch.times, stretch.data))
+        outputs = Outputs.at(times[times >= breaks[0]], work.n)
+        work.want(outputs, None)
+        work.over(breaks, data[:, : breaks.size - 1])
+        work.loop.h_min = stretch.h_min[m]
+        stop = Stop.SEARCH if stretch.follow else Stop.FULL
+        while stop in (Stop.SEARCH, Stop.FULL) or (
+            stop is Stop.ATTEMPTS and made < stretch.max_steps
+        ):
+            if stop is Stop.SEARCH and not self._follows(work):
+                break
+            allowed = min(ATTEMPTS, stretch.max_steps - made)
+            records, count, stop = self.engine.march(work, allowed)
+            ends, made = pieces_of(records, work.n).y1, made + count
             reach[0] = np.minimum(reach[0], ends.min(axis=0, initial=np.inf))
             reach[1] = np.maximum(reach[1], ends.max(axis=0, initial=-np.inf))
-            inside = (self.times >= breaks[k]) & (self.times <= S[State.T])
-            if not last:
-                inside &= self.times < breaks[k + 1]
-            at = self.times[inside]
-            y, later = np.tile(y0, (at.size, 1)), at > from_t
-            if later.any():
-                y[later] = from_records(records, y0.size)(at[later]).T
-            d = np.tile(R[R.size - signals.function.numel_in(2) :], (at.size, 1))
-            found[inside] = signals([at, y, d])[0]
-            if last or stop is not Stop.END:
-                break
-        return stop
+        if stop is not Stop.SEARCH:
+            outputs.stand(work.S[State.T], work.S[State.Y])
+        return outputs.times[: outputs.found], outputs.reached.T, made, stop
 
-    def followed(self) -> bool:
+    def _follows(self, work: Work) -> bool:
         """Whether the algebraic unknowns could follow the data that jumped."""
-        members, y = self.members, self.S[State.Y]
-        if members.follow is None:
-            return not members.searches
-        n_d = members.signals.function.numel_in(2)
-        found = members.follow(y, self.R[self.R.size - n_d :])
+        if self.follow is None:
+            return not self.engine.follows
+        y, n_d = work.S[State.Y], self.signals.function.numel_in(2)
+        found = self.follow(y, work.R[work.R.size - n_d :])
         if found is not None:
             y[:] = found
         return found is not None
-
-    def attempts(self) -> tuple[Array, Stop]:
-        """Advance over one interval; all records, why it stopped."""
-        found: list[Array] = []
-        stop, most = Stop.FULL, self.stretch.max_steps
-        while stop is Stop.FULL or (stop is Stop.ATTEMPTS and self.made < most):
-            allowed = min(ATTEMPTS, most - self.made)
-            records, count, stop = self.members.engine.run(
-                self.S, self.R, ROWS, allowed, self.h_min
-            )
-            self.made += count
-            found.append(records)
-        return np.vstack(found), stop
 
 
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_longlong
@@ -274,3 +264,34 @@ def many_source(
         jump = generator.dump() + follow.c_source
     defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
     return f"{jump}{lanes_header(lanes)}\n{of_step}{of_values}{defined}{c_text('loop.h')}"
+
+
+def pays(integrator: Integrator, plants: Plants) -> bool:
+    """Whether plants go faster side by side."""
+    return plants.S.shape[0] >= LEAST_PLANTS and integrator.instructions <= MOST_INSTRUCTIONS
+
+
+def side_by_side(integrator: Integrator, plants: Plants) -> Advance:
+    """Plants in the lanes of vectors, from sample to sample.
+
+    A lane does what `symfric.integrator.running.plants` does, but for functions like exp, which are
+    within a few units of the last place of those there (`lanes.h`). The bits of a plant depend
+    neither on the number of lanes nor on the other plants.
+
+    Raises:
+        CompileError: there is no compiler, or it failed.
+    """
+    return loaded(integrator, plants, "lanes", plants_source)
+
+
+def plants_source(integrator: Integrator) -> str:
+    """C of the step on vectors, of what follows a jump, and of the loop around them."""
+    s = integrator.system
+    nothing = ca.Function("nothing", [ca.SX.sym("t"), s.y, s.d], [ca.SX(0, 1)])
+    every = many_source(integrator.step, nothing, integrator.follows, integrator.follow)
+    numbers = {
+        "HELD": integrator.inputs.data.numel(), "REFUSED": REFUSED, "SEARCHED": SEARCH,
+        "AGAIN": AGAIN,
+    }  # fmt: skip
+    defined = "".join(f"#define {name} ({value})\n" for name, value in numbers.items())
+    return every + filled("members.h") + defined + c_text("plants.c")

@@ -62,7 +62,7 @@ class Method(ABC):
         dense_dae: order of the dense output for index-1 DAEs.
         H: dense output from the stages, shape (r, s).
         finer: how many times shorter than usual the ways are that a sliding velocity may go near
-            rest in one step (`step.watch`).
+            rest in one step (`step.attempt`).
         source: where the coefficients are from.
     """
 

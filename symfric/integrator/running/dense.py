@@ -1,4 +1,4 @@
-"""Dense output: the continuous solution between accepted steps."""
+"""Dense output: the continuous solution between accepted steps, and at the times of the result."""
 
 from dataclasses import dataclass
 from typing import final
@@ -81,11 +81,6 @@ def pieces_of(records: Array, n: int) -> Dense:
     )
 
 
-def from_records(records: Array, n: int) -> Dense:
-    """Pieces of records whose buffer may be written over."""
-    return pieces_of(records.copy(), n)
-
-
 def join(pieces: list[Dense]) -> Dense:
     """Pieces of several runs, in order."""
     if len(pieces) == 1:
@@ -97,3 +92,53 @@ def join(pieces: list[Dense]) -> Dense:
         np.concatenate([p.y1 for p in pieces]),
         np.concatenate([p.D for p in pieces]),
     )
+
+
+@final
+@dataclass(eq=False)
+class Outputs:
+    """Unknowns at increasing times; mutable, filled from the start on.
+
+    The compiled loop does what `fill` does, operation by operation (`loop.OUTPUTS`).
+
+    Attributes:
+        times: of the result [s], shape (m,).
+        values: unknowns there, shape (n, m), known for the first `found` times.
+        found: how many times were reached.
+    """
+
+    times: Array
+    values: Array
+    found: int = 0
+
+    @classmethod
+    def at(cls, times: Array, n: int) -> "Outputs":
+        """Nothing yet of `n` unknowns at `times`."""
+        times = np.ascontiguousarray(times)
+        return cls(times, np.empty((n, times.size)))
+
+    def fill(self, piece: Dense, last: bool = False) -> None:
+        """Values at the times within `piece`.
+
+        A time at its very end belongs to what follows, which an event or a break may have changed;
+        unless the run ends there, with this `last` piece.
+        """
+        end = int(np.searchsorted(self.times, piece.t1[-1], side="right" if last else "left"))
+        if end > self.found:
+            self.values[:, self.found : end] = piece(self.times[self.found : end])
+            self.found = end
+
+    def stand(self, t: float, y: Array) -> None:
+        """Values at the times up to `t` [s] that are left: a run stands there with `y`."""
+        end = int(np.searchsorted(self.times, t, side="right"))
+        self.values[:, self.found : end] = y[:, None]
+        self.found = max(self.found, end)
+
+    def back_to(self, t: float) -> None:
+        """Forget what lies behind `t` [s]: steps that were interrupted before they were kept."""
+        self.found = min(self.found, int(np.searchsorted(self.times, t, side="right")))
+
+    @property
+    def reached(self) -> Array:
+        """Unknowns at the times that were reached, shape (n, found)."""
+        return self.values[:, : self.found]

@@ -55,19 +55,13 @@ class Engine(Protocol):
         """What ran: vm or compiled."""
         ...
 
-    def run(
-        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
-    ) -> tuple[Array, int, Stop]:
-        """Advance S with one R; return the records, the attempts made and why it stopped.
-
-        A step that fell below `h_min`, or below what rounding leaves of t (`FLOOR`), stops it.
-        """
-        ...
-
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
         """Advance `work` over its input intervals, and fill its outputs.
 
-        Returns records that the next call writes over, the attempts made and why it stopped.
+        A step that fell below its `h_min`, or below what rounding leaves of t (`FLOOR`), stops it.
+
+        Returns:
+            Records that the next call writes over, the attempts made and why it stopped.
         """
         ...
 
@@ -116,22 +110,22 @@ class VmEngine:
         except IndexError:
             return _Batch(self.step, size)
 
-    def run(
+    def _attempts(
         self,
         S: Array,
         R: Array,
         rows: int,
         attempts: int,
         h_min: float,
-        events: Eventful | None = None,
-        size: int = 0,
+        events: Eventful | None,
+        size: int,
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped.
 
         With `events` these are carried out on the way; `size` attempts are made in one call.
         """
-        batch, search = self._batch(size or self.size), None if events is None else Search(events)
-        size, S_out, D = batch.size, batch.S_out, batch.D
+        batch, search = self._batch(size), None if events is None else Search(events)
+        S_out, D = batch.S_out, batch.D
         batch.R[:] = R
         found: list[Array] = []
         count = made = 0
@@ -185,7 +179,7 @@ class VmEngine:
             work.events.count = work.events.steps = 0
         while True:
             limits = loop.max_rows - count, attempts - made, loop.h_min
-            records, tried, stop = self.run(work.S, work.R, *limits, work.events, size)
+            records, tried, stop = self._attempts(work.S, work.R, *limits, work.events, size)
             size = self.size if tried > FEW else min(self.size, FEW)
             found.append(records)
             count, made = count + records.shape[0], made + tried
@@ -246,9 +240,6 @@ class CompiledEngine:
     """Attempts in a compiled loop around the generated C of the step; releases the GIL."""
 
     library: ctypes.CDLL
-    n: int
-    given: int
-    dense_rows: int
     name: str = "compiled"
 
     @classmethod
@@ -269,21 +260,7 @@ class CompiledEngine:
         library = load(source, "symfric_march")
         library.symfric_march.restype = ctypes.c_int
         library.symfric_march.argtypes = [ctypes.c_void_p]
-        return cls(library, step.numel_in(0) - State.MEMORY, step.numel_in(1), dense_rows)
-
-    def run(
-        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
-    ) -> tuple[Array, int, Stop]:
-        """Advance S; return the records, the attempts made and why it stopped."""
-        work = Work(self.n, self.given, self.dense_rows, rows)
-        work.S[:], work.R[:] = S, R
-        if S[State.T] >= R[Given.T_END]:
-            return work.rows[:0], 0, Stop.END
-        work.over(np.array([S[State.T], R[Given.T_END]]), np.zeros((0, 1)))
-        work.loop.h_min = h_min
-        records, made, stop = self.march(work, attempts)
-        S[:] = work.S
-        return records, made, stop
+        return cls(library)
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
         """Advance `work`; return records in its buffer, the attempts made and why it stopped."""

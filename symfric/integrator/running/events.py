@@ -1,7 +1,7 @@
 """Events: zero crossings in accepted steps, located, and carried out.
 
 The search in the virtual machine, and what both engines tell of it. It is written a second time in
-C (`symfric.integrator.running.search`), operation by operation.
+C (`search.c`), operation by operation.
 """
 
 from collections.abc import Callable
@@ -24,9 +24,10 @@ from symfric.integrator.running.crossings import (
     RESTART,
     SOON,
     Crossings,
+    Isolation,
     Memory,
+    passed,
 )
-from symfric.integrator.running.isolation import Isolation, passed
 from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """The adaptive integrator of one model: built once, run for any numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.compiler import CompileError
+from symfric.foundation.memory import remember
 from symfric.foundation.symbols import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
@@ -321,3 +322,21 @@ class Integrator:
             except CompileError:  # a broken compiler is no reason not to simulate
                 self.prospect.hopeless = True
         return self.vm()
+
+
+REMEMBERED = 16
+"""Integrators kept per model; the oldest goes first."""
+
+
+def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, bool]:
+    """The integrator of this model, structure of inputs and method; whether it was built just now.
+
+    The model holds it, not a table of models: an integrator refers to its model, and a table would
+    keep both alive for ever.
+    """
+    known: dict[Hashable, Integrator] = model.memory.setdefault("integrators", {})
+    key = (method.name, method.finer, inputs.key)
+    found = known.get(key)
+    if found is not None:
+        return found, False
+    return remember(known, key, Integrator(model, inputs, method), REMEMBERED), True

@@ -1,11 +1,15 @@
-"""The compiled loop around the step, in pieces of C: attempts, outputs, input intervals.
+"""The compiled loop around the step, in pieces of C: attempts, events, outputs, input intervals.
 
-`attempts` makes steps with one set of run data; `march` goes with it from input interval to input
+`attempts.c` makes steps with one set of run data, and looks for events behind them by `search.c`,
+which does what `running.events` does in Python; `march.c` goes on from input interval to input
 interval and writes the unknowns at the times of the result on the way. What it needs stands in one
-struct, so that a call from Python hands over one address (`Work`).
+struct, so that a call from Python hands over one address (`Work`). These files are templates: what
+begins with a dollar is filled in.
 """
 
 import ctypes
+from collections.abc import Iterable
+from pathlib import Path
 from string import Template
 from typing import final
 
@@ -15,12 +19,22 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import address
 from symfric.integrator.equations.following import Following
-from symfric.integrator.equations.initial import FLOOR
-from symfric.integrator.running.crossings import Crossings
+from symfric.integrator.equations.initial import FLOOR, SURE
+from symfric.integrator.running.crossings import (
+    ALIKE,
+    FINER,
+    KEPT,
+    LEAST,
+    LOOKS,
+    RESTART,
+    SHARPER,
+    SOON,
+    STRAIGHT,
+    Crossings,
+)
+from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.events import Eventful
-from symfric.integrator.running.outputs import Outputs
-from symfric.integrator.running.search import search_source
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 
 Array = NDArray[np.float64]
 MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20
@@ -84,6 +98,10 @@ class Work:
             loop.breaks, loop.data = self.breaks.ctypes.data, self.data.ctypes.data
         self.enter(0)
 
+    def interval(self, times: Array) -> NDArray[np.intp]:
+        """Number of the input interval of each time; at a break the later one."""
+        return np.searchsorted(self.breaks[1:-1], times, side="right")
+
     def enter(self, interval: int) -> None:
         """Begin an input interval: its end and its data."""
         self.loop.interval = interval
@@ -100,6 +118,12 @@ class Work:
             loop.memory, loop.jumps, loop.max_jumps = events.pointers
 
 
+def filled(name: str, /, **numbers: object) -> str:
+    """C of a template of this folder."""
+    text = Path(__file__).with_name(name).read_text(encoding="utf-8")
+    return Template(text).substitute(numbers)
+
+
 def c_source(
     step: ca.Function,
     dense_rows: int,
@@ -112,10 +136,19 @@ def c_source(
     of the search for them in its code.
     """
     generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
-    for function in (step, *(crossings.functions if crossings else ()), *others):
+    called = (step, *(crossings.functions if crossings else ()))
+    for function in (*called, *others):
         generator.add(function)
-    attempts = Template(ATTEMPTS).substitute(_numbers(step, dense_rows, crossings))
-    return generator.dump() + search_source(crossings, step.numel_in(1)) + attempts
+    n, given = step.numel_in(0) - State.MEMORY, step.numel_in(1)
+    attempts = filled(
+        "attempts.c",
+        n=n, memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, given=given,
+        width=width(n, dense_rows), dense=2 + 2 * n, dense_rows=dense_rows, floor=repr(FLOOR),
+        jump=crossings.width if crossings else 0, searches=int(crossings is not None),
+        arg=step.sz_arg(), res=step.sz_res(),
+        iw=max(1, *(f.sz_iw() for f in called)), w=max(1, *(f.sz_w() for f in called)),
+    )  # fmt: skip
+    return generator.dump() + search_source(crossings, given) + attempts
 
 
 def loop_source(
@@ -133,185 +166,58 @@ def loop_source(
         follows: whether there are algebraic unknowns, which follow a jump of inputs.
         follow: how; where it is left out, the loop returns at each jump, and at each event.
     """
-    numbers = _numbers(step, dense_rows, crossings)
-    numbers |= {"followed": "\n      return 7;" if follows else "", "settled": ""}
-    if follow is not None:
-        data = step.numel_in(1) - follow.round.numel_in(1)
-        call = f"symfric_follow(L->S + {State.MEMORY}, L->R + {data})"
-        numbers["followed"] = f"\n      if ({call}) return 7;"
-        if crossings is not None and not crossings.closes:
-            place = {"call": call, "jump": crossings.width}
-            numbers["settled"] = Template(SETTLED).substitute(numbers, **place)
-    pieces = Template(STRUCT + OUTPUTS + MARCH).substitute(numbers)
     others = () if follow is None else (follow.round,)
+    march = filled(
+        "march.c",
+        follows=0 if not follows else 1 if follow is None else 2,
+        settles=int(follow is not None and crossings is not None and not crossings.closes),
+        data=0 if follow is None else follow.round.numel_in(1),
+    )
     jump = "" if follow is None else follow.c_source
-    return c_source(step, dense_rows, *others, crossings=crossings) + jump + pieces
+    return c_source(step, dense_rows, *others, crossings=crossings) + jump + march
 
 
-def _numbers(
-    step: ca.Function, dense_rows: int, crossings: Crossings | None
-) -> dict[str, str | int]:
-    """What the C below leaves open."""
-    n, given = step.numel_in(0) - State.MEMORY, step.numel_in(1)
-    called = (step, *(crossings.functions if crossings else ()))
-    hooks = dict.fromkeys(EVENTS, "")
-    if crossings is not None:
-        place = {"jump": crossings.width}
-        hooks = {name: Template(code).substitute(place) for name, code in EVENTS.items()}
-    return hooks | {
-        "n": n,
-        "memory": State.MEMORY,
-        "t": State.T,
-        "h": State.H,
-        "t_end": Given.T_END,
-        "given": given,
-        "width": width(n, dense_rows),
-        "dense": 2 + 2 * n,
-        "dense_rows": dense_rows,
-        "floor": repr(FLOOR),
-        "arg": step.sz_arg(),
-        "res": step.sz_res(),
-        "iw": max(1, *(f.sz_iw() for f in called)),
-        "w": max(1, *(f.sz_w() for f in called)),
-    }
+def search_source(crossings: Crossings | None, given: int) -> str:
+    """C of the search in an accepted step, to be called behind it; none without events.
+
+    `given` is the length of R.
+    """
+    if crossings is None:
+        return ""
+    functions, m = crossings.functions, len(crossings.resets)
+    return filled(
+        "search.c",
+        n=crossings.record.n,
+        events=crossings.count,
+        looks=len(LOOKS) - 1,
+        resets=m,
+        row=crossings.record.width,
+        y0=crossings.record.y0.start,
+        y1=crossings.record.y1.start,
+        at_looks=", ".join(map(repr, LOOKS)),
+        directions=_table(crossings.directions),
+        terminal=_table(crossings.terminal),
+        by_event=_table(i for i, _ in crossings.resets),
+        of_state=_table(j for _, j in crossings.resets),
+        kept=KEPT,
+        alike=ALIKE,
+        finer=FINER,
+        sharper=repr(SHARPER),
+        soon=repr(SOON),
+        straight=repr(STRAIGHT),
+        restart=repr(RESTART),
+        least=repr(LEAST),
+        sure=repr(SURE),
+        growth=repr(GROWTH_MEMORY),
+        memory=State.MEMORY,
+        d=given - crossings.data,
+        h_max=Given.H_MAX,
+        follows=int(crossings.follows),
+        arg=max(f.sz_arg() for f in functions),
+        res=max(f.sz_res() for f in functions),
+    )
 
 
-ATTEMPTS = """
-/* Attempts from S towards R[T_END]; a row (t0, t1, y0, y1, D) per accepted step. */
-static int symfric_run(double *S, const double *R, double *rows, long long max_rows,
-                       long long max_attempts, double h_min, long long *counts$parameters)
-{
-  enum { N = $n, MEM = $memory, WIDTH = $width, T = $t, H = $h, T_END = $t_end };
-  double next[MEM + N], w[$w];
-  casadi_int iw[$iw];
-  const double *arg[$arg];
-  double *res[$res];
-  long long i, count = 0, made = 0;$variables
-  while (S[T] < R[T_END] && count < max_rows && made < max_attempts
-         && S[H] >= h_min && S[H] >= $floor * fabs(S[T])$condition) {
-    double *row = rows + count * WIDTH;
-    arg[0] = S;
-    arg[1] = R;
-    res[0] = next;
-    res[1] = row + $dense;
-    symfric_step(arg, res, iw, w, 0);
-    ++made;
-    if (next[T] > S[T]) {
-      row[0] = S[T];
-      row[1] = next[T];
-      for (i = 0; i < N; ++i) {
-        row[2 + i] = S[MEM + i];
-        row[2 + N + i] = next[MEM + i];
-      }
-      ++count;$search
-    }
-    for (i = 0; i < MEM + N; ++i) S[i] = next[i];
-  }
-  counts[0] = count;
-  counts[1] = made;$found
-  if (S[T] >= R[T_END]) return 0;
-  if (!(S[H] >= h_min && S[H] >= $floor * fabs(S[T]))) return 3;
-  return count >= max_rows$full ? 1 : 2;
-}
-"""
-
-EVENTS = {
-    "parameters": """,
-                       double *memory, double *jumps, long long max_jumps""",
-    "variables": """
-  long long jumped = 0;
-  int stop = 0, happened;""",
-    "condition": """
-         && jumped < max_jumps && !stop""",
-    "search": """
-      happened = symfric_search(row, next, R, memory, jumps + jumped * $jump, count - 1, iw, w,
-                                &stop);
-      jumped += happened >= CUT;
-      count -= happened == DROPPED;""",
-    "found": """
-  counts[2] = jumped;
-  if (stop) return stop;""",
-    "full": " || jumped >= max_jumps",
-    "handed": """,
-                       L->memory, L->jumps + L->jumped * $jump, L->max_jumps - L->jumped""",
-    "noted": """
-    for (i = 0; i < counts[2]; ++i) L->jumps[(L->jumped + i) * $jump] += (double)L->count;
-    L->jumped += counts[2];""",
-    "entered": """
-      if (L->memory[PHASE] == ON) L->memory[PHASE] = JUMPED;""",
-    "no_room": " || L->jumped == L->max_jumps",
-}
-"""What a model with events adds to the attempts, and to what calls them."""
-
-SETTLED = """
-    if (stop == 6 && !$call) {
-      double *after = L->jumps + (L->jumped - 1) * $jump + 2 + $n;
-      for (i = 0; i < $n; ++i) after[i] = L->S[$memory + i];
-      stop = 1;
-    }"""
-"""Algebraic unknowns behind an event; where they have to be searched for, the loop returns."""
-
-STRUCT = """
-/* A run under way: buffers, limits, and how far it is. */
-typedef struct {
-  double *S, *R, *rows;
-  const double *times;
-  double *out;
-  const double *breaks, *data;
-  double *memory, *jumps;
-  double h_min;
-  long long max_rows, max_attempts, max_jumps, n_times, found, intervals, interval, n_data;
-  long long count, made, jumped;
-} symfric_loop;
-"""
-
-OUTPUTS = """
-/* Unknowns at the times within an accepted step, out[unknown][time]; at its end if it is last. */
-static void symfric_outputs(symfric_loop *L, const double *row, int last)
-{
-  enum { N = $n, ROWS = $dense_rows };
-  long long i, r;
-  for (; L->found < L->n_times; ++L->found) {
-    const double time = L->times[L->found];
-    double s;
-    if (!(time < row[1] || (last && time == row[1]))) return;
-    s = (time - row[0]) / (row[1] - row[0]);
-    for (i = 0; i < N; ++i) {
-      double bend = 0.;
-      for (r = ROWS - 1; r >= 0; --r) bend = row[2 + 2 * N + r * N + i] + s * bend;
-      L->out[i * L->n_times + L->found] =
-          (1. - s) * row[2 + i] + s * (row[2 + N + i] + (1. - s) * bend);
-    }
-  }
-}
-"""
-
-MARCH = """
-/* Steps over all input intervals, up to a full record, a number of attempts, a tiny step, or what
-   events ask for; 7 where algebraic unknowns have to be searched for behind a jump of inputs. */
-int symfric_march(symfric_loop *L)
-{
-  enum { WIDTH = $width, T_END = $t_end, GIVEN = $given };
-  L->count = L->made = L->jumped = 0;
-  for (;;) {
-    double *row = L->rows + L->count * WIDTH;
-    long long counts[3], i;
-    int stop = symfric_run(L->S, L->R, row, 1, L->max_attempts - L->made, L->h_min, counts$handed);
-    L->made += counts[1];$noted$settled
-    if (counts[0]) {
-      ++L->count;
-      symfric_outputs(L, row, stop == 0 && L->interval + 1 == L->intervals);
-    }
-    if (stop >= 3) return stop;
-    if (stop == 0) {
-      if (L->interval + 1 == L->intervals) return 0;
-      ++L->interval;
-      L->R[T_END] = L->breaks[L->interval + 1];
-      for (i = 0; i < L->n_data; ++i)
-        L->R[GIVEN - L->n_data + i] = L->data[i * L->intervals + L->interval];$entered$followed
-    }
-    if (L->count == L->max_rows$no_room) return 1;
-    if (L->made == L->max_attempts) return 2;
-  }
-}
-"""
+def _table(values: Iterable[int]) -> str:
+    """Entries of a C array, which has at least one."""
+    return ", ".join(str(int(value)) for value in values) or "0"

@@ -7,7 +7,6 @@ order: a loop in C around the generated step, and one in Python around CasADi's 
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from string import Template
 from time import perf_counter
 from typing import Any, cast, final
 
@@ -19,6 +18,10 @@ from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
+from symfric.integrator.running import loop
+from symfric.integrator.running.dense import Outputs
+from symfric.integrator.running.engine import Engine, Stop
+from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
 
@@ -92,7 +95,7 @@ SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
 
 
 class _Members(ctypes.Structure):
-    """`symfric_members` of the C below."""
+    """`symfric_members` of members.h."""
 
     _fields_ = (
         *((name, ctypes.c_longlong) for name in ("members", "attempts")),
@@ -195,98 +198,130 @@ def _large(S: Array, h_min: float) -> bool:
     return bool(h >= h_min and h >= FLOOR * abs(S[State.T]))
 
 
+EVENTFUL_ATTEMPTS = 50_000
+"""Attempts of one call of an engine."""
+WHY = {Stop.END: END, Stop.STEP_TOO_SMALL: STEP_TOO_SMALL, Stop.TERMINAL: OVER, Stop.STORM: STORM}
+
+
+def with_events(
+    integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
+) -> Advance:
+    """The loop for models with events, one plant after the other by an engine of runs.
+
+    Python stands between the samples, and between what events ask for; the search for them is the
+    engine's (`symfric.integrator.running.events`).
+
+    Args:
+        integrator, plants: what goes on.
+        engine: that makes the steps.
+        tolerance: of event times [s].
+    """
+    return _Eventful(integrator, plants, engine, tolerance).advance
+
+
+@final
+class _Eventful:
+    """Buffers of the plant that is under way."""
+
+    def __init__(
+        self, integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
+    ) -> None:
+        self.integrator, self.plants, self.engine = integrator, plants, engine
+        system, rows = integrator.system, integrator.tableau.H.shape[0]
+        if integrator.crossings is None:
+            raise ValueError(f"plants of '{integrator.model.name}': expected a model with events")
+        self.work = loop.Work(system.n, integrator.step.numel_in(1), rows)
+        self.events = Eventful(integrator.crossings, tolerance)
+        self.work.want(Outputs.at(np.zeros(0), system.n), self.events)
+        self.work.over(np.zeros(2), np.zeros((0, 1)))
+        self.work.loop.h_min = plants.h_min
+        self.data = Given.d(system.nx)
+
+    def advance(self, begin: int) -> int:
+        """As `Advance`."""
+        plants = self.plants
+        if begin and not np.isfinite(plants.u).all():
+            return REFUSED
+        if begin:
+            plants.happened.clear()
+        for b in range(plants.S.shape[0]):
+            if plants.why[b] == OVER or not (begin or plants.why[b] == AGAIN):
+                continue
+            self.work.S[:], self.work.R[:] = plants.S[b], plants.R[b]
+            self.events.memory[:] = plants.memory[b]
+            first = bool(plants.ready[b])
+            follows = self._takes_over(b, first) if begin else True
+            plants.why[b] = self._runs(b) if follows else SEARCH
+            plants.S[b], plants.R[b] = self.work.S, self.work.R
+            plants.memory[b] = self.events.memory
+        return int(np.count_nonzero(plants.why > 0))
+
+    def _takes_over(self, b: int, first: bool) -> bool:
+        """New inputs and the time of the next sample; whether algebraic unknowns could follow."""
+        plants, S, R = self.plants, self.work.S, self.work.R
+        plants.count[b] += S[State.T] >= R[Given.T_END]
+        plants.made[b] = plants.ready[b] = 0
+        R[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
+        R[R.size - plants.u.shape[1] :] = plants.u[b]
+        if first:
+            self._before_start()
+            return True
+        self.events.entered()
+        return self._follow()
+
+    def _before_start(self) -> None:
+        """Events that have happened by the start have values as if just before it."""
+        events = self.integrator.model.events
+        if any(event.at_start for event in events):
+            S, d = self.work.S, self.work.R[self.data]
+            now = self.integrator.events(S[State.T], S[State.Y], d).full().ravel()
+            signs = [-e.direction if e.at_start else x for e, x in zip(events, now, strict=True)]
+            self.events.jumped(np.array(signs))
+
+    def _follow(self) -> bool:
+        """Whether algebraic unknowns could follow a jump."""
+        follow = self.integrator.follow
+        if follow is None:
+            return True
+        found = follow(self.work.S[State.Y], self.work.R[self.data])
+        if found is not None:
+            self.work.S[State.Y] = found
+        return found is not None
+
+    def _runs(self, b: int) -> int:
+        """Steps and events up to the sample; why they ended."""
+        plants, manifold = self.plants, self.integrator.system.manifold
+        events = self.integrator.model.events
+        while plants.made[b] < plants.attempts:
+            allowed = min(EVENTFUL_ATTEMPTS, plants.attempts - int(plants.made[b]))
+            _, made, stop = self.engine.march(self.work, allowed)
+            plants.made[b] += made
+            jumps = self.events.jumps(0)
+            for t, which in zip(jumps.t.tolist(), jumps.which, strict=True):
+                plants.happened += [(b, t, events[int(i)].name) for i in np.flatnonzero(which)]
+            if stop in WHY:
+                return WHY[stop]
+            if stop is Stop.FOLLOW:
+                moved = any(events[int(i)].reset for i in np.flatnonzero(jumps.which[-1]))
+                if (moved and manifold is not None and manifold.m) or not self._follow():
+                    return SEARCH
+        return ATTEMPTS
+
+
 def c_source(integrator: Integrator) -> str:
     """C of the step, of what follows a jump, and of the loop around them."""
-    step, follow = integrator.step, integrator.follow
-    nx, n_d = integrator.system.nx, integrator.system.d.numel()
-    nu = integrator.inputs.data.numel()
-    generator = ca.CodeGenerator("symfric_plants.c", {"static_aux": True})
-    generator.add(step)
-    if follow is not None:
-        generator.add(follow.round)
-    own = _FOLLOWS_NOTHING if follow is None else follow.c_source
-    loop = Template(MEMBERS + _LOOP).substitute(
-        columns=step.numel_in(0), given=step.numel_in(1), nu=nu,
-        memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, floor=repr(FLOOR),
-        data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
-        attempts=ATTEMPTS, too_small=STEP_TOO_SMALL, search=SEARCH, again=AGAIN, refused=REFUSED,
-        arg=step.sz_arg(), res=step.sz_res(), iw=max(1, step.sz_iw()), w=max(1, step.sz_w()),
+    follow, nx = integrator.follow, integrator.system.nx
+    n_d, nu = integrator.system.d.numel(), integrator.inputs.data.numel()
+    others = () if follow is None else (follow.round,)
+    attempts = loop.c_source(integrator.step, integrator.tableau.H.shape[0], *others)
+    plants = loop.filled(
+        "plants.c",
+        nu=nu, data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
+        follows=int(follow is not None), search=SEARCH, again=AGAIN, refused=REFUSED,
     )  # fmt: skip
-    return generator.dump() + own + loop
-
-
-_FOLLOWS_NOTHING = """
-static int symfric_follow(double *y, const double *d) { return 0; }
-"""
-
-MEMBERS = """
-typedef struct {
-  long long members, attempts;
-  double dt, h_min;
-  double *S, *R, *u, *begin;
-  long long *count, *ready, *why, *made;
-} symfric_members;
-"""
-
-_LOOP = """
-enum { COLUMNS = $columns, GIVEN = $given, NU = $nu, MEM = $memory, T = $t, H = $h,
-       T_END = $t_end, DATA = $data, HELD = $held };
-
-/* Attempts towards R[T_END]; why they ended. */
-static int symfric_runs(const symfric_members *m, double *S, const double *R, long long *made)
-{
-  double next[COLUMNS], w[$w];
-  casadi_int iw[$iw];
-  const double *arg[$arg];
-  double *res[$res];
-  long long tried = 0;
-  int i;
-  while (S[T] < R[T_END] && tried < m->attempts
-         && S[H] >= m->h_min && S[H] >= $floor * fabs(S[T])) {
-    arg[0] = S;
-    arg[1] = R;
-    res[0] = next;
-    res[1] = 0;
-    symfric_step(arg, res, iw, w, 0);
-    ++tried;
-    for (i = 0; i < COLUMNS; ++i) S[i] = next[i];
-  }
-  *made += tried;
-  if (S[T] >= R[T_END]) return 0;
-  return S[H] >= m->h_min && S[H] >= $floor * fabs(S[T]) ? $attempts : $too_small;
-}
-
-/* New inputs and the time of the next sample; whether algebraic unknowns could follow. */
-static int symfric_takes_over(const symfric_members *m, long long b)
-{
-  double *R = m->R + b * GIVEN;
-  int i;
-  m->count[b] += m->S[b * COLUMNS + T] >= R[T_END];
-  m->made[b] = 0;
-  R[T_END] = m->begin[b] + m->count[b] * m->dt;
-  for (i = 0; i < NU; ++i) R[HELD + i] = m->u[b * NU + i];
-  return m->ready[b] || !symfric_follow(m->S + b * COLUMNS + MEM, R + DATA);
-}
-
-/* All plants go to their next sample; how many did not get there. */
-long long symfric_plants(const symfric_members *m, int begin)
-{
-  long long b, failed = 0;
-  if (begin)
-    for (b = 0; b < m->members * NU; ++b)
-      if (!(m->u[b] - m->u[b] == 0)) return $refused;
-  for (b = 0; b < m->members; ++b) {
-    if (begin && !symfric_takes_over(m, b)) {
-      m->why[b] = $search;
-    } else if (begin || m->why[b] == $again) {
-      m->ready[b] = 0;
-      m->why[b] = symfric_runs(m, m->S + b * COLUMNS, m->R + b * GIVEN, m->made + b);
-    }
-    failed += m->why[b] != 0;
-  }
-  return failed;
-}
-"""
+    return (
+        attempts + ("" if follow is None else follow.c_source) + loop.filled("members.h") + plants
+    )
 
 
 @final
@@ -354,31 +389,11 @@ def look_source(integrator: Integrator) -> str:
     function, nx = integrator.signals, integrator.system.nx
     generator = ca.CodeGenerator("symfric_look.c", {"static_aux": True})
     generator.add(function)
-    loop = Template(MEMBERS + _LOOK).substitute(
+    look = loop.filled(
+        "look.c",
         columns=integrator.step.numel_in(0), given=integrator.step.numel_in(1),
         memory=State.MEMORY, t=State.T, data=Given.d(nx).start, rows=function.numel_out(0),
         arg=function.sz_arg(), res=function.sz_res(), name=function.name(),
         iw=max(1, function.sz_iw()), w=max(1, function.sz_w()),
     )  # fmt: skip
-    return generator.dump() + loop
-
-
-_LOOK = """
-/* The signals of every plant where it stands. */
-void symfric_look(const symfric_members *m, double *out)
-{
-  double w[$w];
-  casadi_int iw[$iw];
-  const double *arg[$arg];
-  double *res[$res];
-  long long b;
-  for (b = 0; b < m->members; ++b) {
-    const double *S = m->S + b * $columns;
-    arg[0] = S + $t;
-    arg[1] = S + $memory;
-    arg[2] = m->R + b * $given + $data;
-    res[0] = out + b * $rows;
-    $name(arg, res, iw, w, 0);
-  }
-}
-"""
+    return generator.dump() + loop.filled("members.h") + look

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
-from symfric.integrator.running.dense import Dense, join, pieces_of
+from symfric.integrator.running.dense import Dense, Outputs, join, pieces_of
 from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.outputs import Outputs
 
 Array = NDArray[np.float64]
 MOST_BYTES = 64 * 2**20

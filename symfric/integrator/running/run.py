@@ -1,4 +1,10 @@
-"""Drive an integrator from start to end: input intervals, events, progress, failures."""
+"""Drive an integrator from start to end: input intervals, events, progress, failures.
+
+Tolerances follow the size of the motion: absolute ones are fractions of each state's nominal value,
+which is a guess of the model: a decimetre, a turn. A motion of a micrometre would be resolved to a
+hundredth of itself, one of a nanometre not at all. So a run that turns out to be that small is run
+again on its own scale.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,17 +20,46 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pace
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.loop import Work
-from symfric.integrator.running.outputs import Outputs
 from symfric.integrator.running.record import MOST_BYTES, Run
-from symfric.integrator.running.sizes import ROUNDS, ample, finer
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
+SMALL, REST = 1e-3, 1e-12
+"""Sizes, in nominal values, below which a motion has a scale of its own and is none any more: what
+is left then is the rounding of states it is coupled to."""
+
+ROUNDS = 3
+"""How often: a motion that was not resolved at all may have been taken for a larger one."""
+
+
+def ample(run: Run, nominal: Array) -> bool:
+    """Whether no state of a run is small all the time: most do not even end small."""
+    # few numbers: quicker than by NumPy
+    ends = zip(run.end.tolist(), nominal.tolist(), strict=False)
+    return all(
+        abs(end) >= SMALL * typical or run.farthest(i) >= SMALL * typical
+        for i, (end, typical) in enumerate(ends)
+    )
+
+
+def own_scale(size: Array, nominal: Array) -> Array:
+    """Typical magnitudes: `nominal`, or the `size` of what moves far less."""
+    small = (size < SMALL * nominal) & (size > REST * nominal)
+    return np.where(small, size, nominal)
+
+
+def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
+    """The scale of another run of a motion of this `size`; None where `scale` serves."""
+    own = np.minimum(scale, own_scale(size, nominal))
+    return own if (own < 0.1 * scale).any() else None
+
+
 PACES = 8
 """Straight pieces of an input that a step may pass with events, which look at its quarters."""
 
@@ -78,7 +113,7 @@ def integrate(
 ) -> Run:
     """Integrate over all input intervals, with outputs at `times`; the run holds what was reached.
 
-    A motion that turns out to be tiny is integrated again on its own scale (`sizes`).
+    A motion that turns out to be tiny is integrated again on its own scale.
     """
     nominal = integrator.system.nominal
     if integrator.model.events:

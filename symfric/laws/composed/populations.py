@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import ClassVar, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -322,3 +323,61 @@ class RandomBristles(Population):
     def _draw(self, random: np.random.Generator) -> tuple[Array, Array]:
         r = random.uniform(-1.0, 1.0, self.count)
         return r[None] * self.delta_s, r
+
+
+def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
+    """Force in steady sliding [N] at the velocities `v` [m/s].
+
+    Further inputs of the law have their values `Input.steady`, with the sign of v where the law is
+    odd: an applied force pulls forward.
+    """
+    if isinstance(law, Population):
+        return law.steady_force(v, N)
+    ahead: Scalar = smooth.sign(v, 0.0) if law.facts.odd else 1.0
+    given = {i.name: i.steady * ahead for i in law.inputs}
+    force = law.force(v, N, law.steady_state(v, N), **given)
+    return np.array(np.broadcast_to(force, v.shape), dtype=float)
+
+
+def steady_inputs(law: AnyLaw) -> str:
+    """The further inputs behind `steady_force` as text: ", F_e = 1 N"; empty where there are none.
+
+    For an odd law these are the values at v > 0.
+    """
+    return "".join(f", {i.name} = {i.steady:g} {i.unit}" for i in law.inputs)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """CasADi instructions, those of inputs and outputs included.
+
+    Attributes:
+        value: of force and rate together, or of one contact of a population.
+        gradient: of their derivatives by v, N, the states and further inputs.
+    """
+
+    value: int
+    gradient: int
+
+
+def cost(law: AnyLaw) -> Cost:
+    """The cost of `law` with the numbers it holds, common parts counted once."""
+    v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    if isinstance(law, Population):
+        r, dt = ca.SX.sym("r"), ca.SX.sym("dt")
+        arguments, results = ca.vertcat(v, N, z, r, dt), law.contact(z, r, v * dt, dt, N)
+        return _cost(arguments, results)
+    given = {i.name: ca.SX.sym(i.name) for i in law.inputs}
+    arguments = ca.vertcat(v, N, z, *given.values())
+    results = ca.vertcat(law.force(v, N, z, **given), law.rate(v, N, z, **given))
+    return _cost(arguments, results)
+
+
+def _cost(arguments: ca.SX, results: ca.SX) -> Cost:
+    return Cost(
+        _instructions(arguments, results), _instructions(arguments, ca.jacobian(results, arguments))
+    )
+
+
+def _instructions(arguments: ca.SX, results: ca.SX) -> int:
+    return ca.Function("law", [arguments], [ca.cse(results)]).n_instructions()

@@ -10,7 +10,7 @@ from symfric.foundation.parameters import Variable
 from symfric.laws import LuGre
 from symfric.model import Model
 from symfric.scenes import Arm
-from symfric.scenes.drive import Drive
+from symfric.scenes.blocks import Drive
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from symfric import GMS, BoucWen, Dahl, LuGre, law_from_text, simulate
 from symfric.foundation.parameters import Variable, parameters
 from symfric.integrator import Linear
 from symfric.laws import Law
-from symfric.laws.steady import steady_force
+from symfric.laws.composed.populations import steady_force
 from symfric.model import Model, Output
 
 T = np.linspace(0.0, 1.0, 801)

@@ -13,7 +13,7 @@ from identification.unknowns.subject import Subject, subject
 from symfric import LuGre, Stribeck, rabinowicz, simulate
 from symfric.foundation.parameters import with_values
 from symfric.integrator import Linear
-from symfric.scenes.drive import Drive
+from symfric.scenes.blocks import Drive
 from symfric.scenes.linkages import FourBar
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from identification.unknowns.subject import subject
 from symfric import Asymmetric, LuGre, Stribeck, law_from_text
 from symfric.foundation.parameters import parameters
 from symfric.laws import Law
-from symfric.laws.steady import steady_force
+from symfric.laws.composed.populations import steady_force
 
 V = np.array([-0.2, -0.03, -0.004, 0.002, 0.02, 0.1])
 

@@ -11,7 +11,7 @@ from identification.residuals.points import Points
 from symfric import Dahl, Stribeck
 from symfric.bench.identification_measured import FRANKA, franka
 from symfric.bench.identification_memory import gms
-from symfric.laws.steady import steady_force
+from symfric.laws.composed.populations import steady_force
 
 
 def test_points_take_three_lines_of_a_user() -> None:

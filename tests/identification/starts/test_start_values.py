@@ -9,7 +9,7 @@ from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import LuGre, Stribeck
 from symfric.laws.base.law import Law
 from symfric.laws.catalogue import ALL_LAWS
-from symfric.laws.steady import steady_force
+from symfric.laws.composed.populations import steady_force
 from symfric.scenes import Drive
 
 T = 2.5e-3 * np.arange(4000)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import symfric
-from symfric.cli.commands import COMMANDS, MODULES
+from symfric.cli.app import COMMANDS, MODULES
 
 ROOT = Path(symfric.__file__).parents[1]
 FRONTS = [
@@ -81,7 +81,7 @@ def test_version_and_help_load_no_command() -> None:
 def test_simulating_on_a_belt_loads_neither_mechanisms_nor_processes() -> None:
     """And a room called as what it hands out, loaded before it, does not stand for it."""
     code = (
-        "import symfric.integrator.simulate, symfric.scenes.rabinowicz, sys, symfric as sf;"
+        "import symfric.integrator.simulate, symfric.scenes.blocks, sys, symfric as sf;"
         "sf.integrator.simulate(sf.scenes.rabinowicz(sf.BrownMcPhee()), 0.1); print(*sys.modules)"
     )
     loaded = fresh(code).split()

@@ -35,8 +35,8 @@ TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     *(("symfric/scenes/rigs.py", name, GMS) for name in ("_CURVE", "_BRISTLE", "_LEVELS")),
     ("symfric/gallery/quarter_car_friction/rig.py", "M_B", CAR),
     ("symfric/gallery/quarter_car_friction/rig.py", "THETA", CAR),
-    ("symfric/gallery/quarter_car_friction/readings.py", "RESIDUAL", CAR),
-    ("symfric/gallery/quarter_car_friction/readings.py", "RANGE", CAR),
+    ("symfric/gallery/quarter_car_friction/rig.py", "RESIDUAL", CAR),
+    ("symfric/gallery/quarter_car_friction/rig.py", "RANGE", CAR),
     ("symfric/gallery/quarter_car_friction/rig.py", "STAGES", CAR),
     ("symfric/gallery/quarter_car_friction/rig.py", "FRICTION", CAR),
     *((TUNING + "four_mass.py", name, FOUR) for name in ("MU", "V_T")),
@@ -48,7 +48,7 @@ MACHINES = {
     "symfric/scenes/spatial.py": (
         tuple(f"FourMass.{name}" for name in ("m_1", "m_3", "k", "k_4", "v_4", "g")), FOUR
     ),
-    "symfric/scenes/slider_crank.py": (
+    "symfric/scenes/linkages.py": (
         ("m_crank", "m_slider", "J", "r", "l", "b", "c", "e", "a", "R", "omega", "g"), CRANK
     ),
     "symfric/scenes/rigs.py": (("QuarterCar.L_d", "QuarterCar.middle"), CAR),
@@ -124,7 +124,7 @@ def test_a_changed_number_and_a_changed_law_change_a_verdict() -> None:
     """One of each kind, in the figure that shows it."""
     table = Job("symfric/gallery/selection/tables.py", "PRINTED", 1, "", ("selection/fig_02",))
     machine = Job(SELECTION + "box.py", "M_BOX", 0, "", ("selection/fig_06",))
-    law = Job("symfric/laws/static/quarter_car.py", "QuarterCarSimple", -1, "force",
+    law = Job("symfric/laws/static/machines.py", "QuarterCarSimple", -1, "force",
               ("quarter_car_friction/fig_13",))  # fmt: skip
     told = verdicts([table, machine, law])
     assert "S is that of table 4" in told[str(table)]

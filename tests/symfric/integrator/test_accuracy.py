@@ -13,7 +13,7 @@ from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
 from symfric.integrator import simulate_by_peer
-from symfric.integrator.peers.casadi_integrators import PEERS
+from symfric.integrator.by_peer import PEERS
 
 Array = NDArray[np.float64]
 SPAN = 20.0

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, Hold, Model, Trajectory, Variable, contact, simulate
-from symfric.integrator.measured import differences_of_derivatives
+from symfric.integrator.simulate import differences_of_derivatives
 from symfric.model import Event
 from symfric.scenes import rabinowicz
 

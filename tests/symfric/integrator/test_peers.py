@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from symfric import Model, Variable
+from symfric.integrator.by_peer import Peer, peer
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.peers.casadi_integrators import Peer, peer
 from symfric.integrator.running.run import Tolerances
 
 

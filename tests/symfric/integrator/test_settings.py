@@ -5,7 +5,7 @@ import pytest
 
 from symfric import BrownMcPhee, rabinowicz, simulate
 from symfric.integrator import simulate_by_peer
-from symfric.integrator.settings import REMEMBERED
+from symfric.integrator.simulate import REMEMBERED
 
 
 def test_settings_are_checked_once_and_true_is_no_time() -> None:

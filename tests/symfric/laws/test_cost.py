@@ -9,7 +9,7 @@ from law_cases import CASES
 
 from symfric import ALL_LAWS, Coulomb, Viscous
 from symfric.laws import BAM, POPULATIONS
-from symfric.laws.cost import cost
+from symfric.laws.composed.populations import cost
 
 TABLE = Path(__file__).parents[2] / "golden" / "instructions.json"
 

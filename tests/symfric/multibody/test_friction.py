@@ -33,7 +33,7 @@ from symfric.laws import (
 )
 from symfric.multibody import JointFriction, Mechanism, Revolute, Spherical, Universal
 from symfric.scenes import FourBar, SliderCrank
-from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.linkages import MechanismScene
 
 pytestmark = pytest.mark.heavy
 

@@ -12,8 +12,8 @@ from robots import MOVING, random_robot, rod
 from symfric import Coulomb, Law
 from symfric.multibody import Mechanism, functions
 from symfric.multibody.spatial import euler_g, rotation
-from symfric.multibody.urdf.file import parse
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.urdf import read_urdf
+from symfric.multibody.urdf_file import parse
 
 pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody import Distance, PinInSlot, Prismatic, Revolute, Spherical
-from symfric.multibody.sketch import SPRING
+from symfric.multibody.results import SPRING
 from symfric.results.strokes import Poses, Stroke, View, look, strokes
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ import pytest
 
 from symfric import BrownMcPhee, Coulomb, LuGre, Viscous, parameters, simulate
 from symfric.scenes import ALL_SCENES, MECHANISMS, FourMass, SliderCrank
-from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.linkages import MechanismScene
 
 RUBS = {
     ("double_pendulum", "lower"): "phi_2",

@@ -6,7 +6,7 @@ from robots import MOVING, SMALL, random_robot
 
 from symfric import BrownMcPhee, Coulomb, LuGre, parameters, simulate
 from symfric.multibody import JointFriction
-from symfric.multibody.urdf.read import relative
+from symfric.multibody.urdf import relative
 from symfric.scenes import Robot
 
 BARE = SMALL.replace(' friction="0.2"', "")

@@ -23,7 +23,7 @@ from symfric.multibody import (
     Universal,
     functions,
 )
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.urdf import read_urdf
 from symfric.scenes import Arm, FourBar
 
 EASY = Coulomb(mu_d=1.0, v_eps=0.1)

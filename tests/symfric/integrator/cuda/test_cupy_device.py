@@ -9,8 +9,7 @@ from ensembles import assert_same
 from fake_cupy import FakeCupy
 
 from symfric import Ensemble, simulate_many
-from symfric.integrator.cuda.cupy_device import CupyDevice
-from symfric.integrator.cuda.device import DeviceError
+from symfric.integrator.cuda.device import CupyDevice, DeviceError
 from symfric.integrator.cuda.kernel import BLOCK
 
 

@@ -7,7 +7,7 @@ from differentiable import pendulum, switched
 
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda import nvrtc
+from symfric.integrator.cuda import device
 from symfric.integrator.cuda.device import DeviceError
 from symfric.integrator.cuda.kernel import NAME, kernel_of
 from symfric.integrator.equations.inputs import input_data
@@ -17,7 +17,7 @@ from symfric.scenes import SliderCrank
 from symfric.scenes.catalogue import ALL_SCENES
 
 needs_nvrtc = pytest.mark.skipif(
-    nvrtc.library() is None, reason="needs NVRTC (extra 'cuda-check'); no GPU is needed"
+    device.library() is None, reason="needs NVRTC (extra 'cuda-check'); no GPU is needed"
 )
 
 
@@ -40,7 +40,7 @@ MODELS = {
 @pytest.mark.parametrize("name", ["brown_mcphee", "algebraic unknowns", "mechanism"])
 def test_a_kernel_becomes_ptx_without_a_warning(name: str, between: bool, real: str) -> None:
     kernel = kernel_of(integrator(MODELS[name]()), between, REALS[real])
-    built = nvrtc.build(kernel.on_device)
+    built = device.build(kernel.on_device)
     assert f".visible .entry {NAME}(" in built.text
     assert not built.log.strip("\0\n ")
     doubles = len(re.findall(r"\b(?:add|mul|fma|div|sqrt)\S*\.f64", built.text))
@@ -54,17 +54,17 @@ def test_a_kernel_becomes_ptx_without_a_warning(name: str, between: bool, real: 
 def test_all_scenes_become_ptx(name: str, real: str) -> None:
     """The arm takes a minute."""
     kernel = kernel_of(integrator(ALL_SCENES[name](LuGre()).model()), True, REALS[real])
-    assert f".visible .entry {NAME}(" in nvrtc.build(kernel.on_device).text
+    assert f".visible .entry {NAME}(" in device.build(kernel.on_device).text
 
 
 @needs_nvrtc
 def test_no_product_goes_unrounded_into_a_sum(monkeypatch: pytest.MonkeyPatch) -> None:
     source = 'extern "C" __global__ void f(double *x) { x[0] = x[0] * x[1] + x[2]; }'
-    built = nvrtc.build(source)
+    built = device.build(source)
     assert "mul" in built.text
     assert "fma" not in built.text
-    monkeypatch.setattr(nvrtc, "OPTIONS", ())
-    assert "fma" in nvrtc.build(source).text
+    monkeypatch.setattr(device, "OPTIONS", ())
+    assert "fma" in device.build(source).text
 
 
 @needs_nvrtc
@@ -78,7 +78,7 @@ def test_no_product_goes_unrounded_into_a_sum(monkeypatch: pytest.MonkeyPatch) -
 )
 def test_registers_are_few(name: str, most: int) -> None:
     """Small scenes spill nothing; those of a mechanism are as many as there are."""
-    built = nvrtc.build(kernel_of(integrator(MODELS[name]())).on_device, "sm_80")
+    built = device.build(kernel_of(integrator(MODELS[name]())).on_device, "sm_80")
     assert 32 <= built.registers <= most
     assert (built.spilled == 0) == (most < 255)
 
@@ -86,10 +86,10 @@ def test_registers_are_few(name: str, most: int) -> None:
 @needs_nvrtc
 def test_what_is_no_cuda_is_refused_with_its_first_error() -> None:
     with pytest.raises(DeviceError, match=r"refused the kernel: .*error: .*nonsense"):
-        nvrtc.build("nonsense x;")
+        device.build("nonsense x;")
 
 
 def test_without_nvrtc_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(nvrtc, "library", lambda: None)
+    monkeypatch.setattr(device, "library", lambda: None)
     with pytest.raises(DeviceError, match=r"pip install 'symfric\[cuda-check\]'"):
-        nvrtc.build("")
+        device.build("")

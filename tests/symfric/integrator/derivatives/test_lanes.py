@@ -6,7 +6,7 @@ import pytest
 from backends import needs_compiler
 
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.derivatives.lanes import FEW, MANY, lanes_source
+from symfric.integrator.derivatives.functions import FEW, MANY, lanes_source
 
 pytestmark = needs_compiler
 

@@ -28,10 +28,10 @@ from symfric import (
 )
 from symfric.integrator.derivatives import together as module
 from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.seeds import seeds
+from symfric.integrator.derivatives.path import seeds
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.built import built
+from symfric.integrator.running.integrator import built
 from symfric.model import Event
 from symfric.scenes import PendulumBox
 

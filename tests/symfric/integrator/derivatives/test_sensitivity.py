@@ -25,9 +25,9 @@ from symfric import (
     rabinowicz,
     simulate,
 )
+from symfric.integrator.by_peer import peer
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
 
 Array = NDArray[np.float64]

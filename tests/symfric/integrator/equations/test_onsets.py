@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric import BrownMcPhee, Model, Variable, drive, simulate, simulate_many
+from symfric import BrownMcPhee, Model, SolveError, Status, Variable, drive, simulate, simulate_many
 from symfric.integrator.equations.expressions import DEPTH, changes, levels, onsets, pace
 from symfric.laws import Karnopp
 
@@ -127,6 +127,39 @@ def test_a_ramp_in_the_equations_of_a_model_is_not_leapt_over(method: str) -> No
     assert run.final["v"] == pytest.approx(exact, rel=1e-3)
     many = simulate_many(model, 3.5, p={}, x0={"v": [0.0, 0.0]}, rtol=1e-5, backend="vm")
     assert many["v"][:, -1] == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:simulate. rtol")
+@pytest.mark.parametrize("method", ["auto", "rodas5p", "dopri5"])
+def test_a_pulse_of_any_width_is_solved_or_refused(method: str) -> None:
+    """The rate of a ramp of a nanosecond was leapt over, with SUCCESS."""
+    t, y, solved = ca.SX.sym("t"), Variable("y", "m"), 0
+    for width in np.logspace(-14, -1, 27):
+        ramp = ca.fmin(ca.fmax((t - 0.5) / width, 0.0), 1.0)
+        rate = ramp + ca.jtimes(ramp, t, ca.SX(1)) - y.symbol / 10
+        model = Model("bump", x=(y,), ode=rate, t=t)
+        # y during the ramp: 10 (1/w - 1) e(w) + 10 s / w, with e(s) = 1 - exp(-s/10)
+        peak = (10 / width - 100 / width) * -np.expm1(-width / 10) + 10
+        after = np.exp(-(3.0 - width) / 10)
+        try:
+            run = simulate(model, 3.5, method=method, rtol=1e-4, backend="vm")
+        except SolveError as error:
+            assert error.status is Status.STEP_TOO_SMALL
+            continue
+        assert run.final["y"] == pytest.approx(peak * after + 10 * (1 - after), abs=1e-2), width
+        solved += 1
+    assert solved >= 16
+
+
+def test_pulses_within_jumps_are_found_and_jumps_are_not() -> None:
+    def ramp(t: ca.SX) -> ca.SX:
+        return ca.fmin(ca.fmax((t - AT) / 1e-9, 0.0), 1.0)
+
+    def rate(t: ca.SX) -> ca.SX:
+        return ca.jtimes(ramp(t), t, ca.SX(1))
+
+    assert np.abs(times(lambda t: ramp(t) + rate(t)) - AT - 5e-10).min() < 1e-12
+    assert np.abs(times(ramp) - AT).min() > 1e-6
 
 
 def test_time_that_enters_beside_parameters_is_seen_at_their_start_values() -> None:

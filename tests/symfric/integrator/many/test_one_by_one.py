@@ -9,8 +9,8 @@ from ensembles import EXECUTORS, assert_same
 
 from symfric import ExactCoulomb, Karnopp, Law, Linear, Model, Variable, drive, simulate_many
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.many import one_by_one
-from symfric.integrator.many.one_by_one import solve_one_by_one
+from symfric.integrator.many import chunk
+from symfric.integrator.many.chunk import solve_one_by_one
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
@@ -54,7 +54,7 @@ def test_member_without_a_consistent_start_is_passed_over() -> None:
 
 def test_interrupt_goes_on_to_the_ensemble(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run keeps an interrupt for itself, and says so by its status."""
-    real: Callable[..., Any] = one_by_one.integrate
+    real: Callable[..., Any] = chunk.integrate
 
     def pressed(*arguments: Any) -> Any:
         def interrupt(_: float) -> None:
@@ -62,7 +62,7 @@ def test_interrupt_goes_on_to_the_ensemble(monkeypatch: pytest.MonkeyPatch) -> N
 
         return real(*arguments[:-2], interrupt, arguments[-1])
 
-    monkeypatch.setattr(one_by_one, "integrate", pressed)
+    monkeypatch.setattr(chunk, "integrate", pressed)
     with pytest.raises(KeyboardInterrupt):
         solve([[0.01, 1.0]])
 

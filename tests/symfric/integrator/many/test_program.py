@@ -10,7 +10,7 @@ from differentiable import oscillator, switched
 
 import symfric.integrator.compiled.compiler as compiler
 import symfric.integrator.many.program as module
-import symfric.integrator.running.built as built
+import symfric.integrator.running.integrator as built
 from symfric import Model, simulate, simulate_many
 from symfric.foundation.compiler import Compiler
 

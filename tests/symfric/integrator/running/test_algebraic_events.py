@@ -5,12 +5,14 @@ from math import asin, atan2, pi, sqrt
 import casadi as ca
 import numpy as np
 import pytest
-from backends import each_backend
+from backends import each_backend, needs_compiler
 
 from symfric import Event, Model, Variable, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import Tolerances, integrate
 
 LEVELS = (-0.4, -0.35, -0.29, -0.22, -0.15, 0.05, 0.12, 0.21, 0.28, 0.35)
 SPAN = 20.0
@@ -60,6 +62,23 @@ def test_each_passage_is_one_event(backend: str, form: str, rtol: float) -> None
         first = (asin(x / size) - atan2(0.1, 1.0)) % (2 * pi)  # x = size sin(t + atan2(0.1, 1))
         times = np.arange(first, SPAN, 2 * pi)
         assert [t for t, _ in run.happened] == pytest.approx(times, abs=30 * rtol)
+
+
+@needs_compiler
+def test_engines_tell_the_same_of_unknowns_around_an_event() -> None:
+    """Behind it those that follow are known; before it they are as the step has them."""
+    model = watched("explicit")
+    inputs = input_data(model, None, 0.0, SPAN)
+    allowed = Tolerances(1e-6, np.full(2, 1e-7), 1e-10, 10_000)
+    y0, p = np.array([0.1, 1.0, 0.3]), np.array([0.12])
+    runs = [
+        integrate(Integrator(model, inputs, RODAS5P), inputs, y0, p, allowed, backend, None)
+        for backend in ("vm", "compiled")
+    ]
+    one, other = (Jumps.joined(run.jumps) for run in runs)
+    assert one.t.size == 3
+    for name in ("step", "t", "size", "before", "after", "which"):
+        assert (getattr(one, name) == getattr(other, name)).all(), name
 
 
 def test_events_of_coupled_variables_grow_with_their_number() -> None:

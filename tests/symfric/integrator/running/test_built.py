@@ -8,12 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 import casadi as ca
 import pytest
 
-import symfric.integrator.running.built as module
+import symfric.integrator.running.integrator as module
 from symfric import Model, Variable, Viscous, drive, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.built import REMEMBERED, built
-from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.integrator import REMEMBERED, Integrator, built
 
 
 def cart() -> Model:

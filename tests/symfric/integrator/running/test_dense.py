@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from symfric import LuGre, rabinowicz, simulate
 from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.dense import Dense, from_records, hermite, join
+from symfric.integrator.running.dense import Dense, hermite, join, pieces_of
 from symfric.integrator.running.loop import width
 from symfric.integrator.step.layout import Record
 
@@ -65,7 +65,7 @@ def test_step_cut_at_an_event_keeps_its_polynomial(rows: int, theta: float) -> N
     at = Record(2, rows)
     assert at.width == width(2, rows)
     row = np.concatenate([whole.t0, whole.t1, whole.y0[0], whole.y1[0], whole.D.ravel()])
-    cut = from_records(cutting(at)(theta, row).full().T, 2)
+    cut = pieces_of(cutting(at)(theta, row).full().T, 2)
     assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0], [theta])
     times = np.linspace(0, theta, 101)
     assert cut(times) == pytest.approx(whole(times), abs=1e-12)
@@ -83,7 +83,7 @@ def test_value_at_a_jump_is_that_after_it() -> None:
 @pytest.mark.parametrize("rows", [0, 2, 3])
 def test_records_are_taken_apart(count: int, rows: int) -> None:
     records = RNG.normal(size=(count, width(3, rows)))
-    dense = from_records(records, 3)
+    dense = pieces_of(records, 3)
     assert dense.D.shape == (count, rows, 3)
     again = np.hstack(
         [dense.t0[:, None], dense.t1[:, None], dense.y0, dense.y1, dense.D.reshape(count, rows * 3)]

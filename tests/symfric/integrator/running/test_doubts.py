@@ -30,7 +30,7 @@ from symfric import (
 )
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parameters
-from symfric.integrator.running import gains, record
+from symfric.integrator.running import doubts, record
 from symfric.integrator.running.doubts import places
 from symfric.laws import ALL_LAWS, Asymmetric, LoadNormalised, Sum
 from symfric.scenes import ALL_SCENES, Drive, Rabinowicz
@@ -186,7 +186,7 @@ PLAIN = [n for n, law in ALL_LAWS.items() if {i.name for i in law().inputs} <= {
 @pytest.mark.parametrize("name", PLAIN)
 def test_steady_friction_of_no_law_adds_energy(name: str) -> None:
     model = Drive(ALL_LAWS[name]()).model()
-    for sliding in gains.places(model):
+    for sliding in doubts.sliding_places(model):
         assert not sliding.suspect(model.values("p"))
 
 

@@ -19,7 +19,7 @@ from symfric import (
     simulate_many,
 )
 from symfric.integrator.compiled.compiler import find_compiler
-from symfric.integrator.running.sizes import finer, own_scale
+from symfric.integrator.running.run import finer, own_scale
 
 x, v = Variable("x", "m"), Variable("v", "m/s")
 

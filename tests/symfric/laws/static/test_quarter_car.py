@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from symfric import Law
 from symfric.laws import QuarterCarGeneral, QuarterCarSimple, Tustin
-from symfric.laws.cost import cost
-from symfric.laws.static.quarter_car import tilt
+from symfric.laws.composed.populations import cost
+from symfric.laws.static.machines import tilt
 
 
 @pytest.mark.parametrize(("x_rel", "angle"), [(6.9e-3, 0.7075), (-6.9e-3, -0.6905), (0.0, 0.0)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from robots import SMALL
 
-from symfric.multibody.urdf.file import carried, holding, merged, parse
+from symfric.multibody.urdf_file import carried, holding, merged, parse
 
 TIP = '<joint name="tip" type="{}"><parent link="arm"/><child link="hand"/></joint>{}</robot>'
 HAND = '<link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from symfric import simulate
 from symfric.multibody import functions
-from symfric.multibody.urdf.read import read_urdf
+from symfric.multibody.urdf import read_urdf
 
 pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
 Array = NDArray[np.float64]

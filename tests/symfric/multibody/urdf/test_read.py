@@ -11,8 +11,8 @@ from robots import SMALL, rod
 from symfric import Coulomb, Law, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
 from symfric.multibody import JointFriction, Mechanism, Universal, functions
-from symfric.multibody.urdf.file import parse
-from symfric.multibody.urdf.read import read_urdf, relative, tag_friction
+from symfric.multibody.urdf import read_urdf, relative, tag_friction
+from symfric.multibody.urdf_file import parse
 
 
 def test_damping_is_viscous_and_friction_a_constant_torque_without_any_unknown() -> None:

@@ -1,1 +1,0 @@
-"""Integrators of others on the same model, as a second opinion: CasADi's and SUNDIALS'."""

@@ -1,0 +1,399 @@
+"""Friction of machines with formulas of their own: joints of robots, ropes, a quarter-car rig."""
+
+from dataclasses import dataclass
+from math import pi
+from typing import final
+
+from symfric.foundation.numeric import (
+    Scalar,
+    asin,
+    cos,
+    equals,
+    exp,
+    expm1,
+    is_number,
+    sin,
+    sqrt,
+    tan,
+    tanh,
+)
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.families import Curve, Fall
+from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Bittencourt(Curve):
+    """Friction torque of a robot joint under load N at temperature T, after Bittencourt.
+
+        static(T)  = max(F_s0 + F_sT T, 0),   v_s(T) = v_s0 + v_sT T
+        F = {F_c0 + F_cl N + F_sl N exp(-|v/v_sl|^delta)
+             + static(T) exp(-|v/v_s(T)|^delta)} sign(v) + (F_v0 + F_vT exp(-T/T_v)) v
+
+    N is the magnitude of the load torque [N m], v in rad/s, F in N m. sign(v) is smooth over v_eps,
+    |v| over 1e-4 v_eps, the maximum over F_eps. Temperature is a parameter, so that it may be a
+    symbol. The defaults of levels, velocities and viscous coefficients are those of the paper's
+    table of an industrial robot as it is remembered, unverified; its torques are normalised, and
+    it was identified from about 30 degC on. v_s(T) is above zero from 25 degC on only.
+    Limits: at fixed N and T a `Stribeck` law with two falls; not valid outside the temperatures of
+    its identification. Creeps under load.
+    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (abstract only).
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="unverified",
+        checked="formula and defaults",
+        source="Bittencourt and Gunnarsson 2012",
+        load="affine",
+    )
+
+    T: Scalar = param(
+        30.0, unit="degC", role="temperature", doc="temperature", lower=-60.0, upper=200.0
+    )
+    F_c0: Scalar = fields.TORQUE(0.031, doc="dynamic level without load")
+    F_cl: Scalar = fields.COEFFICIENT(0.023, doc="dynamic level by load")
+    F_sl: Scalar = fields.COEFFICIENT(0.126, doc="static excess by load")
+    F_s0: Scalar = param(-0.025, unit="N m", role="level", doc="static excess at 0 degC")
+    F_sT: Scalar = param(1.6e-3, unit="N m/K", role="level", doc="static excess by temperature")
+    v_sl: Scalar = param(
+        9.2,
+        unit="rad/s",
+        role="velocity scale",
+        doc="Stribeck velocity of the load part",
+        lower=1e-12,
+    )
+    v_s0: Scalar = param(
+        -25.0, unit="rad/s", role="velocity scale", doc="Stribeck velocity at 0 degC"
+    )
+    v_sT: Scalar = param(
+        1.0, unit="rad/(s K)", role="velocity scale", doc="Stribeck velocity by temperature"
+    )
+    F_v0: Scalar = param(
+        1.3e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, hot", lower=0.0
+    )
+    F_vT: Scalar = param(
+        1.3e-3,
+        unit="N m s/rad",
+        role="viscous",
+        doc="viscous coefficient, rise to 0 degC",
+        lower=0.0,
+    )
+    T_v: Scalar = param(
+        20.7, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
+    )
+    delta: Scalar = fields.DELTA(1.3)
+    v_eps: Scalar = fields.V_EPS(0.1, unit="rad/s", lower=1e-12)
+    F_eps: Scalar = param(1e-4, unit="N m", role="width", doc="smoothing of the maximum", lower=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        v_s = self.v_s0 + self.v_sT * self.T
+        if is_number(v_s) and v_s <= 0:
+            raise ValueError(
+                f"Bittencourt: expected v_s0 + v_sT T > 0, got {v_s:g} rad/s at T = {self.T:g}; "
+                "the law is not valid at this temperature"
+            )
+
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        v_s = self.v_s0 + self.v_sT * self.T
+        loaded = self.F_sl * N * fall(v, self.v_sl, self.delta)
+        static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
+        level = self.F_c0 + self.F_cl * N + loaded
+        level += static * fall(v, v_s, self.delta)
+        return level * s + (self.F_v0 + self.F_vT * exp(-self.T / self.T_v)) * v
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BAM(StaticLaw):
+    """Servo friction of the BAM family, models M1 to M6, torques in N m.
+
+        s = exp(-|v/v_s|^alpha)
+        K = K_b + |K_e tau_e - K_m tau_m| + s [K_s + |K_es tau_e - K_ms tau_m| + quadratic]
+        quadratic = Q_e tau_e^2 where the motor drives, Q_m tau_m^2 where it is driven,
+                    only while tau_e and tau_m oppose each other
+        F = K sign(v) + K_v v
+
+    tau_m is the torque of the motor, tau_e the external one. Zero coefficients switch terms off:
+    M5 has no quadratic; M4 also K_e = K_m and K_es = K_ms; M3 of M4 no Stribeck part; M2 of M4 no
+    load; M1 neither. The motor drives where |tau_m| > |tau_e|. sign(v) is smooth over v_eps, |v|
+    over 1e-4 v_eps, magnitudes and cases of the torques over tau_eps.
+    Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; BAM
+    itself limits the torque that stops the motor within a step.
+    Source: Duclusaud et al. 2025, as in their public code.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="one source",
+        checked="Rhoban/bam",
+        source="Duclusaud et al. 2025, public code",
+        load="independent",
+    )
+
+    K_b: Scalar = fields.TORQUE(0.05, doc="dynamic level without load")
+    K_s: Scalar = fields.TORQUE(0.05, doc="static excess without load")
+    K_e: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by external torque")
+    K_m: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by motor torque")
+    K_es: Scalar = fields.COEFFICIENT(0.05, doc="static excess by external torque")
+    K_ms: Scalar = fields.COEFFICIENT(0.05, doc="static excess by motor torque")
+    Q_e: Scalar = param(
+        0.0, unit="1/(N m)", role="level", doc="excess by external torque squared", lower=0.0
+    )
+    Q_m: Scalar = param(
+        0.0, unit="1/(N m)", role="level", doc="excess by motor torque squared", lower=0.0
+    )
+    v_s: Scalar = fields.V_S(0.2, unit="rad/s")
+    alpha: Scalar = fields.DELTA(1.35)
+    K_v: Scalar = fields.SIGMA_2(0.1, unit="N m s/rad")
+    v_eps: Scalar = fields.V_EPS(0.01, unit="rad/s", lower=1e-12)
+    tau_eps: Scalar = param(1e-3, unit="N m", role="width", doc="smoothing torque", lower=1e-12)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The torques on both sides of the gear, where a coefficient asks for them."""
+        of_load = (self.K_e, self.K_m, self.K_es, self.K_ms, self.Q_e, self.Q_m)
+        if all(equals(coefficient, 0.0) for coefficient in of_load):
+            return ()
+        return (
+            Input("tau_m", "N m", "torque of the motor", steady=1.0),
+            Input("tau_e", "N m", "external torque", steady=0.5),
+        )
+
+    def force(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """Friction torque [N m]."""
+        falling = smooth.stribeck(v, self.v_s, self.alpha, smooth.CORNER * self.v_eps)
+        return self._level(falling, tau_m, tau_e) * smooth.sign(v, self.v_eps) + self.K_v * v
+
+    def outside(
+        self, speed: Scalar, N: Scalar, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding torque [N m] at a speed >= 0 as the widths vanish."""
+        falling = smooth.fall(speed, self.v_s, self.alpha)
+        return self._level(falling, tau_m, tau_e) + self.K_v * speed
+
+    def sliding(
+        self, v: Scalar, N: Scalar, side: int, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding torque [N m] on one side of v = 0."""
+        return side * self.outside(side * v, N, tau_m=tau_m, tau_e=tau_e)
+
+    def static_level(
+        self, N: Scalar, side: int = 1, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """The torque [N m] of break-away."""
+        return self.outside(0.0, N, tau_m=tau_m, tau_e=tau_e)
+
+    def _level(self, falling: Scalar, tau_m: Scalar, tau_e: Scalar) -> Scalar:
+        dynamic = smooth.magnitude(self.K_e * tau_e - self.K_m * tau_m, self.tau_eps)
+        static = smooth.magnitude(self.K_es * tau_e - self.K_ms * tau_m, self.tau_eps)
+        if not (equals(self.Q_e, 0.0) and equals(self.Q_m, 0.0)):
+            static += self._quadratic(tau_m, tau_e)
+        return self.K_b + dynamic + falling * (self.K_s + static)
+
+    def _quadratic(self, tau_m: Scalar, tau_e: Scalar) -> Scalar:
+        width = self.tau_eps * self.tau_eps
+        opposed = (1 - tanh(tau_m * tau_e / width)) / 2
+        drives = (1 + tanh((tau_m * tau_m - tau_e * tau_e) / width)) / 2
+        return opposed * (
+            drives * self.Q_e * tau_e * tau_e + (1 - drives) * self.Q_m * tau_m * tau_m
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Capstan(StaticLaw):
+    """Capstan (belt) friction of Euler and Eytelwein.
+
+        F = T_1 - T_2 = N [exp(mu_d beta sign(v)) - 1]
+
+    N is the tension T_2 of the belt on one side; the tension T_1 on the other is larger while the
+    belt slides towards it (v > 0) and smaller while it slides back. sign(v) is smooth over v_eps.
+    Limits: mu_d beta -> 0 gives `Coulomb` with the coefficient mu_d beta. Not odd: sliding back,
+    |F| is smaller by exp(-mu_d beta). Creeps under load.
+    Source: Euler 1769, Eytelwein 1808; textbook.
+    """
+
+    facts = Facts(("D",), "C∞", "textbook", "Euler 1769, Eytelwein 1808", odd=False)
+
+    mu_d: Scalar = fields.MU_D(0.1)
+    beta: Scalar = param(
+        3.141592653589793, unit="rad", role="geometry", doc="wrap angle", lower=0.0
+    )
+    v_eps: Scalar = fields.V_EPS(1e-3)
+
+    def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
+        """Sliding force [N] to one side as the widths vanish."""
+        return N * expm1(self.mu_d * self.beta * side)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away: larger towards the tension T_1."""
+        return side * self.sliding(0.0, N, side)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return N * expm1(self.mu_d * self.beta * smooth.sign(v, self.v_eps))
+
+
+def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:
+    """Change d_theta of the strut's angle [rad], positive for a shortened spring.
+
+        sin d_theta = x_rel cos(theta) / (L_d - x_rel sin(theta))
+
+    for a strut of length L_d [m] at the angle theta [rad] whose wheel rose by x_rel [m] relative
+    to the body. The paper writes sin(theta) for cos(theta), which is the same at its 45 degrees.
+    """
+    return asin(x_rel * cos(theta) / (L_d - x_rel * sin(theta)))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class QuarterCarGeneral(StaticLaw):
+    """Quarter-car friction with the load of the linkage, in newton.
+
+        f_sd = k_s x_rel + b_d v_rel                              force of spring and damper
+        sin d_theta = x_rel cos(theta) / (L_d - x_rel sin(theta))
+        slip   = [C_e exp(-|v|/e_1) + mu |f_sd| / tan(theta - d_theta)] sign(v) + sigma_v v
+        F      = (1 - w) hold(f_sd, F_brk) + w slip,   w = S(|v| / v_eps),   smooth
+        F      = f_sd at v = 0, else C_e exp(-|v|/e_1) sign(v) + mu f_sd / tan(theta - d_theta)
+                 + sigma_v v,                                                as printed
+
+    S is the quintic step of `Karnopp`, hold its rounded clip. `N` has no effect: the load is
+    |f_sd| / tan. `v` is the velocity of the body, x_rel the wheel's position minus the body's.
+    As printed, the Coulomb term has the sign of the spring force and may drive the body, the branch
+    at rest is not limited, and exp(|v|/e_1) needs e_1 < 0: here e_1 is its magnitude.
+    C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented, sigma_v
+    so that friction lessens the overshoot of the body, as the paper says.
+    Limits: holds |f_sd| <= F_brk - F_eps at rest; within v_eps friction may drive, F v >= -0.274
+    F_brk v_eps (as printed at any speed); mu = 0 leaves the simple law beyond v_eps;
+    x_rel < L_d / (2 sin(theta)).
+    Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
+    """
+
+    facts = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
+        confidence="one source",
+        checked="the paper, corrected as said",
+        source="Al-Zughaibi, quarter-car friction, corrected",
+        odd=False,
+        load="independent",
+    )
+
+    k_s: Scalar = fields.STIFFNESS(28900.0, doc="spring stiffness", lower=0.0)
+    b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="damper coefficient", lower=0.0)
+    theta: Scalar = param(
+        pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
+    )
+    L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
+    F_brk: Scalar = fields.LEVEL(193.8, doc="break-away force")
+    C_e: Scalar = fields.LEVEL(180.0, doc="static excess at rest")
+    e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
+    mu: Scalar = fields.COEFFICIENT(0.05, doc="friction coefficient of the guide")
+    sigma_v: Scalar = fields.SIGMA_2(1500.0)
+    v_eps: Scalar = param(
+        1e-3, unit="m/s", role="width", width=1, doc="half width of the stick window", lower=1e-12
+    )
+    F_eps: Scalar = param(
+        1.0, unit="N", role="width", doc="rounding of the break-away and of |f_sd|", lower=1e-12
+    )
+    form: str = option("smooth", choices=("smooth", "as_printed"), doc="corrected or as printed")
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Position and velocity of the wheel relative to the body."""
+        return (
+            Input("x_rel", "m", "position of the wheel minus that of the body", 0.01, 5e-3),
+            Input("v_rel", "m/s", "velocity of the wheel minus that of the body", 0.1),
+        )
+
+    def outside(
+        self, speed: Scalar, N: Scalar, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish; not of the form as printed."""
+        self._refuse_as_printed()
+        f_sd = self.k_s * x_rel + self.b_d * v_rel
+        load = sqrt(f_sd * f_sd + self.F_eps * self.F_eps)
+        dry = self.C_e * smooth.fall(speed, self.e_1, 1.0)
+        return dry + self._leverage(x_rel) * load + self.sigma_v * speed
+
+    def sliding(
+        self, v: Scalar, N: Scalar, side: int, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding force [N] on one side of v = 0."""
+        return side * self.outside(side * v, N, x_rel=x_rel, v_rel=v_rel)
+
+    def static_level(
+        self, N: Scalar, side: int = 1, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """The force [N] of break-away."""
+        self._refuse_as_printed()
+        return self.F_brk
+
+    def _refuse_as_printed(self) -> None:
+        if self.form == "as_printed":
+            raise one_sided(self, "as printed, it holds any force at rest and may drive the body")
+
+    def _leverage(self, x_rel: Scalar) -> Scalar:
+        if equals(self.mu, 0.0):
+            return 0.0
+        return self.mu / tan(self.theta - tilt(x_rel, self.theta, self.L_d))
+
+    def force(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """Friction force [N]."""
+        f_sd = self.k_s * x_rel + self.b_d * v_rel
+        leverage = self._leverage(x_rel)
+        speed = smooth.magnitude(v, 0.0)
+        dry = self.C_e * exp(-speed / self.e_1)
+        if self.form == "as_printed":
+            slip = dry * smooth.sign(v, 0.0) + leverage * f_sd + self.sigma_v * v
+            return smooth.choose(speed <= 0, f_sd, slip)
+        load = sqrt(f_sd * f_sd + self.F_eps * self.F_eps)
+        slip = (dry + leverage * load) * smooth.sign(v, 0.0) + self.sigma_v * v
+        w = smooth.step5(speed / self.v_eps)
+        return (1 - w) * smooth.hold(f_sd, self.F_brk, self.F_eps) + w * slip
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class QuarterCarSimple(Curve):
+    """Quarter-car friction without the Coulomb term, in newton.
+
+        F = C_e exp(-|v|/e_1) sign(v) + sigma_v v
+
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original. As
+    printed the exponent grows: here e_1 is the magnitude of the paper's. `N` has no effect. C_e,
+    e_1 and sigma_v are not given in the paper; their defaults are invented, as for
+    `QuarterCarGeneral`.
+    Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
+    mu = 0 holds at rest.
+    Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.
+    """
+
+    facts = Facts(
+        phenomena=("S", "St", "V"),
+        smoothness="C∞",
+        confidence="one source",
+        checked="the paper, corrected as said",
+        source="Al-Zughaibi, quarter-car friction, corrected",
+        load="independent",
+    )
+
+    C_e: Scalar = fields.LEVEL(180.0, doc="static level")
+    e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
+    sigma_v: Scalar = fields.SIGMA_2(1500.0)
+    v_eps: Scalar = fields.V_EPS(1e-3)
+
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Friction force [N] in the direction `s`."""
+        return self.C_e * fall(v, self.e_1, 1.0) * s + self.sigma_v * v

@@ -1,0 +1,302 @@
+"""URDF import: the mechanism that a robot's file describes."""
+
+import re
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
+from symfric.foundation.parameters import check_names, parameters, with_values
+from symfric.laws import Coulomb, Law, Sum, Viscous
+from symfric.laws.base.law import check_law
+from symfric.multibody.constraints import Gear
+from symfric.multibody.forces import JointSpringDamper
+from symfric.multibody.joint import Joint, JointFriction
+from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
+from symfric.multibody.mechanism import Mechanism
+from symfric.multibody.spatial import GROUND, Vector, unphysical
+from symfric.multibody.urdf_file import (
+    Carried,
+    Inertial,
+    Urdf,
+    UrdfJoint,
+    carried,
+    holding,
+    merged,
+    parse,
+)
+from symfric.multibody.urdf_notes import Array
+
+KINDS: dict[str, type[Joint]] = {
+    "revolute": Revolute,
+    "continuous": Revolute,
+    "prismatic": Prismatic,
+    "planar": Planar,
+    "floating": Floating,
+}
+FLOATING = "floating_base"
+"""The joint of a root link that moves freely."""
+
+
+def read_urdf(
+    source: str | Path,
+    *,
+    law: Law | None = None,
+    laws: Mapping[str, Law] | None = None,
+    level: Scalar = 0.0,
+    bearings: Mapping[str, JointFriction] | None = None,
+    floating: bool = False,
+    gravity: Vector = (0.0, 0.0, -9.81),
+    strict: bool = False,
+) -> Mechanism:
+    """The mechanism that a URDF file describes: a chain or tree of links.
+
+    Joints keep their names, q = 0 is the file's zero. Links that fixed joints hold together are
+    one body with the name of the innermost link; every link is a frame of its body, "body.link".
+    Massless links between joints make these the axes of one joint; joints that move no mass at
+    all are held at zero. Every joint that turns about or slides along its axis gets an input
+    `tau_<joint>` [N m, N], unless it mimics another one: then a `Gear` makes it follow.
+
+    `<dynamics damping="d" friction="f">` becomes the friction d w + f tanh(w / v_eps) for a joint
+    rate w: `Viscous` with sigma_2 = d, and `Coulomb` with mu_d = 1 under the normal force f. That
+    friction is independent of the reactions and adds no unknown; for a joint that turns, read
+    N m and rad/s. `bearings` are for friction that reactions cause.
+
+    Args:
+        source: path of the file, or its text.
+        law: instead of Coulomb; its normal force is f, so with mu_d = 1 it slides at the file's
+            level (`relative` scales a law so).
+        laws: joint name -> law, instead of `law`.
+        level: f of the joints whose tag has none [N m, N].
+        bearings: joint name -> friction, instead of what the file says of this joint.
+        floating: whether the root link moves freely (joint `floating_base`); otherwise it is the
+            ground, whatever it weighs. A massless root always is.
+        gravity: [m/s^2] in the axes of the root link.
+        strict: refuse instead of warn: inertias that no rigid body has, joints that move no mass,
+            joints that mimic one the file does not have.
+
+    Raises:
+        ValueError: all mistakes of the file at once, each with its path; nothing that moves has a
+            mass; an unknown name in `bearings` or `laws`.
+        OSError: the file cannot be read.
+
+    Warns:
+        UserWarning: once, of what is taken as it is though it cannot be meant (see `strict`), of
+            all that is left out (tags such as `<limit>`: nothing stops a joint there, `parse` has
+            the numbers; not of visual, collision and material) and of names that are no C
+            identifiers and are changed.
+
+    Limits: an inertia of which no body is made can make the motion gain energy; `build` refuses it
+    where the mass matrix at the start is not positive definite.
+    """
+    if law is not None:
+        check_law("urdf: law", law)
+    for name, own in checks.named("urdf: laws", laws).items():
+        check_law(f"urdf: law of '{name}'", own)
+    if not is_symbolic(level):
+        checks.number("urdf: level", level, lower=0.0)
+    checks.named("urdf: bearings", bearings)
+    for name, bearing in (bearings or {}).items():
+        checks.kind(
+            f"urdf: bearing '{name}'", bearing, JointFriction, "JointFriction(law, radius=...)"
+        )
+    for name, value in (("floating", floating), ("strict", strict)):
+        checks.flag(f"urdf: {name}", value)
+    urdf, held = holding(parse(source, strict))
+    places = carried(urdf)
+    weights = {link: merged(urdf, places, link) for link in urdf.links if link == places[link].body}
+    grounded = not floating or weights[urdf.root].mass == 0
+    names = _names(urdf, grounded)
+    moved = [joint for joint in urdf.outwards() if places[joint.child].body == joint.child]
+    problems = [*names.problems, *_massless(moved, held, strict or (grounded and not moved))]
+    if problems:
+        raise ValueError("\n".join(f"urdf '{urdf.name}' > {text}" for text in problems))
+    for what, given in (("bearings", bearings), ("laws", laws)):
+        check_names(f"urdf '{urdf.name}' {what}", given or {}, [j.name for j in moved])
+    m = Mechanism(_identifier(urdf.name), gravity)
+    _add_bodies(m, urdf, places, weights, names)
+    if not grounded:
+        m.joint(Floating(FLOATING, GROUND, names.links[urdf.root]))
+    left = list(urdf.left_out)
+    for joint in moved:
+        friction = (bearings or {}).get(joint.name) or tag_friction(
+            joint, (laws or {}).get(joint.name, law), level
+        )
+        left += _hang(m, joint, names, places, friction, urdf.zero(joint))
+    _couple(m, moved, names)
+    if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
+        left.append(f"{type(law).__name__}, because no joint has <dynamics friction>")
+    changes = [f"{old} to {new}" for old, new in names.changed.items()]
+    still = grounded and not moved and weights[urdf.root].mass > 0
+    texts = [
+        ("nothing moves", [f"floating=True frees the root '{urdf.root}'"] if still else []),
+        ("taken as it is", urdf.doubts),
+        ("held at zero, because they move no mass", [f"joint '{name}'" for name in held]),
+        ("left out", left),
+        ("names changed", changes),
+    ]
+    message = "; ".join(f"{what}: {', '.join(several)}" for what, several in texts if several)
+    if message:
+        warnings.warn(f"urdf '{urdf.name}': {message}", stacklevel=2)
+    return m
+
+
+def tag_friction(
+    joint: UrdfJoint, law: Law | None = None, level: Scalar = 0.0
+) -> JointFriction | None:
+    """The friction of `<dynamics damping friction>`, as `read_urdf` says; None without it."""
+    laws: list[Law] = []
+    normal = joint.friction or level
+    if not equals(normal, 0.0):
+        laws.append(Coulomb(mu_d=1.0) if law is None else law)
+    if joint.damping:
+        laws.append(Viscous(sigma_2=joint.damping))
+    if not laws or joint.kind in ("planar", "floating"):
+        return None
+    whole = laws[0] if len(laws) == 1 else Sum(tuple(laws))
+    return JointFriction(whole, normal=normal, turning=joint.kind != "prismatic")
+
+
+def relative(law: Law) -> Law:
+    """`law` with its coefficients divided by the largest, so that it breaks away at N itself.
+
+    Coefficients are the levels of unit 1; a law without any stays.
+    """
+    known = {n: p for n, p in parameters(law).items() if p.role == "level" and p.unit == "1"}
+    numbers = {name: float(p.value) for name, p in known.items() if is_number(p.value)}
+    top = max(numbers.values(), default=0.0)
+    return with_values(law, {name: x / top for name, x in numbers.items()}) if top else law
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Names:
+    """Names in the mechanism: of bodies by link, of joints; those that differ; what is wrong."""
+
+    links: dict[str, str] = field(default_factory=dict[str, str])
+    joints: dict[str, str] = field(default_factory=dict[str, str])
+    changed: dict[str, str] = field(default_factory=dict[str, str])
+    problems: list[str] = field(default_factory=list[str])
+
+
+def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) -> Iterator[str]:
+    """Joints that move no mass, where that is refused, and those that mimic them."""
+    for name in held if refused else ():
+        yield (
+            f"joint '{name}': expected links with a mass > 0 kg that it moves, got none; give one "
+            "an <inertial>, or make it a fixed joint"
+        )
+    for joint in moved:
+        if joint.mimic is not None and joint.mimic.joint in held:
+            yield (
+                f"joint '{joint.name}' > mimic: expected a joint that moves a mass, got "
+                f"'{joint.mimic.joint}'"
+            )
+
+
+def _identifier(text: str) -> str:
+    """`text` with underscores where a C identifier allows nothing else."""
+    text = re.sub(r"\W", "_", text, flags=re.ASCII)
+    return f"_{text}" if text[:1].isdigit() else text
+
+
+def _names(urdf: Urdf, grounded: bool) -> _Names:
+    """C identifiers, each once; joints keep their names first, because results carry them."""
+    names = _Names(links={urdf.root: GROUND} if grounded else {})
+    taken = {GROUND: "the ground", "gravity": "the weight", FLOATING: "the root's joint"}
+    groups = (
+        ("joint", names.joints, [joint.name for joint in urdf.joints if joint.kind != "fixed"]),
+        ("link", names.links, [link for link in urdf.links if link not in names.links]),
+    )
+    for kind, into, olds in groups:
+        # those that are identifiers first, so that they keep their names
+        for old in sorted(olds, key=lambda old: old != _identifier(old)):
+            new = _identifier(old)
+            if new in taken:
+                new = f"{new}_{kind}"
+            if new in taken:
+                names.problems.append(
+                    f"{kind} '{old}': expected a name that differs from that of {taken[new]} as a "
+                    f"C identifier, got {new} for both; rename one"
+                )
+            taken[new] = f"{kind} '{old}'"
+            into[old] = new
+            if new != old:
+                names.changed[f"{kind} '{old}'"] = new
+    return names
+
+
+def _add_bodies(
+    m: Mechanism,
+    urdf: Urdf,
+    places: Mapping[str, Carried],
+    weights: Mapping[str, Inertial],
+    names: _Names,
+) -> None:
+    """Bodies, and every link as a frame."""
+    for link, weight in weights.items():
+        if names.links[link] != GROUND:
+            six = weight.J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+            ideal = weight.mass == 0 or any(unphysical(weight.J))
+            m.body(names.links[link], weight.mass, six.tolist(), _plain(weight.com), ideal)
+    for link, at in places.items():
+        name = names.links[link] if names.links[link] != GROUND else _identifier(link)
+        m.frame(
+            f"{names.links[at.body]}.{name}", _plain(at.p), _plain(at.R[:, 2]), _plain(at.R[:, 0])
+        )
+
+
+def _hang(
+    m: Mechanism,
+    joint: UrdfJoint,
+    names: _Names,
+    places: Mapping[str, Carried],
+    friction: JointFriction | None,
+    start: float,
+) -> Iterator[str]:
+    """Add a joint with its frames and its input; yield what is left out."""
+    name, on = names.joints[joint.name], places[joint.parent]
+    parent, child = names.links[on.body], names.links[joint.child]
+    across = np.eye(3)[int(np.argmin(np.abs(joint.axis)))]
+    R, p = on.R @ joint.R, on.p + on.R @ joint.p
+    # a point keeps joints and links of one name apart
+    ends = f"{parent}.{name}.parent", f"{child}.{name}.child"
+    z, x = joint.axis, across
+    if joint.kind == "floating":
+        z, x = np.eye(3)[2], np.eye(3)[0]
+    m.frame(ends[0], _plain(p), _plain(R @ z), _plain(R @ x))
+    m.frame(ends[1], (0.0, 0.0, 0.0), _plain(z), _plain(x))
+    kind = KINDS[joint.kind]
+    single = len(kind.directions) == 1
+    m.joint(kind(name, *ends, start=start if single else None, friction=friction))
+    if single and joint.mimic is None:
+        torque = m.input(f"tau_{name}", "N m" if "turn" in kind.directions else "N")
+        motor = JointSpringDamper(f"motor_{name}", name, _direction(kind), actuator=torque)
+        m.force(motor)
+    elif not single and (joint.damping or joint.friction):
+        yield f"<dynamics> of {joint.kind} joint '{joint.name}'"
+
+
+def _direction(kind: type[Joint]) -> str:
+    return "turn" if "turn" in kind.directions else "slide"
+
+
+def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:
+    """Make joints follow those they mimic."""
+    directions = {joint.name: _direction(type(joint)) for joint in m.joints}
+    for joint in moved:
+        if joint.mimic is not None:
+            a, b = names.joints[joint.mimic.joint], names.joints[joint.name]
+            ratio, offset = joint.mimic.multiplier, joint.mimic.offset
+            m.constraint(Gear(f"{b}_mimic", a, b, ratio, offset, directions[a], directions[b]))
+
+
+def _plain(values: Array) -> tuple[float, float, float]:
+    """Three floats."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,371 @@
+"""A URDF file as data: links, joints, bodies of links that are fixed to each other."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import final
+from xml.parsers import expat
+
+import numpy as np
+
+from symfric.foundation import checks
+from symfric.multibody.spatial import unphysical
+from symfric.multibody.urdf_notes import Array, Notes
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+SINGLE = KINDS[:3]
+"""Joints of one coordinate."""
+LIMITS = ("lower", "upper", "effort", "velocity")
+POINT = 1e-15
+"""Inertia over mass [m^2] that is rounding: a radius of gyration of 30 nm."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass [kg], centre of mass [m] and inertia about it [kg m^2], in the axes of the link."""
+
+    mass: float
+    com: Array
+    J: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Mimic:
+    """A joint that follows another one: q = multiplier q_joint + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """A joint tag.
+
+    Attributes:
+        kind: one of `KINDS`.
+        parent, child: links.
+        R, p: pose of the child link in the parent link while the joint is at zero.
+        axis: unit vector in the axes of the child link.
+        damping: [N s/m] or [N m s/rad].
+        friction: [N] or [N m].
+        limits: lower and upper [m, rad], effort [N, N m], velocity [m/s, rad/s], where given.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    R: Array
+    p: Array
+    axis: Array
+    damping: float
+    friction: float
+    limits: Mapping[str, float]
+    mimic: Mimic | None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Urdf:
+    """A robot as its file describes it.
+
+    Attributes:
+        name: of the robot.
+        links: what each link weighs; None for a massless one.
+        joints: every link but the root is the child of one.
+        left_out: tags that say something which is not in here, each with where it stands.
+        doubts: what cannot be meant as it stands and is taken as it is, each with its path.
+    """
+
+    name: str
+    links: Mapping[str, Inertial | None]
+    joints: tuple[UrdfJoint, ...]
+    left_out: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def root(self) -> str:
+        """The link that is nobody's child."""
+        children = {joint.child for joint in self.joints}
+        return next(link for link in self.links if link not in children)
+
+    def zero(self, joint: UrdfJoint) -> float:
+        """Where a joint stands while all joints that mimic no other are at zero [m, rad]."""
+        if joint.mimic is None:
+            return 0.0
+        leader = next(other for other in self.joints if other.name == joint.mimic.joint)
+        return joint.mimic.multiplier * self.zero(leader) + joint.mimic.offset
+
+    def outwards(self) -> Iterator[UrdfJoint]:
+        """The joints, each after the one that carries its parent."""
+        below: dict[str, list[UrdfJoint]] = {}
+        for joint in self.joints:
+            below.setdefault(joint.parent, []).append(joint)
+        waiting = [self.root]
+        while waiting:
+            for joint in below.get(waiting.pop(0), []):
+                waiting.append(joint.child)
+                yield joint
+
+
+def parse(source: str | Path, strict: bool = False) -> Urdf:
+    """Read a URDF file.
+
+    Args:
+        source: path of a file, or its text (which begins with "<").
+        strict: refuse what no rigid body has (a negative principal moment, one larger than the sum
+            of the others, an inertia without a mass) and joints that mimic one the file does not
+            have; otherwise the former is taken as it is, the latter move on their own.
+
+    Raises:
+        ValueError: no XML, no tree of links, or numbers that cannot be, all problems at once, each
+            with its path ("urdf 'arm' > joint 'elbow' > axis").
+        OSError: the file cannot be read.
+    """
+    is_text = isinstance(source, str) and source.lstrip().startswith("<")
+    where = "urdf" if is_text else f"urdf '{checks.path('urdf', source)}'"
+    if not is_text and not Path(source).is_file():
+        raise ValueError(f"{where}: expected a file, got nothing there; check the path")
+    content = str(source).strip().encode() if is_text else Path(source).read_bytes()
+    try:
+        robot = _tags(content, "utf-8" if is_text else None)
+    except expat.ExpatError as error:
+        raise ValueError(f"{where}: expected XML, got {error}") from None
+    if robot.tag != "robot":
+        raise ValueError(f"{where}: expected <robot> as its outermost tag, got <{robot.tag}>")
+    name = robot.get("name") or ("robot" if is_text else Path(source).stem)
+    notes = Notes(strict)
+    links = {tag.get("name", ""): _inertial(tag, notes) for tag in robot.findall("link")}
+    joints = tuple(_joint(tag, notes) for tag in robot.findall("joint"))
+    notes.others("", robot, {"link", "joint"})
+    _check_names(robot, notes)
+    if not notes.problems:
+        joints = tuple(_known_leader(joint, joints, notes) for joint in joints)
+        notes.problems.extend([*_tree_problems(links, joints), *_mimic_problems(joints)])
+    if notes.problems:
+        raise ValueError("\n".join(f"urdf '{name}' > {text}" for text in notes.problems))
+    left = tuple(
+        f"<{tag}>" + (f" of {', '.join(at)}" if any(at) else "")
+        for tag, at in notes.left_out.items()
+    )
+    return Urdf(name, links, joints, left, tuple(notes.doubts))
+
+
+def _tags(content: bytes, encoding: str | None) -> ET.Element:
+    """The outermost tag; prefixes need not be declared, because many files do not."""
+    builder, parser = ET.TreeBuilder(), expat.ParserCreate(encoding)
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(content, True)
+    return builder.close()
+
+
+def _inertial(tag: ET.Element, notes: Notes) -> Inertial | None:
+    link = f"link '{tag.get('name', '')}'"
+    notes.others(link, tag, {"inertial"})
+    inertial = tag.find("inertial")
+    if inertial is None:
+        return None
+    where = f"{link} > inertial"
+    notes.others(link, inertial, {"origin", "mass", "inertia"})
+    for key in ("mass", "inertia"):
+        if inertial.find(key) is None:
+            notes.problems.append(f"{where} > {key}: expected a tag, found none")
+    R, com = notes.pose(where, inertial)
+    mass = notes.number(f"{where} > mass", inertial.find("mass"), "value")
+    inertia, at = inertial.find("inertia"), f"{where} > inertia"
+    xx, yy, zz, xy, xz, yz = (
+        notes.number(at, inertia, key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    )
+    given = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass < 0:
+        notes.problems.append(f"{where} > mass: expected >= 0 kg, got {mass:g}")
+        return None
+    J = given if np.abs(given).max() > POINT * mass else np.zeros((3, 3))
+    for text in unphysical(J, point=True) if mass else _weightless(J):
+        notes.doubt(f"{where} > {text}")
+    return Inertial(mass, com, R @ J @ R.T) if mass or J.any() else None
+
+
+def _weightless(J: Array) -> Iterator[str]:
+    """An inertia without a mass."""
+    if J.any():
+        yield "mass: expected > 0 kg, because there is an inertia, got 0"
+
+
+def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
+    name, kind = tag.get("name", ""), tag.get("type", "")
+    where = f"joint '{name}'"
+    known = {"origin", "parent", "child", "axis", "dynamics", "limit", "mimic"}
+    notes.others(where, tag, known)
+    if kind not in KINDS:
+        notes.problems.append(f"{where} > type: expected one of {', '.join(KINDS)}, got '{kind}'")
+    dynamics, limit = tag.find("dynamics"), tag.find("limit")
+    for key in () if dynamics is None else dynamics.keys():
+        if key not in ("damping", "friction"):
+            notes.left(f"dynamics {key}", where)
+    if limit is not None and kind != "fixed":
+        notes.left("limit", where)
+    # what a joint does not have says nothing, and exporters write zeros there
+    along = None if kind in ("fixed", "floating") else tag.find("axis")
+    mimic = tag.find("mimic")
+    if kind == "fixed" and mimic is not None:
+        notes.left("mimic", where)
+        mimic = None
+    axis = notes.numbers(f"{where} > axis", along, "xyz", "1 0 0")
+    length = float(np.linalg.norm(axis))
+    if not length > 1e-12:
+        notes.problems.append(f"{where} > axis: expected a direction, got '0 0 0'")
+    damping, friction = (
+        notes.number(f"{where} > dynamics", dynamics, key) for key in ("damping", "friction")
+    )
+    for key, value in (("damping", damping), ("friction", friction)):
+        if value < 0:
+            notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {value:g}")
+    ends = {key: _end(where, tag.find(key), key, notes) for key in ("parent", "child")}
+    R, p = notes.pose(where, tag)
+    return UrdfJoint(
+        name, kind, ends["parent"], ends["child"], R, p, axis / (length or 1.0), damping, friction,
+        {key: notes.number(f"{where} > limit", limit, key) for key in LIMITS
+         if limit is not None and key in limit.attrib},
+        _mimic(where, mimic, notes),
+    )  # fmt: skip
+
+
+def _end(where: str, tag: ET.Element | None, key: str, notes: Notes) -> str:
+    link = "" if tag is None else tag.get("link", "")
+    if not link:
+        notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
+    return link
+
+
+def _mimic(where: str, tag: ET.Element | None, notes: Notes) -> Mimic | None:
+    if tag is None:
+        return None
+    at = f"{where} > mimic"
+    return Mimic(
+        tag.get("joint", ""), notes.number(at, tag, "multiplier", "1"),
+        notes.number(at, tag, "offset"),
+    )  # fmt: skip
+
+
+def _check_names(robot: ET.Element, notes: Notes) -> None:
+    """Every link and every joint has a name of its own."""
+    for kind in ("link", "joint"):
+        names = [tag.get("name", "") for tag in robot.findall(kind)]
+        for name in dict.fromkeys(names):
+            if not name:
+                notes.problems.append(f"{kind}: expected a name, found none")
+            elif names.count(name) > 1:
+                notes.problems.append(f"{kind} '{name}': expected every name once")
+        if kind == "link" and not names:
+            notes.problems.append("link: expected at least one, got none")
+
+
+def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterator[str]:
+    """Why the joints do not make a tree of the links."""
+    carriers: dict[str, list[str]] = {link: [] for link in links}
+    for joint in joints:
+        for key, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in carriers:
+                yield f"joint '{joint.name}' > {key}: expected a link, got '{link}'"
+        carriers.setdefault(joint.child, []).append(joint.name)
+    for link, above in carriers.items():
+        for first, second in pairwise(above):
+            yield f"link '{link}': expected one joint that carries it, got {first}, {second}"
+    roots = [link for link, above in carriers.items() if not above]
+    if len(roots) != 1:
+        yield f"expected one link that no joint carries, got {', '.join(roots) or 'a closed loop'}"
+        return
+    reached = {roots[0]}
+    while more := {j.child for j in joints if j.parent in reached} - reached:
+        reached |= more
+    for link in carriers:
+        if link not in reached:
+            yield f"link '{link}': expected joints that lead to '{roots[0]}', got a closed loop"
+
+
+def _known_leader(joint: UrdfJoint, joints: Sequence[UrdfJoint], notes: Notes) -> UrdfJoint:
+    """The joint; one that moves on its own where the file lacks the joint that it mimics."""
+    if joint.mimic is None or any(joint.mimic.joint == other.name for other in joints):
+        return joint
+    leader = joint.mimic.joint or "one without a name"
+    notes.doubt(f"joint '{joint.name}' > mimic: expected a joint of the file, got {leader}")
+    return replace(joint, mimic=None)
+
+
+def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:
+    """Followers whose chain of leaders does not end in a joint that turns or slides."""
+    along = {joint.name: joint for joint in joints if joint.kind in SINGLE}
+    for joint in joints:
+        leader, steps = joint, 0
+        while leader is not None and leader.mimic is not None and steps <= len(joints):
+            leader, steps = along.get(leader.mimic.joint), steps + 1
+        if joint.mimic is not None and (leader is None or leader.mimic or joint.name not in along):
+            yield (
+                f"joint '{joint.name}' > mimic: expected joints of kind {', '.join(SINGLE)} whose "
+                f"chain ends in one that mimics no other, got '{joint.mimic.joint}'"
+            )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Where a link is: the link whose body it is part of, and its pose there."""
+
+    body: str
+    R: Array
+    p: Array
+
+
+def carried(urdf: Urdf) -> dict[str, Carried]:
+    """Every link: a body of its own, or fixed to another one."""
+    found = {urdf.root: Carried(urdf.root, np.eye(3), np.zeros(3))}
+    for joint in urdf.outwards():
+        on = found[joint.parent]
+        found[joint.child] = (
+            Carried(on.body, on.R @ joint.R, on.p + on.R @ joint.p)
+            if joint.kind == "fixed"
+            else Carried(joint.child, np.eye(3), np.zeros(3))
+        )
+    return found
+
+
+def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
+    """Mass, centre of mass and inertia about it of all links of a body."""
+    parts = [
+        (at, part)
+        for link, at in places.items()
+        if at.body == body and (part := urdf.links[link]) is not None
+    ]
+    mass = sum(part.mass for _, part in parts)
+    moment = sum((part.mass * (at.p + at.R @ part.com) for at, part in parts), np.zeros(3))
+    com = moment / mass if mass else moment
+    inertia = np.zeros((3, 3))
+    for at, part in parts:
+        d = at.p + at.R @ part.com - com
+        inertia += at.R @ part.J @ at.R.T + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Inertial(mass, com, inertia)
+
+
+def holding(urdf: Urdf) -> tuple[Urdf, tuple[str, ...]]:
+    """The robot with all joints fixed that move nothing but massless links, and their names.
+
+    Nothing would resist their motion, and it moves nothing. A massless link that carries a heavy
+    one, however far out, is no such case: its joints are the axes of one joint.
+    """
+    heavy = {link for link, weight in urdf.links.items() if weight is not None}
+    for joint in reversed(tuple(urdf.outwards())):
+        if joint.child in heavy:
+            heavy.add(joint.parent)
+    held = tuple(j.name for j in urdf.joints if j.kind != "fixed" and j.child not in heavy)
+    if not held:
+        return urdf, ()
+    joints = tuple(replace(j, kind="fixed") if j.name in held else j for j in urdf.joints)
+    return replace(urdf, joints=joints), held
