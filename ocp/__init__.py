@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from ocp.solving.methods import Fatrop as Fatrop
     from ocp.solving.methods import Ipopt as Ipopt
     from ocp.solving.methods import Sqp as Sqp
-    from ocp.solving.outcome import Progress as Progress
-    from ocp.solving.outcome import SolverStatistics as SolverStatistics
     from ocp.solving.solution import Mode as Mode
     from ocp.solving.solution import Solution as Solution
     from ocp.solving.solution import load as load
     from ocp.solving.solution import plot_solutions as plot_solutions
     from ocp.solving.starts import Guess as Guess
+    from ocp.transcription.program import Progress as Progress
+    from ocp.transcription.program import SolverStatistics as SolverStatistics
     from ocp.transcription.schemes import Legendre as Legendre
     from ocp.transcription.schemes import Radau as Radau
     from ocp.transcription.schemes import Shooting as Shooting

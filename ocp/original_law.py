@@ -27,11 +27,10 @@ from ocp.checking.verify import verified
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import solution_of
-from ocp.solving.outcome import Iterate, Report
 from ocp.solving.prepared import Clock
 from ocp.solving.solution import Solution
 from ocp.solving.starts import start_of
-from ocp.transcription.program import Program
+from ocp.transcription.program import Iterate, Program, Report
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription

@@ -21,10 +21,10 @@ from ocp.original_law import STEPS, OriginalLaw
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import Stored
 from ocp.solving.one_solve import Solver
-from ocp.solving.outcome import Report
 from ocp.solving.prepared import Clock
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
+from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status

@@ -21,9 +21,9 @@ from ocp.friction.sequence import Leg, flat, placed, shown, tracks_of
 from ocp.friction.transfer import CAUGHT, FIRST, PULLED, STOPPED, Known, breaks_away, points_in
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import Motion, motion_of
-from ocp.solving.outcome import Iterate, Outcome, Report, SolverStatistics
 from ocp.solving.prepared import Clock, Option
 from ocp.solving.solution import Mode, Solution
+from ocp.transcription.program import Iterate, Outcome, Report, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription

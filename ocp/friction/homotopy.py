@@ -40,10 +40,10 @@ from ocp.solving.motion import (
     stored_spans,
 )
 from ocp.solving.one_solve import Solver, solution_of, starts_around
-from ocp.solving.outcome import Iterate, Outcome, Report, SolverStatistics
 from ocp.solving.prepared import Clock, Prepared
 from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start, resample, start_of
+from ocp.transcription.program import Iterate, Outcome, Report, SolverStatistics
 from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription

@@ -42,9 +42,9 @@ from ocp.friction.sequence import (
 )
 from ocp.friction.transfer import Known, Reading, sequence_of, sizes_of, starts_at_rest
 from ocp.solving.methods import Ipopt
-from ocp.solving.outcome import Report
 from ocp.solving.prepared import Clock
 from ocp.solving.solution import Solution
+from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
 

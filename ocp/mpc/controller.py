@@ -240,18 +240,9 @@ class Controller:
             CompileError: as `start`.
         """
         return run_closed_loop(
-            self.design,
-            self.start(backend),
-            plant,
-            t_end,
-            references or {},
-            x0=x0,
-            p=p,
-            plant_p=plant_p,
-            noise=noise,
-            seed=seed,
-            check=check,
-        )
+            self.design, self.start(backend), plant, t_end, references or {},
+            x0=x0, p=p, plant_p=plant_p, noise=noise, seed=seed, check=check,
+        )  # fmt: skip
 
     def to_c(self, folder: str | Path) -> GeneratedController:
         """Write the controller as C99: `NAME.h` and `NAME.c`.

@@ -18,10 +18,10 @@ from ocp.formulation.phase import Box, Free, Span
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.motion import Motion, motion_of
-from ocp.solving.outcome import Outcome, Report
 from ocp.solving.prepared import Prepared
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, rates_of, start_of
+from ocp.transcription.program import Outcome, Report
 from ocp.transcription.schemes import Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription

@@ -10,15 +10,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.solving.outcome import (
-    Iterate,
-    Outcome,
-    Report,
-    SolverStatistics,
-    in_stage,
-    outside,
-    worst_of,
-)
 from ocp.solving.watch import (
     OVERDETERMINED,
     At,
@@ -30,7 +21,16 @@ from ocp.solving.watch import (
     plainly,
     sentence,
 )
-from ocp.transcription.program import Program
+from ocp.transcription.program import (
+    Iterate,
+    Outcome,
+    Program,
+    Report,
+    SolverStatistics,
+    in_stage,
+    outside,
+    worst_of,
+)
 from ocp.transcription.transcription import Transcription
 from symfric.foundation import checks
 from symfric.foundation.status import Status

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Free
 from ocp.formulation.problem import Posed, Problem, posed
 from ocp.solving.motion import Motion, Stored, Stretch, stored_spans, structure_of
-from ocp.solving.outcome import Iterate, SolverStatistics
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
 from symfric.foundation import checks, packed

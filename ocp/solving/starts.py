@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from ocp.formulation.phase import Box, Free, Link, Span
 from ocp.formulation.problem import Problem
 from ocp.solving.motion import Stored, StoredSpan, along, structure_of
-from ocp.solving.outcome import Iterate
 from ocp.solving.solution import Solution
+from ocp.transcription.program import Iterate
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks

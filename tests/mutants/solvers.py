@@ -3,7 +3,7 @@
 from mutants.mutant import Mutant
 
 WATCH, PREPARED = "ocp/solving/watch.py", "ocp/solving/prepared.py"
-OUTCOME, ANSWERS = "ocp/solving/outcome.py", WATCH
+OUTCOME, ANSWERS = "ocp/transcription/program.py", WATCH
 CONVEXIFY, STAGES = "ocp/solving/methods.py", "ocp/transcription/program.py"
 MOTION = STORED = "ocp/solving/motion.py"
 STARTS, ONE = "ocp/solving/starts.py", "ocp/solving/one_solve.py"

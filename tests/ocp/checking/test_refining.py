@@ -21,8 +21,8 @@ from ocp.problems import (
     hang_glider,
 )
 from ocp.solving.methods import Ipopt
-from ocp.solving.outcome import Progress
 from ocp.solving.solution import Solution
+from ocp.transcription.program import Progress
 from ocp.transcription.schemes import make_meshes
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status

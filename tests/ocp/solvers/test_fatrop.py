@@ -12,8 +12,8 @@ from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Fatrop, Ipopt
 from ocp.solving.one_solve import solve_once
-from ocp.solving.outcome import Progress
 from ocp.solving.starts import start_of
+from ocp.transcription.program import Progress
 from ocp.transcription.schemes import Legendre, Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import Status

@@ -13,8 +13,8 @@ from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import ANSWERS, Ipopt
 from ocp.solving.one_solve import solve_once
-from ocp.solving.outcome import Progress, in_stage
 from ocp.solving.solution import Solution
+from ocp.transcription.program import Progress, in_stage
 from symfric import Model, Status, Variable
 
 HARD = fastest_move()

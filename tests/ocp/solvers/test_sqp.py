@@ -8,8 +8,7 @@ from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Free
 from ocp.solving.methods import Convexified, Ipopt, Sqp
 from ocp.solving.one_solve import solve_once
-from ocp.solving.outcome import Progress
-from ocp.transcription.program import Place, Program
+from ocp.transcription.program import Place, Program, Progress
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import Model, Status, Variable
