@@ -1,5 +1,7 @@
 """Model predictive controllers made of problems, and their C in files."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -18,10 +20,7 @@ from ocp.mpc.horizon import Horizon, horizon_of
 from ocp.mpc.session import BACKENDS, Session
 from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
-from symfric.codegen.runner import (
-    compile_object,
-    needed_symbols,
-)
+from symfric.codegen.runner import compile_object, needed_symbols
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
