@@ -31,9 +31,9 @@ from symfric.integrator.equations.initial import (
 )
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State

@@ -18,9 +18,9 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
-from symfric.integrator.running.dense import pieces_of
 from symfric.integrator.running.events import Change, Eventful, Happened, Search
 from symfric.integrator.running.loop import Work, loop_source, width
+from symfric.integrator.running.record import pieces_of
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]

@@ -19,10 +19,10 @@ from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
 from symfric.integrator.running import loop
-from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.engine import Engine, Stop
 from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Outputs
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
