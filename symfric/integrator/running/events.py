@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import partial
-from typing import Any, cast, final
+from typing import final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running.crossings import (
     ALIKE,
@@ -216,13 +216,9 @@ def _called(function: ca.Function) -> Callable[..., list[Array]]:
     """`function` of flat arrays, with a buffer of its own that its results lie in."""
     arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
     results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-    buffer, call = cast(tuple[Any, Any], function.buffer())
-    for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
-        for i, array in enumerate(arrays):
-            if array.size:
-                place(i, flat_view(array))
+    call = bound(function, arguments, results)
 
-    def called(*values: Array, _alive: object = buffer) -> list[Array]:
+    def called(*values: Array) -> list[Array]:
         for argument, value in zip(arguments, values, strict=True):
             argument[:] = value
         call()
