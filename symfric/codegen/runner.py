@@ -6,7 +6,7 @@ the inputs, and with guards the status.
 
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +23,7 @@ from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, p
 from symfric.emitter.c99 import Real
 from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.graph import graph
+from symfric.foundation.numeric import bound
 from symfric.foundation.programs import PATIENCE, ProgramError, finished
 
 WARNINGS = tuple(
@@ -275,25 +276,6 @@ def run_vm(
         row[:] = np.concatenate([following, y, *others, said[k : k + 1] if guards else ()])
         x[:] = following
     return rows
-
-
-def bound(
-    function: ca.Function, arguments: Sequence[Array], results: Sequence[Array]
-) -> Callable[[], None]:
-    """A call without copies: CasADi reads and writes the arrays themselves."""
-    buffer: Any
-    buffer, evaluate = function.buffer()
-    for i, array in enumerate(arguments):
-        if array.size:
-            buffer.set_arg(i, array.data)
-    for i, array in enumerate(results):
-        if array.size:
-            buffer.set_res(i, array.data)
-
-    def call(alive: object = (function, buffer)) -> None:
-        evaluate()
-
-    return call
 
 
 def signals(block: Block, *, guards: bool = True) -> list[str]:

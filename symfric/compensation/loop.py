@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
 from symfric.codegen.layout import TEMPLATES, called, filled, prefix
-from symfric.codegen.runner import FLAGS, bound
+from symfric.codegen.runner import FLAGS
 from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
 from symfric.foundation.files import write_text
+from symfric.foundation.numeric import bound
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant

@@ -14,8 +14,7 @@ MODULES = (
     "symfric.foundation.variable", "symfric.laws.", "symfric.model.", "symfric.scenes.",
     "symfric.multibody.joint", "symfric.results.ensemble", "symfric.results.statistics",
     "symfric.integrator.stored", "symfric.integrator.derivatives.path",
-    "symfric.integrator.equations.inputs", "symfric.integrator.running.dense",
-    "symfric.integrator.running.events",
+    "symfric.integrator.equations.inputs", "symfric.integrator.running.record",
     "ocp.checking.verification", "ocp.solving.motion", "ocp.solving.solution", "ocp.formulation.",
     "ocp.transcription.program",
     "ocp.transcription.unknowns", "ocp.transcription.schemes",
@@ -26,6 +25,8 @@ MODULES = (
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
 MOVED = {
+    "symfric.integrator.running.dense": "symfric.integrator.running.record",
+    "symfric.integrator.running.events": "symfric.integrator.running.record",
     "symfric.integrator.derivatives.seeds": "symfric.integrator.derivatives.path",
     "symfric.laws.base.curve": "symfric.laws.base.families",
     "symfric.laws.base.facts": "symfric.laws.base.law",

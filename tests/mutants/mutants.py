@@ -330,7 +330,7 @@ CACHES = (
         ("tests/symfric/integrator/running/test_bits.py",),
     ),
     Mutant(
-        "outputs at a jump are those before it", "symfric/integrator/running/dense.py",
+        "outputs at a jump are those before it", "symfric/integrator/running/record.py",
         'side="right" if last else "left"', 'side="right"', T_OUTPUTS,
     ),
     Mutant(

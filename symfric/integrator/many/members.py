@@ -16,11 +16,11 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.running.dense import Outputs, pieces_of
 from symfric.integrator.running.engine import Stop, VmEngine
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.loop import Work, filled
 from symfric.integrator.running.plants import AGAIN, REFUSED, SEARCH, Advance, Plants, loaded
+from symfric.integrator.running.record import Outputs, pieces_of
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]

@@ -8,21 +8,21 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any, cast, final
+from typing import final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
 from symfric.integrator.running import loop
-from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.engine import Engine, Stop
 from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Outputs
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -145,10 +145,7 @@ def in_vm(integrator: Integrator, plants: Plants) -> Advance:
     """The loop in Python; needs no compiler."""
     step, follow, nx = integrator.step, integrator.follow, integrator.system.nx
     S, R, after = (np.zeros(k) for k in (step.numel_in(0), step.numel_in(1), step.numel_in(0)))
-    buffer, attempt = cast(tuple[Any, Any], step.buffer())
-    buffer.set_arg(0, flat_view(S))
-    buffer.set_arg(1, flat_view(R))
-    buffer.set_res(0, flat_view(after))
+    attempt = bound(step, (S, R), (after,))
     data, held = Given.d(nx), plants.u.shape[1]
 
     def runs(b: int) -> int:
@@ -178,7 +175,7 @@ def in_vm(integrator: Integrator, plants: Plants) -> Advance:
         plants.S[b, State.Y] = found
         return True
 
-    def advance(begin: int, _alive: object = buffer) -> int:
+    def advance(begin: int) -> int:
         if begin and not np.isfinite(plants.u).all():
             return REFUSED
         for b in range(plants.S.shape[0]):
@@ -363,13 +360,7 @@ class Looks:
         function, nx = self.integrator.signals, self.integrator.system.nx
         p, data = self.plants, Given.d(nx)
         for S, R, out in zip(p.S, p.R, self.values, strict=True):
-            buffer, call = cast(tuple[Any, Any], function.buffer())
-            rows = (S[State.T : State.T + 1], S[State.Y], R[data])
-            for i, array in enumerate(rows):
-                if array.size:
-                    buffer.set_arg(i, flat_view(array))
-            buffer.set_res(0, flat_view(out))
-            call()
+            bound(function, (S[State.T : State.T + 1], S[State.Y], R[data]), (out,))()
 
     def _in_c(self) -> Callable[[], None]:
         library = load(look_source(self.integrator), "symfric_look")
