@@ -239,7 +239,7 @@ def _of_numbers(
 
 
 def _at_rest(block: Block, zero: str = "") -> bool:
-    """Whether force and states are finite at rest, with the parameter `zero` at 0."""
+    """Return True if force and states are finite at rest, with the parameter `zero` at 0."""
     states = [v.start for v in block.states]
     p = [0.0 if v.name == zero else v.start for v in block.parameters]
     rest = [0.0 if v.name == "v" else v.nominal for v in block.inputs]
@@ -247,7 +247,7 @@ def _at_rest(block: Block, zero: str = "") -> bool:
 
 
 def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
-    """What docstrings say of the law and of those that it holds, for the data sheet.
+    """Texts of the data sheet from the docstrings of the law and of those that it holds.
 
     Of parameters without effect, `idle`, nothing is said, nor of N = 0, where the block, other than
     the law, is right.

@@ -26,7 +26,7 @@ number."""
 @final
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What a step of h [s] makes of the states of a law, columns.
+    """States of a law after a step of h [s], columns.
 
     Attributes:
         end, mean: the states after it, and their mean over it.
@@ -233,7 +233,7 @@ def with_unloaded_case(
 
 
 def needs_unloaded_case(law: Law, own: ca.Function, cases: ca.Function) -> bool:
-    """Whether the formulas of `law` are not finite at N = 0, or hold a force at rest there.
+    """Return True if the formulas of `law` are not finite at N = 0, or hold a force at rest there.
 
     Elements of event forms let go at once. A law that has a level of its own there, such as by a
     preload, keeps its formulas.
@@ -266,7 +266,7 @@ def _level(law: Law) -> float:
 
 
 def _is_finite(expression: ca.SX) -> bool:
-    """Whether no 0/0 is in an expression, at numbers that no formula treats specially."""
+    """Return True if no 0/0 is in an expression, at numbers that no formula treats specially."""
     symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(expression))
     value = ca.evalf(ca.substitute(expression, symbols, 0.7 * ca.SX.ones(symbols.numel())))
     return bool(np.isfinite(float(value)))

@@ -52,7 +52,7 @@ SOURCES = (
 @final
 @dataclass(frozen=True)
 class Options:
-    """What is variable in the inverse dynamics; see `inverse_dynamics_block`."""
+    """Variable parts of the inverse dynamics; see `inverse_dynamics_block`."""
 
     payload: str | None = None
     payload_inertia: bool = False
@@ -238,7 +238,7 @@ class _Machine:
         }
 
     def texts(self, what: str, parts: Sequence[Rubbing]) -> dict[str, Any]:
-        """What the data sheet says."""
+        """Texts of the data sheet."""
         laws = {part.law.name: part.law for part in parts}
         order = ", ".join(f"{k} {v.name}" for k, v in enumerate(self.joints, start=1))
         where = (
