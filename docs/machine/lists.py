@@ -277,7 +277,7 @@ SOURCES = re.compile(
 )
 YEAR = re.compile(r"\b1[6-9]\d\d\b|\b20\d\d\b")
 ASIDE = ("laws", "gallery", "bench", "stress", "cli")
-"""Rooms of symfric whose sources stand elsewhere, or are those of tables."""
+"""Packages of symfric whose sources stand elsewhere, or are those of tables."""
 
 
 def literature_page() -> str:

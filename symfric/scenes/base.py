@@ -27,7 +27,7 @@ from symfric.foundation.variable import check_si
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables
-from symfric.model.holding import APPLIED
+from symfric.model.forces import APPLIED
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.scenes.presets import Preset
 
