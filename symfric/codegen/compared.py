@@ -62,7 +62,7 @@ class Run:
 
     @property
     def block(self) -> Block:
-        """What was generated."""
+        """The block that was generated."""
         return self.generated.block
 
     @cached_property
@@ -79,7 +79,7 @@ class Run:
 
     @cached_property
     def tied(self) -> NDArray[np.bool_]:
-        """Where a mode differs in float because its decision ties, shape (steps, columns).
+        """Mask of modes that differ in float because their decision ties, shape (steps, columns).
 
         That is where the mode of the C is one that CasADi's own operations come to when each is
         rounded to float, to nearest or by chance up or down. Nothing else in that step is excused.
@@ -97,7 +97,7 @@ class Run:
         return found
 
     def _rounded(self, rows: NDArray[np.int64]) -> Array | None:
-        """What the operations of CasADi in float make of some of the steps, see `rounded`."""
+        """Results of CasADi's operations in float for some of the steps, see `rounded`."""
         states, parameters, inputs = self._arguments
         own = np.broadcast_to(parameters, (len(inputs), parameters.shape[-1]))
         return rounded(self.block, states[rows], own[rows], inputs[rows])
@@ -123,7 +123,7 @@ class Run:
 
     @property
     def rounding(self) -> float | None:
-        """How far rounding to float in the worst step may move the worst signal, see `rounded`.
+        """Largest change of the worst signal by rounding to float in the worst step, see `rounded`.
 
         None where it is not known.
         """

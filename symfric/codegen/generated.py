@@ -29,7 +29,7 @@ from symfric.laws import AnyLaw, Population
 @final
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """What `generate` wrote.
+    """Files that `generate` wrote.
 
     Attributes:
         block: what the C computes.

@@ -43,7 +43,7 @@ STEP_SIZE = "h"
 
 
 class Status(IntFlag):
-    """What a step found and mended; 0 if all was well."""
+    """Bits for what a step repaired; 0 if nothing."""
 
     CLAMPED = 1
     NOT_FINITE = 2
@@ -64,7 +64,7 @@ MEANING = {
 @final
 @dataclass(frozen=True)
 class Range:
-    """What a number may be, closed, and what takes its place where it is none."""
+    """Closed range of a number, and the value that replaces one that is not finite."""
 
     low: float
     high: float

@@ -50,7 +50,7 @@ class Member:
 
     @property
     def count(self) -> int:
-        """How many numbers it holds."""
+        """Number of its values."""
         return max(self.size, 1)
 
     @property
@@ -62,7 +62,7 @@ class Member:
 
 
 def prefix(block: Block, real: Real) -> str:
-    """What all names of a block in one type begin with; also the name of its files."""
+    """Prefix of all names of a block in one type, and of its files."""
     return f"{block.name}_{real.suffix}"
 
 
@@ -98,7 +98,7 @@ def places(block: Block, group: str) -> tuple[str, ...]:
 
 
 def indexed(block: Block, results: Sequence[str], guards: bool) -> Arrays:
-    """What loops may index: the arrays of the structs in the order of `GROUPS`.
+    """Arrays that loops may index: those of the structs in the order of `GROUPS`.
 
     Args:
         results: the structs that the results of the function are written to.

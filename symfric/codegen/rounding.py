@@ -116,7 +116,7 @@ PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
 
 
 def functions(block: Block) -> list[ca.Function]:
-    """What makes the columns of a row: the step and the further initialisations."""
+    """Functions that give the columns of a row: the step and the further initialisations."""
     return [block.step, *(block.reset(name) for name in block.resets)]
 
 
@@ -151,7 +151,7 @@ def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDAr
 
 
 def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array | None:
-    """What CasADi's operations make of some steps in float, shape (SAMPLES, steps, columns).
+    """Results of CasADi's operations in float, shape (SAMPLES, steps, columns).
 
     Args:
         states, parameters, inputs: before and in every step, shape (steps, ...).

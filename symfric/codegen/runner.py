@@ -288,7 +288,7 @@ def signals(block: Block, *, guards: bool = True) -> list[str]:
 @final
 @dataclass(frozen=True, eq=False)
 class GuardModel:
-    """What the guards of a block do, on rows of numbers of one type."""
+    """The guards of a block in NumPy, on rows of numbers of one type."""
 
     block: Block
     real: Real
@@ -312,7 +312,7 @@ class GuardModel:
         return found, status
 
     def lost(self, states: Array) -> bool:
-        """Whether the states (states,) restart before a step."""
+        """Return True if the states (states,) restart before a step."""
         return not bool((np.abs(states) <= self._limits).all())
 
     def parameters(self, values: Array) -> tuple[Array, int]:

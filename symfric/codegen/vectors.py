@@ -177,7 +177,7 @@ def _is_sound(spread: Array, tolerance: Array) -> NDArray[np.bool_]:
 
 
 def _spread(block: Block, real: Real, steps: Steps, results: Array) -> Array:
-    """What rounding the numbers that go in changes in the results, shape (rows, results)."""
+    """Changes of the results by rounding of the inputs, shape (rows, results)."""
     random, found = np.random.default_rng(1), np.zeros_like(results)
     unit = float(np.finfo(f"f{real.size}").eps)
     first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
@@ -224,7 +224,7 @@ SIDES = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX})
 
 
 def _outcomes(block: Block, real: Real, steps: Steps) -> Array:
-    """How the comparisons in a step come out, shape (rows, comparisons)."""
+    """Outcomes of the comparisons in a step, shape (rows, comparisons)."""
     source = graph(block.step)
     asked = [(i, n) for i, n in enumerate(source.nodes) if n.op in COMPARISONS | SIDES]
     if not (asked and len(steps)):

@@ -131,7 +131,7 @@ WHERE = "close_loop"
 @final
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What all runs of a comparison share; see `close_loop`."""
+    """Settings that all runs of a comparison share; see `close_loop`."""
 
     controller: Cascade
     delay: int

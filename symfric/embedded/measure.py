@@ -81,7 +81,7 @@ class Measured:
 
     @property
     def ok(self) -> bool:
-        """Whether it was measured and all numbers are finite."""
+        """Return True if it was measured and all numbers are finite."""
         return self.status == MEASURED and self.finite
 
     def to_dict(self) -> dict[str, Any]:
@@ -210,7 +210,7 @@ def wrong_on_target(
     flags: Sequence[str] = ("-O2",),
     tools: Tools | Absent | None = None,
 ) -> int:
-    """How many results of the kit's own unit test are wrong on a core under QEMU.
+    """Number of wrong results of the kit's own unit test on a core under QEMU.
 
     Args:
         generated: what `generate` returned, with the floating point type `real`.

@@ -211,7 +211,7 @@ class Absent:
 
     @property
     def advice(self) -> str:
-        """What is absent and how to get it, in a sentence."""
+        """Sentence with the absent tools and how to install them."""
         packages = " ".join(PACKAGES[name] for name in self.names)
         return (
             f"{', '.join(self.names)} not found; on Debian and Ubuntu: "
@@ -231,7 +231,7 @@ def find_tools() -> Tools | Absent:
 
 
 def _has_library(gcc: str) -> bool:
-    """Whether the compiler finds the mathematical library: asked, it says a path, not a name."""
+    """Return True if the compiler finds libm: it then prints a path and not only the name."""
     try:
         said = finished((gcc, "-print-file-name=libm.a"), limit=LIBRARY_PATIENCE).output.strip()
     except ProgramError:
@@ -260,7 +260,7 @@ PATIENCE = 120.0
 @final
 @dataclass(frozen=True, eq=False)
 class Said:
-    """What a program said.
+    """Output of a program.
 
     Attributes:
         instructions: of every step, shape (steps,); each to a third of one, their mean exactly.
@@ -304,7 +304,7 @@ class Target:
         return image
 
     def heard(self, image: Path) -> dict[str, NDArray[np.uint32]]:
-        """What an image says under QEMU: words by the name before them.
+        """Run an image under QEMU; its words by the name before them.
 
         Raises:
             CompileError: it does not start, comes to no end, or ends in a fault.
@@ -346,7 +346,7 @@ def built(subject: Subject, real: str, inputs: Array, columns: int, target: Targ
 
 
 def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
-    """What a measured program said."""
+    """Output of a measured program."""
     kind = REALS[real].kind
     ticks = words["ticks"] - words["idle"].mean()
     return Said(

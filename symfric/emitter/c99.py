@@ -73,7 +73,7 @@ REALS = {real.name: real for real in (DOUBLE, FLOAT)}
 
 @dataclass(frozen=True)
 class Form:
-    """How an operation is written: `pattern` with operands that bind as tightly as `needs`.
+    """C text of an operation: `pattern` with operands that bind as tightly as `needs`.
 
     Attributes:
         logical: the result is a bool.
@@ -147,7 +147,7 @@ FUNCTIONS = CHEAP | TRANSCENDENTAL
 
 
 def form(op: int, arity: int, real: Real) -> Form:
-    """How the operation `op` with `arity` operands is written."""
+    """C text of the operation `op` with `arity` operands."""
     if op in FORMS:
         return FORMS[op]
     operands = ", ".join(["{}"] * arity)

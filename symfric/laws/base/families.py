@@ -85,7 +85,7 @@ class Sticking(Law):
     @property
     @abstractmethod
     def has_mode(self) -> bool:
-        """Whether rest is a mode and not a band of velocities."""
+        """Return True if rest is a mode and not a band of velocities."""
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -124,7 +124,7 @@ class Sticking(Law):
 
 
 def rests(mode: Scalar) -> Scalar:
-    """Whether `mode`, -1, 0 or 1 but for the overload that error control sees, says rest."""
+    """Return True if `mode`, -1, 0 or 1 but for the overload that error control sees, says rest."""
     return smooth.magnitude(mode, 0.0) < 0.5
 
 

@@ -222,7 +222,7 @@ class Armstrong(Law):
         return exp(x), -expm1(x)
 
     def _balance(self, v: Scalar) -> Scalar:
-        """Where the dwell grows as fast as it is lost.
+        """Dwell time at which growth equals loss.
 
         The root of what is lost, `slip` gamma, is written with |v|: it has a slope at rest, too.
         """

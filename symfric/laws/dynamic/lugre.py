@@ -44,7 +44,7 @@ class Bristle(Levels, StribeckLevel):
         return column(self.level(v, N) / self.sigma_0 * smooth.sign(v, self.v_eps))
 
     def warnings(self) -> tuple[str, ...]:
-        """Whether the law may push: its passivity needs viscous friction."""
+        """Return True if the law may push: its passivity needs viscous friction."""
         needed = (self.mu_s - self.mu_d) / self.mu_d * self.sigma_1
         if not is_number(needed) or not is_number(self.sigma_2) or self.sigma_2 >= needed:
             return ()

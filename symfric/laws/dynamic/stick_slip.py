@@ -155,7 +155,7 @@ class StickSlip(Levels):
         return column((1 - slip) * stretch - slip * forgotten)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Where growth and loss are equal, none left beyond v_s, shape (1, 1).
+        """Deformation at which growth equals loss, zero beyond v_s, shape (1, 1).
 
         The root of slip r + (1 - slip) (r^n - 1), convex, by Newton's method from r = 1.
         """
