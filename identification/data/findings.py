@@ -176,6 +176,28 @@ class View:
         times = (float(first), float(last)) if t is None else (float(t[first]), float(t[last]))
         return Finding(kind, self.number, signal, sentence, *times, severity)
 
+    def error(
+        self,
+        kind: str,
+        signal: str,
+        sentence: str,
+        begin: int | None = None,
+        end: int | None = None,
+    ) -> Finding:
+        """A finding after which no fit of these data can be physics."""
+        return self.finding(kind, signal, sentence, "error", begin, end)
+
+    def warning(
+        self,
+        kind: str,
+        signal: str,
+        sentence: str,
+        begin: int | None = None,
+        end: int | None = None,
+    ) -> Finding:
+        """A finding that leaves numbers doubtful."""
+        return self.finding(kind, signal, sentence, "warning", begin, end)
+
     def at(self, sample: int) -> str:
         """A place in words: its time and its row."""
         t = self.record.t
