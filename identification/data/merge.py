@@ -13,7 +13,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import GAP, Record
+from identification.data.record import GAP, Record, runs
 from identification.data.resample import SHORTEST, hermite, interpolated
 from symfric.foundation import checks
 
@@ -286,9 +286,7 @@ def _joined(
     t, at = second.time, delay.second(first.time)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     there = (at >= t[0]) & (at <= t[-1]) & (t[k + 1] - t[k] <= GAP * second.median_step)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
-    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    kept = [slice(a, b) for a, b in runs if b - a >= SHORTEST]
+    kept = [slice(a, b) for a, b in runs(there) if b - a >= SHORTEST]
     if not kept:
         raise ValueError(
             f"{where}: expected a time that both have in common, got {first.time[0]:g} ... "
