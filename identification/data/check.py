@@ -10,6 +10,7 @@ from identification.data.check_drive import (
     of_drift,
     of_excitation,
     of_motion,
+    of_one_way,
     of_residue,
 )
 from identification.data.check_signals import (
@@ -33,12 +34,8 @@ def of_times(view: View) -> Iterator[Finding]:
     """Gaps, irregular intervals, too few samples, times that may be in another unit."""
     record = view.record
     if record.size < FEW:
-        yield view.finding(
-            "short",
-            "t",
-            f"There are {record.size} samples only.",
-            "error" if record.size < FEWEST else "warning",
-        )
+        text = f"There are {record.size} samples only."
+        yield view.finding("short", "t", text, "error" if record.size < FEWEST else "warning")
     if record.t is None or record.size < 3:
         return
     intervals = np.diff(record.t)
@@ -46,38 +43,28 @@ def of_times(view: View) -> Iterator[Finding]:
     gaps = np.flatnonzero(intervals > GAP * usual)
     if gaps.size:
         k = int(gaps[np.argmax(intervals[gaps])])
-        yield view.finding(
-            "gap",
-            "t",
+        text = (
             f"The times have {gaps.size} gap(s), the longest of {intervals[k]:.3g} s at "
-            f"{view.at(k)}: data.resampled() makes a record of each piece.",
-            "warning",
-            k,
-            k + 1,
+            f"{view.at(k)}: data.resampled() makes a record of each piece."
         )
+        yield view.warning("gap", "t", text, k, k + 1)
     off = np.abs(intervals - usual)
     off[gaps] = 0.0
     k = int(np.argmax(off))
     if off[k] > 2 * JITTER * usual:
         uneven = float(np.mean(off > 2 * JITTER * usual))
-        yield view.finding(
-            "irregular",
-            "t",
+        text = (
             f"The sample intervals are not equal: {uneven:.1%} are off {usual:.4g} s by more than "
-            f"{2 * JITTER:.0%}, most {intervals[k]:.4g} s at {view.at(k)}: use data.resampled().",
-            "warning",
-            k,
-            k + 1,
+            f"{2 * JITTER:.0%}, most {intervals[k]:.4g} s at {view.at(k)}: use data.resampled()."
         )
+        yield view.warning("irregular", "t", text, k, k + 1)
     whole = bool(np.all(np.abs(record.t - np.rint(record.t)) < 1e-9))
     if usual >= SLOW and whole and record.size >= 200:
-        yield view.finding(
-            "units",
-            "t",
+        text = (
             f"The samples are {usual:g} s apart over {np.ptp(record.t) / 3600:.2g} hours, at whole "
-            "seconds: are the times in ms, or row numbers?",
-            "warning",
+            "seconds: are the times in ms, or row numbers?"
         )
+        yield view.warning("units", "t", text)
 
 
 FEWEST_POINTS = 4
@@ -92,27 +79,25 @@ def of_points(view: View) -> Iterator[Finding]:
         return
     v, force = record["v"], record["F"]
     if record.size < FEWEST_POINTS:
-        yield view.finding("short", "v", f"There are {record.size} points only.", "warning")
+        text = f"There are {record.size} points only."
+        yield view.warning("short", "v", text)
     if np.ptp(v) == 0 or np.ptp(force) == 0:
         name = "v" if np.ptp(v) == 0 else "F"
-        yield view.finding("constant", name, f"{name} is {record[name][0]:g} throughout.", "error")
+        text = f"{name} is {record[name][0]:g} throughout."
+        yield view.error("constant", name, text)
         return
     moving = np.abs(v) > 0.01 * np.abs(v).max()
     both = min(np.mean(v > 0), np.mean(v < 0)) > 0.1
     around = float(np.median(force)) if both else 0.0
     if np.mean(v[moving] * (force[moving] - around) > 0) < WRONG:
-        yield view.finding(
-            "sign",
-            "F",
+        text = (
             "F is opposite to v in most points: friction is counted as what the drive needs, so "
-            "F v > 0; turn one sign round.",
-            "error",
+            "F v > 0; turn one sign round."
         )
+        yield view.error("sign", "F", text)
     if not both:
-        yield view.finding(
-            "one-way", "v", "All points are of one direction: friction cannot be told from a "
-            "constant force.", "warning",
-        )  # fmt: skip
+        text = "All points are of one direction: friction cannot be told from a constant force."
+        yield view.warning("one-way", "v", text)
 
 
 LIMITS = {
@@ -134,34 +119,30 @@ def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
     record = view.record
     mixed = [record.units[view.roles[r]] for r in ("x", "force") if r in view.roles]
     if len(mixed) == 2 and "" not in mixed and tuple(mixed) not in TOGETHER:
-        yield view.finding(
-            "units",
-            view.name("force"),
+        text = (
             f"{view.name('x')} is in {mixed[0]} and {view.name('force')} in {mixed[1]}: a slide "
-            "needs m and N, a shaft rad and N m.",
-            "error",
+            "needs m and N, a shaft rad and N m."
         )
+        yield view.error("units", view.name("force"), text)
     for signal in view.roles.values():
         low, doubt, high = LIMITS.get(record.units[signal], (0.0, np.inf, np.inf))
         range_ = float(np.ptp(record.signals[signal]))
         if 0 < range_ < low or range_ > doubt:
+            text = f"{signal} has a range of {range_:.3g} {record.units[signal]}: check its unit."
             yield view.finding(
-                "units",
-                signal,
-                f"{signal} has a range of {range_:.3g} {record.units[signal]}: check its unit.",
-                "error" if range_ < low or range_ > high else "warning",
+                "units", signal, text, "error" if range_ < low or range_ > high else "warning"
             )
     if model is not None and model.clean:
         unit = record.units[view.roles["x"]]
         fastest = float(np.quantile(np.abs(model.v), 0.99))
         doubt, high = FASTEST.get(unit, (np.inf, np.inf))
         if fastest > doubt:
-            yield view.finding(
-                "units",
-                view.roles["x"],
+            text = (
                 f"{view.roles['x']} moves at {fastest:.3g} {unit}/s: check its unit and that of "
-                "the times.",
-                "error" if fastest > high else "warning",
+                "the times."
+            )
+            yield view.finding(
+                "units", view.roles["x"], text, "error" if fastest > high else "warning"
             )
 
 
@@ -205,28 +186,22 @@ def of_velocity(view: View) -> Iterator[Finding]:
         alike = float(np.corrcoef(derived, given)[0, 1])
         scale = float(given.std() / derived.std())
         if alike < -ALIKE:
-            yield view.finding(
-                "sign",
-                name,
+            text = (
                 f"{name} is opposite to the slope of {other} (correlation {alike:.2f}): the sign "
-                "of one is wrong.",
-                "error",
+                "of one is wrong."
             )
+            yield view.error("sign", name, text)
         elif alike < ALIKE:
-            yield view.finding(
-                "velocity",
-                name,
-                f"{name} is not the slope of {other} (correlation {alike:.2f}).",
-                "warning",
-            )
+            text = f"{name} is not the slope of {other} (correlation {alike:.2f})."
+            yield view.warning("velocity", name, text)
         elif abs(scale - 1) > OFF:
             near = [text for known, text in KNOWN.items() if abs(scale / known - 1) < 0.1]
-            yield view.finding(
-                "units",
-                name,
+            text = (
                 f"{name} is {scale:.4g} times the slope of {other}: "
-                f"{near[0] if near else 'a wrong unit or scale'}.",
-                "error" if near or scale > 5 or scale < 0.2 else "warning",
+                f"{near[0] if near else 'a wrong unit or scale'}."
+            )
+            yield view.finding(
+                "units", name, text, "error" if near or scale > 5 or scale < 0.2 else "warning"
             )
 
 
@@ -261,7 +236,7 @@ def _of_record(view: View) -> Iterator[Finding]:
         *spikes,
         *of_frozen(view),
         *of_velocity(view),
-        *of_motion(view, None),
+        *of_motion(view),
     ]
     yield from alone
     hopeless = any(f.severity == "error" and f.kind in HOPELESS for f in alone)
@@ -270,7 +245,7 @@ def _of_record(view: View) -> Iterator[Finding]:
     yield from of_units(view, model)
     if model is not None:
         yield from of_direction(view, model)
-        yield from (f for f in of_motion(view, model) if f.kind == "one-way")
+        yield from of_one_way(view, model)
         yield from of_excitation(view, model)
         yield from of_resolution(view, model)
         free = rough_model(view, curve=True)

@@ -15,10 +15,8 @@ NOTHING = 0.05
 """Share of the force below which it has no part in the motion."""
 
 
-def of_direction(view: View, model: Rough | None) -> Iterator[Finding]:
+def of_direction(view: View, model: Rough) -> Iterator[Finding]:
     """A drive whose friction puts power in, and pairs of columns that make sense the other way."""
-    if model is None:
-        return
     names = view.name("force"), view.name("x")
     swapped = rough_model(view, exchanged=True)
     if (
@@ -27,14 +25,12 @@ def of_direction(view: View, model: Rough | None) -> Iterator[Finding]:
         and swapped.explained > MUCH
         and swapped.explained > model.explained + 0.4
     ):
-        yield view.finding(
-            "swapped",
-            names[0],
+        text = (
             f"{names[0]} moves as a position and {names[1]} as a force (a rough drive explains "
             f"{swapped.explained:.0%} of it that way, {model.explained:.0%} as it is): the columns "
-            "are exchanged.",
-            "error",
+            "are exchanged."
         )
+        yield view.error("swapped", names[0], text)
         return
     both = not one_way(model)
     _, level, viscous, *_ = model.values
@@ -43,29 +39,23 @@ def of_direction(view: View, model: Rough | None) -> Iterator[Finding]:
     sure = max(-model.sure(1) if level < 0 else 0.0, -model.sure(2) if viscous < 0 else 0.0)
     if both and put_in < 0 and sure > SURE and model.explained > LITTLE:
         against = " and accelerates against it" if model.sure(0) < -SURE else ""
-        yield view.finding(
-            "sign",
-            names[0],
+        text = (
             f"{names[0]} brakes the motion that it drives{against}: the sign of {names[0]} or of "
-            f"{names[1]} is wrong: data.scaled({{'{names[0]}': -1}}).",
-            "error",
+            f"{names[1]} is wrong: data.scaled({{'{names[0]}': -1}})."
         )
+        yield view.error("sign", names[0], text)
     elif both and model.clean and model.explained < NOTHING and model.independent > 100:
-        yield view.finding(
-            "unrelated",
-            names[0],
+        text = (
             f"A rough drive explains {max(model.explained, 0.0):.0%} of {names[0]}: it has nothing "
-            f"to do with the motion of {names[1]}, or there is more at work than one mass.",
-            "error" if _white(view) else "warning",
+            f"to do with the motion of {names[1]}, or there is more at work than one mass."
         )
+        yield view.finding("unrelated", names[0], text, "error" if _white(view) else "warning")
     if both and model.sure(0) < -SURE and put_in > 0 and model.explained > LITTLE:
-        yield view.finding(
-            "sign",
-            names[0],
+        text = (
             f"{names[0]} accelerates against the motion (a rough mass is {model.values[0]:.3g} +- "
-            f"{model.errors[0]:.1g}): it is late, or something else drives, too.",
-            "warning",
+            f"{model.errors[0]:.1g}): it is late, or something else drives, too."
         )
+        yield view.warning("sign", names[0], text)
 
 
 def _white(view: View) -> bool:
@@ -85,31 +75,25 @@ WORSE = 1.05
 """... where the same lead leaves more."""
 
 
-def of_drift(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
-    """A force that follows the time beside what a rough drive needs."""
-    if model is None or not model.clean or model.explained < 0.5:
-        return
-    if free is None or one_way(model):
+def of_drift(view: View, model: Rough, free: Rough | None) -> Iterator[Finding]:
+    """A force that follows the time in addition to what a rough drive needs."""
+    if not model.clean or model.explained < 0.5 or free is None or one_way(model):
         return
     rise, sure = float(free.values[-1]), free.sure(-1)
     spread = float(np.ptp(np.quantile(model.force, (0.25, 0.75))))
     if abs(rise) > LARGE * spread and abs(sure) > DRIFTS:
         name = view.name("force")
-        yield view.finding(
-            "drift",
-            name,
+        text = (
             f"{name} drifts by {rise:.3g} {view.record.units[name]} from the first to the last "
             "sample against what a rough drive needs: a sensor without a fixed zero, or a drive "
-            "that warms.",
-            "warning",
+            "that warms."
         )
+        yield view.warning("drift", name, text)
 
 
-def of_dead_time(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
+def of_dead_time(view: View, model: Rough, free: Rough | None) -> Iterator[Finding]:
     """A force that explains the motion better when it is moved in time."""
-    if model is None or not model.clean or model.explained < 0.5 or abs(model.sure(0)) < 5:
-        return
-    if free is None:
+    if not model.clean or model.explained < 0.5 or abs(model.sure(0)) < 5 or free is None:
         return
     now = max(1 - free.explained, 1e-9)
 
@@ -123,14 +107,12 @@ def of_dead_time(view: View, model: Rough | None, free: Rough | None) -> Iterato
         best = min(range(LAGS[max(k - 1, 0)], LAGS[min(k + 1, len(LAGS) - 1)] + 1), key=unexplained)
         name = view.name("force")
         word = "late" if best > 0 else "early"
-        yield view.finding(
-            "delay",
-            name,
+        text = (
             f"{name} seems to be {word} by about {abs(best) * model.step:.3g} s ({abs(best)} "
             f"samples) against {view.name('x')}: estimate dead_time, or use data.delayed("
-            f"{{'{name}': {-best * model.step:.3g}}}).",
-            "warning",
+            f"{{'{name}': {-best * model.step:.3g}}})."
         )
+        yield view.warning("delay", name, text)
 
 
 UNSURE = 3.0
@@ -141,47 +123,36 @@ MOST = 0.97
 """Share of the time at rest beyond which hardly anything moved."""
 
 
-def of_excitation(view: View, model: Rough | None) -> Iterator[Finding]:
+def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
     """Too small accelerations, one speed only, hardly any motion."""
-    if model is None or not model.clean:
-        if model is not None:
-            yield view.finding(
-                "excitation",
-                view.name("x"),
-                f"The accelerations do not stand above the noise of {view.name('x')}: a mass "
-                "cannot be told from these data.",
-                "warning",
-            )
+    if not model.clean:
+        text = (
+            f"The accelerations do not stand above the noise of {view.name('x')}: a mass "
+            "cannot be told from these data."
+        )
+        yield view.warning("excitation", view.name("x"), text)
         return
     if abs(model.sure(0)) < UNSURE:
         unit = "kg m^2" if view.record.units[view.name("x")] == "rad" else "kg"
-        yield view.finding(
-            "excitation",
-            view.name("x"),
+        text = (
             f"The accelerations are too small to tell a mass: a rough one is {model.values[0]:.2g} "
-            f"+- {model.errors[0]:.1g} {unit}; give it as fixed.",
-            "warning",
+            f"+- {model.errors[0]:.1g} {unit}; give it as fixed."
         )
+        yield view.warning("excitation", view.name("x"), text)
     moving = model.moving
     if moving.mean() < 1 - MOST:
-        yield view.finding(
-            "excitation",
-            view.name("x"),
-            f"The drive moves in {moving.mean():.1%} of the time only.",
-            "warning",
-        )
+        text = f"The drive moves in {moving.mean():.1%} of the time only."
+        yield view.warning("excitation", view.name("x"), text)
     speed = np.abs(model.v[moving])
     if speed.size > 20:
         low, high = np.quantile(speed, (0.1, 0.9))
         if high < SPREAD * low:
-            yield view.finding(
-                "speeds",
-                view.name("x"),
+            text = (
                 f"Most of the motion is at one speed, {low:.3g} to {high:.3g} "
                 f"{view.record.units[view.name('x')]}/s: how friction depends on velocity cannot "
-                "be told.",
-                "warning",
+                "be told."
             )
+            yield view.warning("speeds", view.name("x"), text)
 
 
 MOVED = 6.0
@@ -194,51 +165,43 @@ ONE_WAY = 0.005
 """Share of the way in the other direction up to which the drive moves one way."""
 
 
-def of_motion(view: View, model: Rough | None) -> Iterator[Finding]:
+def of_motion(view: View) -> Iterator[Finding]:
     """Signals that hold no motion."""
     x, force = view.signal("x"), view.signal("force")
     if x is not None and view.record.t is not None and x.size >= 20:
         yield from _still(view, x)
     if force is not None and force.size >= 20 and np.ptp(force) == 0:
-        nothing = float(force[0]) == 0
-        yield view.finding(
-            "constant",
-            view.name("force"),
-            f"{view.name('force')} is {force[0]:g} {view.record.units[view.name('force')]} "
-            "throughout: "
-            + (
-                "motion without a drive tells friction over mass only."
-                if nothing
-                else "nothing was measured there."
-            ),
-            "warning" if nothing else "error",
-        )
-    if model is not None and model.clean:
-        yield from _one_way(view, model)
+        name = view.name("force")
+        text = f"{name} is {force[0]:g} {view.record.units[name]} throughout: "
+        if float(force[0]) == 0:
+            text += "motion without a drive tells friction over mass only."
+            yield view.warning("constant", name, text)
+        else:
+            yield view.error("constant", name, f"{text}nothing was measured there.")
 
 
 def _still(view: View, x: Array) -> Iterator[Finding]:
     name, unit = view.name("x"), view.record.units[view.name("x")]
     steps = np.diff(x)
     if np.ptp(x) == 0 or np.ptp(x) < COUNTS * count_of(x):
-        yield view.finding(
-            "standstill", name, f"{name} never changes by more than {np.ptp(x):.3g} {unit}: "
-            "nothing moved.", "error",
-        )  # fmt: skip
+        text = f"{name} never changes by more than {np.ptp(x):.3g} {unit}: nothing moved."
+        yield view.error("standstill", name, text)
         return
     centred = x - x.mean()
     lag = float(centred[1:] @ centred[:-1] / (centred @ centred))
     noise = float(np.std(steps)) / np.sqrt(2)
     if lag < WHITE:
-        yield view.finding(
-            "noise", name, f"{name} is noise of {noise:.3g} {unit}: neighbouring samples have "
-            "nothing to do with each other, and no body moves like that.", "error",
-        )  # fmt: skip
+        text = (
+            f"{name} is noise of {noise:.3g} {unit}: neighbouring samples have "
+            "nothing to do with each other, and no body moves like that."
+        )
+        yield view.error("noise", name, text)
     elif np.ptp(np.quantile(x, (0.02, 0.98))) < MOVED * _white_part(x):
-        yield view.finding(
-            "standstill", name, f"{name} moves by {np.ptp(np.quantile(x, (0.02, 0.98))):.3g} {unit}"
-            " only, which its noise does, too.", "error",
-        )  # fmt: skip
+        text = (
+            f"{name} moves by {np.ptp(np.quantile(x, (0.02, 0.98))):.3g} {unit}"
+            " only, which its noise does, too."
+        )
+        yield view.error("standstill", name, text)
 
 
 def _white_part(x: Array) -> float:
@@ -246,16 +209,15 @@ def _white_part(x: Array) -> float:
     return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
-def _one_way(view: View, model: Rough) -> Iterator[Finding]:
-    if one_way(model, ONE_WAY):
+def of_one_way(view: View, model: Rough) -> Iterator[Finding]:
+    """Motion in one direction."""
+    if model.clean and one_way(model, ONE_WAY):
         direction = "forwards" if model.v.sum() > 0 else "backwards"
-        yield view.finding(
-            "one-way",
-            view.name("x"),
+        text = (
             f"The drive moves {direction} only: friction cannot be told from a constant force, "
-            "nor from gravity.",
-            "warning",
+            "nor from gravity."
         )
+        yield view.warning("one-way", view.name("x"), text)
 
 
 LINE = 0.45
@@ -289,14 +251,12 @@ def _hum(view: View, free: Rough) -> Iterator[Finding]:
     loud = size > LOUD * float(np.ptp(np.quantile(free.force, (0.25, 0.75))))
     if share > LINE and loud and not any(_answered(free, round(k / n)) for n in HARMONICS):
         name = view.name("force")
-        yield view.finding(
-            "hum",
-            name,
+        text = (
             f"{name} hums: beside what a rough drive needs there is a sine of {size:.2g} "
             f"{view.record.units[name]} and {k / left.size / free.step:.3g} Hz, {share:.0%} of "
-            "what is left: the mains, or a motion that the position does not show.",
-            "warning",
+            "what is left: the mains, or a motion that the position does not show."
         )
+        yield view.warning("hum", name, text)
 
 
 def _answered(free: Rough, k: int) -> bool:
@@ -319,11 +279,9 @@ def _unequal(view: View, free: Rough) -> Iterator[Finding]:
     ratio = value / free.values[0]
     if abs(ratio) > UNEQUAL and abs(value) > DIFFERS * error:
         name = view.name("force")
-        yield view.finding(
-            "unequal",
-            name,
+        text = (
             f"{name} asks for a mass {2 * abs(ratio):.0%} larger "
             f"{'forwards' if ratio > 0 else 'backwards'}: its gain differs by its sign, or it is "
-            "clipped or filtered on one side.",
-            "warning",
+            "clipped or filtered on one side."
         )
+        yield view.warning("unequal", name, text)

@@ -33,11 +33,14 @@ def of_spikes(view: View) -> Iterator[Finding]:
         weight = float((off[far] ** 2).sum() / (((y - np.median(y)) ** 2).sum() + 1e-300))
         position, heavy = signal == view.name("x"), weight > HEAVY and signal in named
         unit = view.record.units[signal]
+        text = (
+            f"{signal} is far off its neighbours in {far.size} sample(s), most at {view.at(k)} by "
+            f"{off[k]:.3g} {unit}: take them out with data.without_spikes()."
+        )
         yield view.finding(
             "glitch" if position else "spikes",
             signal,
-            f"{signal} is far off its neighbours in {far.size} sample(s), most at {view.at(k)} by "
-            f"{off[k]:.3g} {unit}: take them out with data.without_spikes().",
+            text,
             "error" if position or heavy else "warning",
             int(far[0]),
             int(far[-1]),
@@ -99,14 +102,12 @@ def of_clipping(view: View) -> Iterator[Finding]:
         unit = view.record.units[signal]
         where = " and ".join(f"its {side} value {top:.4g} {unit}" for side, top in sides)
         severity, why = _verdict(view, signal, [top for _, top in sides])
-        yield view.finding(
-            "clipping",
-            signal,
+        text = (
             f"{signal} stays at {where} in {samples / y.size:.1%} of the samples, longest from "
-            f"{view.at(int(first[k]))} on: {why}.",
-            severity,
-            int(first[k]),
-            int(first[k] + length[k] - 1),
+            f"{view.at(int(first[k]))} on: {why}."
+        )
+        yield view.finding(
+            "clipping", signal, text, severity, int(first[k]), int(first[k] + length[k] - 1)
         )
 
 
@@ -170,15 +171,11 @@ def of_frozen(view: View) -> Iterator[Finding]:
         lost = length[k] > LOST * y.size and noisy
         fatal = (jumped and signal == view.name("x")) or (lost and signal in view.roles.values())
         elsewhere = ", while it never repeats elsewhere" if noisy else ""
-        yield view.finding(
-            "frozen",
-            signal,
+        text = (
             f"{signal} keeps the value {y[begin]:.6g} for {length[k]} samples from "
-            f"{view.at(begin)} on{after}{elsewhere}: the sensor or the recorder stood still.",
-            "error" if fatal else "warning",
-            begin,
-            end,
+            f"{view.at(begin)} on{after}{elsewhere}: the sensor or the recorder stood still."
         )
+        yield view.finding("frozen", signal, text, "error" if fatal else "warning", begin, end)
 
 
 def _longest_that_jumps(
@@ -239,23 +236,21 @@ def of_jumps(view: View) -> Iterator[Finding]:
     period = _period(x, far)
     alike = float(np.quantile(heights, 0.9) - np.quantile(heights, 0.1)) <= ALIKE * heights.max()
     if alike and period > 0.8 * np.ptp(x):
-        yield view.finding(
-            "wrap",
-            name,
+        text = (
             f"{name} jumps {far.size} time(s) by {period:.4g} {unit}, its whole range, first at "
             f"{view.at(int(far[0]))}: it is counted modulo a period; use "
-            f"data.unwrapped({{'{name}': {period:.5g}}}).",
-            "error",
-            int(far[0]),
-            int(far[-1]) + 1,
+            f"data.unwrapped({{'{name}': {period:.5g}}})."
         )
+        yield view.error("wrap", name, text, int(far[0]), int(far[-1]) + 1)
         return
     pushed = _force_jumps(view, k)
+    text = f"{name} jumps {far.size} time(s), most by {size[k]:.3g} {unit} at {view.at(k)}: " + (
+        "a motion too fast for the sample rate." if pushed else "a sensor that lost its place."
+    )
     yield view.finding(
         "jump",
         name,
-        f"{name} jumps {far.size} time(s), most by {size[k]:.3g} {unit} at {view.at(k)}: "
-        + ("a motion too fast for the sample rate." if pushed else "a sensor that lost its place."),
+        text,
         "warning" if pushed or far.size >= OFTEN else "error",
         int(far[0]),
         int(far[-1]) + 1,
@@ -291,7 +286,7 @@ PER_SAMPLE = 0.5
 """Counts per sample at a usual speed below which velocities are guesses."""
 
 
-def of_resolution(view: View, model: Rough | None) -> Iterator[Finding]:
+def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
     """Forces of few levels, positions of few counts at the speeds of the record."""
     force = view.signal("force")
     if force is not None and np.ptp(force) > 0:
@@ -299,15 +294,13 @@ def of_resolution(view: View, model: Rough | None) -> Iterator[Finding]:
         step, spread = count_of(force), usual or float(np.ptp(force))
         if step > COARSE * spread:
             name = view.name("force")
-            yield view.finding(
-                "resolution",
-                name,
+            text = (
                 f"{name} has steps of {step:.3g} {view.record.units[name]}, {step / spread:.0%} of "
-                "its range: finer differences of friction cannot be told.",
-                "warning",
+                "its range: finer differences of friction cannot be told."
             )
+            yield view.warning("resolution", name, text)
     x = view.signal("x")
-    if x is None or model is None or not model.clean:
+    if x is None or not model.clean:
         return
     count = count_of(x)
     moved = np.abs(model.v[model.moving])
@@ -315,11 +308,9 @@ def of_resolution(view: View, model: Rough | None) -> Iterator[Finding]:
         slow = float(np.quantile(moved, 0.25)) * model.step
         if slow < PER_SAMPLE * count:
             name = view.name("x")
-            yield view.finding(
-                "resolution",
-                name,
+            text = (
                 f"{name} has counts of {count:.3g} {view.record.units[name]}, and a quarter of the "
                 f"motion makes less than {slow / count:.2g} of one per sample: velocities there "
-                "are averages over several.",
-                "warning",
+                "are averages over several."
             )
+            yield view.warning("resolution", name, text)
