@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Channel
 from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from identification.data.record import Record
     from identification.residuals.shooting import Shooting
 
-Array = NDArray[np.float64]
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
 """Tolerances to choose from, and that of what they are compared with."""
 BIAS = 0.1
@@ -65,13 +63,11 @@ class Preparation:
 
     def shots(self) -> Shots:
         """The residuals of all records, cut into windows."""
-        estimated = self.kind.estimates_dead_time
-        if estimated:
-            low, high = self.kind.dead_time  # type: ignore[misc]
-            unknown = Unknown(
-                DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
-            )
-            self.own.append(unknown)
+        given = self.kind.dead_time
+        tau = None if isinstance(given, tuple) else given
+        if isinstance(given, tuple):
+            middle, width = sum(given) / 2, given[1] - given[0]
+            self.own.append(Unknown(DEAD_TIME, "s", middle, *given, width, nuisance=True))
         pieces, channels, rows = list[Shot](), list[Channel](), 0
         for number, record in enumerate(self.records):
             found = list(self._cut(number, record, rows))
@@ -80,14 +76,13 @@ class Preparation:
             rows = channels[-1].rows.stop
         model = plain(self.model, self.signals)
         names = tuple(v.name for v in model.p)
-        if estimated:
+        if tau is None:
             sampled = [n for n, given in self.inputs.items() if isinstance(given, str)]
             if not sampled:
                 raise ValueError(
                     "Shooting: dead_time: expected an input that is a channel, got none"
                 )
             model = delayed(model, sampled)
-        tau = self.kind.dead_time if not estimated else None
         backend = "compiled" if find_compiler() else "vm"
         shots = Shots(
             model=model,
@@ -95,7 +90,7 @@ class Preparation:
             own=tuple(self.own),
             channels=tuple(channels),
             shots=tuple(pieces),
-            dead_time=tau,  # type: ignore
+            dead_time=tau,
             rtol=self.kind.rtol or RTOLS[-1],
             backend=backend,
         )

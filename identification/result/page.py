@@ -5,7 +5,6 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.result.series import Curve, Errors, Estimate, Series, limits
 from identification.result.stored import source_of
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from identification.result.fitted import Fitted
     from identification.verdict.judge import Test
 
-Array = NDArray[np.float64]
 
 WINDOWS = 60
 """Beginnings of windows that are drawn."""
