@@ -8,6 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 COUNT = """
+import inspect
 import sys
 from pathlib import Path
 
@@ -19,7 +20,11 @@ packages = tuple(str(root / name) for name in ("symfric", "ocp", "identification
 
 def files(call):
     seen = set()
-    watch = lambda frame, event, _: seen.add(frame.f_code.co_filename)
+
+    def watch(frame, event, _):
+        if frame.f_code.co_flags & inspect.CO_OPTIMIZED:  # functions, not modules being imported
+            seen.add(frame.f_code.co_filename)
+
     sys.setprofile(watch)
     try:
         call()
