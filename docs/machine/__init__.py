@@ -1,1 +1,1 @@
-"""What makes the documentation: pages from the catalogue, formulas, blocks that run, checks."""
+"""Makes the documentation: pages from the catalogue, formulas, blocks that run, checks."""

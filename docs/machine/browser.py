@@ -1,9 +1,9 @@
 """Opens built pages in headless Chromium: `python -m docs.machine.browser out/docs`.
 
 Each page is shown narrow, on a tablet, wide, dark and in print, and refused for what `look.js`
-finds (wider than the screen, cut, unreadable, not told to those who do not see it), for an error on
-its console and for anything it asks of the network. The search must find something. `--shots
-FOLDER` keeps a picture of each page in each of these; names behind it choose pages.
+finds (wider than the screen, cut, unreadable, without a text for those who do not see it), for an
+error on its console and for anything it asks of the network. The search must find something.
+`--shots FOLDER` keeps a picture of each page in each of these; names behind it choose pages.
 """
 
 import base64
@@ -101,7 +101,7 @@ class Browser:
         return json.loads(first)
 
     def show(self, width: int, dark: bool = False, as_print: bool = False) -> None:
-        """How pages are shown from now on."""
+        """Set how pages are shown from now on."""
         self.ask(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=900, deviceScaleFactor=1, mobile=width < 600,
@@ -119,7 +119,7 @@ class Browser:
             self.events.append(self.hear())
 
     def value(self, expression: str) -> Any:
-        """What a piece of JavaScript gives, once it is there."""
+        """The value of a piece of JavaScript, once it is there."""
         seen = self.ask(
             "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
         )
@@ -141,7 +141,7 @@ LOOK = Path(__file__).with_name("look.js").read_text("utf-8")
 QUIET = ("search.html", "genindex.html", "py-modindex.html")
 """Pages that are nearly empty before somebody asks."""
 SOUGHT = "stribeck"
-"""What the search is asked for."""
+"""Word that the search must find."""
 
 
 @final
@@ -173,7 +173,7 @@ KINDS = {
 
 
 def said(event: dict[str, Any]) -> str:
-    """What an event says against a page, "" for nothing."""
+    """The problem of a page that an event reports, "" for none."""
     method, what = event.get("method", ""), event.get("params", {})
     if method == "Runtime.exceptionThrown":
         return f"exception: {what['exceptionDetails'].get('exception', {}).get('description', '')}"
@@ -210,7 +210,7 @@ def problems(
 
 
 def searched(browser: Browser, folder: Path, patience: float = 20.0) -> Iterator[str]:
-    """What is wrong with the search, which runs in the browser and asks nobody."""
+    """Problems of the search, which runs in the browser alone."""
     page = folder / "search.html"
     if not page.exists():
         return

@@ -185,14 +185,14 @@ class _Row:
         return "" if self.seen() in ("", ",", ";", ":", ".", ")", "]", "}") else r"\;"
 
     def gap(self, may_align: bool) -> str:
-        """What a wide gap is: conditions of several lines stand below each other."""
+        """The LaTeX of a wide gap: conditions of several lines stand below each other."""
         if self.rest[self.place - 2].text == ",":
             return r"\quad "
         condition = self.is_word() or self.seen(1) in RELATIONS or self.seen() == "("
         return "&\\quad " if may_align and condition else r"\quad "
 
     def is_word(self, ahead: int = 0) -> bool:
-        """Whether the piece ahead is a word of English."""
+        """True if the piece ahead is a word of English."""
         place = self.place + ahead
         if place >= len(self.rest) or self.rest[place].kind != "name":
             return False
@@ -288,7 +288,7 @@ class _Row:
         return drawn, drawn
 
     def within(self, bracket: str) -> str:
-        """What stands up to the closing bracket."""
+        """The terms up to the closing bracket."""
         outer, self.inside_bars = self.inside_bars, bracket == "|"
         inner = self.items(CLOSING[bracket]).strip()
         if self.seen() != CLOSING[bracket]:

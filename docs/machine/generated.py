@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from docs.machine import api_pages, bench_pages, items, lists, made, rst
+from docs.machine import items, lists, made, measure, rst
 from docs.machine.made import MADE, code_hash, code_of, digest, kept
 from docs.machine.names import linked
 from docs.machine.pages import DOCS, ROOT
@@ -23,7 +23,7 @@ ASIDE = ROOT / "symfric" / "gallery" / "pages.py"
 
 
 def quick() -> bool:
-    """Whether figures are computed at reduced size."""
+    """True if figures are computed at reduced size."""
     return os.environ.get("SYMFRIC_DOCS", "") == "quick"
 
 
@@ -170,8 +170,8 @@ def make_all(say: Callable[[str], None]) -> list[str]:
     failed += made.draw_all("scenes", items.ALL_SCENES, items.draw_scene, say)
     write("examples", lists.example_pages())
     write("reference", reference())
-    write("benchmarks", {"index": bench_pages.page()})
-    bench_pages.write_interop()
+    write("benchmarks", {"index": measure.page()})
+    measure.write_interop()
     failed += make_gallery(say)
     write("gallery", gallery_pages())
     return failed
@@ -179,10 +179,10 @@ def make_all(say: Callable[[str], None]) -> list[str]:
 
 def reference() -> dict[str, str]:
     """Python module by module, and the command line."""
-    found = api_pages.pages()
+    found = lists.reference_pages()
     text = rst.title("Python")
     text += "Every public name, from its docstring.\n\n"
-    text += rst.table(["module", "what it is for"], api_pages.index_rows())
+    text += rst.table(["module", "what it is for"], lists.reference_rows())
     text += rst.pages(found, hidden="")
     return found | {
         "python": text,

@@ -13,7 +13,7 @@ from docs.machine.names import linked
 from docs.machine.rst import first_line, sentence, to_rst
 from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, law_name, parameters
 from symfric.cli.laws import costs
-from symfric.figures.magnitudes import phenomena
+from symfric.figures.data import phenomena
 from symfric.foundation.parameters import options
 from symfric.laws import PHENOMENA, AnyLaw
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
@@ -48,7 +48,7 @@ FAMILIES = {
 
 
 def family(law: AnyLaw) -> str:
-    """Where a law stands in the gallery."""
+    """The family of a law in the gallery."""
     if type(law) in POPULATIONS.values():
         return "Populations of contacts"
     if "M" in law.facts.phenomena and law.states:
@@ -190,7 +190,7 @@ def signature(kind: type[Any]) -> str:
 
 
 def facts(law: AnyLaw) -> str:
-    """What is known about a law."""
+    """Facts about a law."""
     instructions = cost(law)
     rows = [
         ["shows", ", ".join(rst.plain(PHENOMENA[code]) for code in phenomena(law)) or "-"],
@@ -247,7 +247,7 @@ def _bounds(lower: float, upper: float) -> str:
 
 
 def usage(name: str, law: AnyLaw) -> str:
-    """How to see more of it."""
+    """Commands and code that show more of it."""
     lines = [f"$ symfric laws {name}"]
     if {"P", "M"} & set(phenomena(law)) and law.states:
         lines.append(f"$ symfric laws {name} --figure hysteresis --plot {name}.png")

@@ -21,7 +21,7 @@ NETWORK = re.compile(r"(?:url\(\s*['\"]?|@import\s+['\"])((?:https?:)?//[^'\")\s
 @final
 @dataclass
 class Found(HTMLParser):
-    """What a page holds: places that links lead to, and its links with what loads them."""
+    """Content of a page: places that links lead to, and its links with the tags that load them."""
 
     places: set[str] = field(default_factory=set[str])
     links: list[tuple[str, str, str]] = field(default_factory=list[tuple[str, str, str]])

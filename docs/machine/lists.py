@@ -1,8 +1,11 @@
-"""Pages made of lists: examples, commands, limits, literature."""
+"""Pages made of lists: the reference of Python, examples, commands, limits, literature."""
 
 import ast
+import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import import_module
 from inspect import getdoc
 from itertools import pairwise
 from pathlib import Path
@@ -13,14 +16,121 @@ import typer
 from docs.machine import rst
 from docs.machine.items import MADE_OF_LAWS
 from docs.machine.made import PACKAGES
-from docs.machine.names import catalogue, linked
+from docs.machine.names import FRONTS, Public, catalogue, known, linked, source_of
 from docs.machine.pages import ROOT
 from docs.machine.rst import Symbols, first_line, sentence, to_rst
 from symfric import ALL_LAWS, POPULATIONS, __version__
-from symfric.cli.app import app
-from symfric.cli.commands import COMMANDS, argument_shown, arguments, is_option, prose_and_examples
+from symfric.cli.app import COMMANDS, app, argument_shown, arguments, is_option, prose_and_examples
 from symfric.gallery import scripts
 from symfric.scenes import ALL_SCENES
+
+
+def reference_pages() -> dict[str, str]:
+    """Name of each page, relative to `reference`, -> its text."""
+    return {front: reference_page(front, names) for front, names in catalogue().items() if names}
+
+
+def reference_rows() -> list[list[str]]:
+    """Module and subject of each page."""
+    return [[f":doc:`{f}`", rst.plain(FRONTS[f])] for f, names in catalogue().items() if names]
+
+
+def reference_page(front: str, names: list[Public]) -> str:
+    """The names of one module: a table, then each in full."""
+    text = rst.title(front)
+    text += rst.plain(FRONTS[front]) + "\n\n"
+    elsewhere = own_pages()
+    laws = [p for p in names if elsewhere.get(id(p.object), "").startswith("/laws/")]
+    others = sorted((p for p in names if p not in laws), key=lambda p: p.name.lower())
+    rows = [[_link(p, elsewhere), sentence(summary(p), linked)] for p in others]
+    text += rst.table(["name", "what it is"], rows)
+    if laws:
+        text += rst.title("Laws", "-") + "Each has a page of its own, with its equation.\n\n"
+        shown = [f":doc:`{p.name} <{elsewhere[id(p.object)]}>`" for p in laws]
+        text += ", ".join(shown) + "\n\n"
+    full = [p for p in others if id(p.object) not in elsewhere]
+    return text + "".join(entry(p) for p in full)
+
+
+@cache
+def own_pages() -> dict[int, str]:
+    """Objects that have a page of their own, and which."""
+    found: dict[int, str] = {}
+    for name, kind in (ALL_LAWS | POPULATIONS | MADE_OF_LAWS).items():
+        found[id(kind)] = f"/laws/{name}"
+    for name, kind in ALL_SCENES.items():
+        found[id(kind)] = f"/scenes/{name}"
+    return found
+
+
+def _link(public: Public, elsewhere: dict[int, str]) -> str:
+    if id(public.object) in elsewhere:
+        return f":doc:`{public.name} <{elsewhere[id(public.object)]}>`"
+    return f":py:obj:`{public.name} <{public.full}>`"
+
+
+def entry(public: Public) -> str:
+    """One name in full, from its docstring."""
+    item: Any = public.object
+    if inspect.isclass(item):
+        kind = "autoexception" if issubclass(item, BaseException) else "autoclass"
+        return rst.directive(kind, public.full, members="")
+    if is_function(item):
+        return rst.directive("autofunction", public.full)
+    return rst.directive("py:data", public.full, sentence(summary(public), linked) + "\n")
+
+
+def summary(public: Public) -> str:
+    """The first line of its docstring; of data, the text below them in their source."""
+    item: Any = public.object
+    if inspect.isclass(item) or is_function(item):
+        return first_line(item.__doc__).rstrip(".")
+    said = data_docs(source_of(public.front, public.name))
+    return first_line(said.get(public.name, "")).rstrip(".")
+
+
+def is_function(item: Any) -> bool:
+    """A function, also a wrapped one; types such as `float | None` can be called, too."""
+    return inspect.isroutine(item) or hasattr(item, "__wrapped__")
+
+
+@cache
+def data_docs(module: str) -> dict[str, str]:
+    """The texts below the data of a module."""
+    tree = ast.parse(inspect.getsource(import_module(module)))
+    found: dict[str, str] = {}
+    for before, behind in zip(tree.body, tree.body[1:], strict=False):
+        said = isinstance(behind, ast.Expr) and isinstance(behind.value, ast.Constant)
+        if said and isinstance(before, ast.Assign | ast.AnnAssign):
+            targets = before.targets if isinstance(before, ast.Assign) else [before.target]
+            names: Iterable[str] = (t.id for t in targets if isinstance(t, ast.Name))
+            found |= dict.fromkeys(names, str(behind.value.value))  # pyright: ignore
+    return found
+
+
+Place = tuple[str, str, str]
+"""Domain, type and target of a link of Sphinx."""
+COMMAND = re.compile(r"symfric ([\w-]+)\b")
+
+
+def place(text: str) -> Place | None:
+    """The place that documents a name between backticks; None if it is no name of ours."""
+    bare = text.removesuffix("()")
+    if bare in ALL_LAWS or bare in POPULATIONS or bare in MADE_OF_LAWS:
+        return "std", "doc", f"/laws/{bare}"
+    if bare in ALL_SCENES:
+        return "std", "doc", f"/scenes/{bare}"
+    command = COMMAND.match(text)
+    if command is not None and command[1] in COMMANDS:
+        return "std", "ref", f"symfric-{command[1]}"
+    if bare in FRONTS:
+        return "std", "doc", f"/reference/{bare}"
+    public = known().get(bare.rpartition(".")[2])
+    if public is None or bare not in (public.name, public.full) or not callable(public.object):
+        return None
+    own = own_pages().get(id(public.object))
+    return ("std", "doc", own) if own else ("py", "obj", public.full)
+
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
@@ -131,7 +241,7 @@ LIMITS = re.compile(r"^(?:Limits|Not valid): (.*?)(?=\n\n|\n[A-Z][a-z]+:|\Z)", r
 
 
 def limits(item: Any) -> str:
-    """What a docstring says about limits, "" for nothing."""
+    """The limits that a docstring states, "" for none."""
     return " ".join(" ".join(found.split()) for found in LIMITS.findall(getdoc(item) or ""))
 
 
@@ -167,11 +277,11 @@ SOURCES = re.compile(
 )
 YEAR = re.compile(r"\b1[6-9]\d\d\b|\b20\d\d\b")
 ASIDE = ("laws", "gallery", "bench", "stress", "cli")
-"""Rooms of symfric whose sources stand elsewhere, or are those of tables."""
+"""Packages of symfric whose sources stand elsewhere, or are those of tables."""
 
 
 def literature_page() -> str:
-    """How to cite, then laws, figures and methods with their sources."""
+    """Citation of symfric, then laws, figures and methods with their sources."""
     text = rst.title("Literature, and how to cite")
     text += cite()
     text += rst.title("Laws", "-")
@@ -190,7 +300,7 @@ def literature_page() -> str:
 
 
 def cite() -> str:
-    """What to put into a paper."""
+    """The entry for a paper."""
     words = "Name the version, and the paper of the law that you took.\n\n"
     entry = f"""@software{{symfric,
   title   = {{symfric: friction laws as {{CasADi}} expressions}},

@@ -1,8 +1,12 @@
 """Measure a subject and store it for the page of benchmarks: `python -m docs.machine.measure ivp`.
 
+The page itself is made here, too, from the stored measurements alone. The page on other tools takes
+its tables from there: the measurement has a line for each tool, route and law; there tools stand
+side by side.
+
 What `symfric bench SUBJECT` prints is kept as tables in `docs/benchmarks/SUBJECT.json`, with
 machine, load, versions, date and commit; the pages are made of these files alone. Measure on a
-machine that does nothing else; what else ran is told by the load, the mean number of processes that
+machine that does nothing else; the load shows what else ran, the mean number of processes that
 wanted a processor, before and after. `--quick` takes fewer points, and the page says so.
 """
 
@@ -11,7 +15,7 @@ import os
 import platform
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
@@ -19,10 +23,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from docs.machine import rst
+from docs.machine.made import MADE
 from docs.machine.pages import DOCS, ROOT
-from symfric import bench
+from docs.machine.rst import sentence
 from symfric.cli import output
-from symfric.cli.bench import SUBJECTS
+from symfric.cli.campaigns import SUBJECTS
 from symfric.foundation.files import write_text
 
 STORED = DOCS / "benchmarks"
@@ -60,6 +66,8 @@ def commit() -> str:
 
 def measured(subject: str, quick: bool) -> dict[str, Any]:
     """The tables that `symfric bench SUBJECT` prints, with what they were measured on."""
+    from symfric import bench  # noqa: PLC0415  (not for pages)
+
     loads, began = [os.getloadavg()[0]], perf_counter()
     result = getattr(bench, f"bench_{subject}")(quick=quick)
     loads.append(os.getloadavg()[0])
@@ -105,3 +113,136 @@ def main(arguments: Sequence[str]) -> int:
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))
+
+
+KEYS = ("title", "about", "command", "date", "commit", "machine", "load", "seconds", "tables")
+"""What `docs.machine.measure` writes; "short", what people condensed, may stand beside."""
+SHORT = ("command", "date", "commit", "machine", "tables")
+"""What stands under "short": tables that people made of a longer measurement."""
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """File name -> measurement."""
+    files = sorted(STORED.glob("*.json"))
+    return {path.stem: json.loads(path.read_text("utf-8")) for path in files}
+
+
+def page() -> str:
+    """All measurements, each with command, machine, load, date and commit."""
+    text = rst.title("Benchmarks")
+    text += (
+        "Measured numbers, kept as files beside this page with command, machine, load, date and "
+        "commit. Times are processor times of whole calls from Python unless a table says "
+        "otherwise. ``symfric bench SUBJECT`` measures on your machine; ``python -m "
+        "docs.machine.measure SUBJECT`` stores what it finds for this page.\n\n"
+        "*Load* is the mean number of processes that wanted a processor before and after, of which "
+        "the machine has two. Above two, times are too long, and their ratios are off, too; counts "
+        "and errors are not touched by it.\n\n"
+    )
+    return text + "".join(section(name, found) for name, found in stored().items())
+
+
+def section(name: str, found: Mapping[str, Any]) -> str:
+    """One measurement: what people condensed of a long one, then the tables as measured."""
+    text = rst.title(found["title"], "-")
+    if found["about"]:
+        text += sentence(found["about"]) + "\n\n"
+    short = found.get("short")
+    if short:
+        text += "".join(shown(short["tables"]))
+        text += f"*Condensed by hand from* {made_by(short)}.\n\n"
+    if "tables" in found:
+        text += "".join(shown(found["tables"]))
+        text += f"*Measured by* {made_by(found)}. Stored in ``docs/benchmarks/{name}.json``.\n\n"
+    return text
+
+
+def shown(tables: Iterable[Mapping[str, Any]]) -> Iterable[str]:
+    """Tables with their titles."""
+    for one in tables:
+        if one["title"]:
+            yield f"**{rst.plain(one['title'].replace('`', ''))}**\n\n"
+        rows = [[sentence(cell) for cell in row] for row in one["rows"]]
+        yield rst.table([sentence(c) for c in one["columns"]], rows)
+
+
+def made_by(found: Mapping[str, Any]) -> str:
+    """Command, date, commit, machine and load."""
+    load = f"; load {found['load']}, {found['seconds']} s" if "load" in found else ""
+    parts = f"{found['date']}, commit {found['commit']}; {found['machine']}{load}"
+    return f"``{found['command']}``, {rst.plain(parts)}"
+
+
+FOLDER = MADE / "tables"
+Row = Mapping[str, str]
+"""Column -> cell."""
+TOOLS = {"opti": "Opti", "rockit": "rockit", "do_mpc": "do-mpc"}
+ROUTES = {"flow": "``flow``", "colloca": "collocation"}
+
+
+def tables() -> dict[str, str]:
+    """Name of each table -> its text."""
+    found = stored()["interop"]
+    by_first = {one["columns"][0]: rows(one) for one in found["tables"]}
+    return {
+        "interop_moves": moves(by_first["tool"]),
+        "interop_integrators": integrators(by_first["integrator"]),
+        "interop_by": f"*Measured by* {made_by(found)}.\n",
+    }
+
+
+def rows(one: Mapping[str, Any]) -> list[Row]:
+    """The rows of a stored table by the names of its columns."""
+    return [dict(zip(one["columns"], row, strict=True)) for row in one["rows"]]
+
+
+def moves(lines: Sequence[Row]) -> str:
+    """A row for each law and route, a column for each tool: miss, iterations, time."""
+    head = ["law", "in as", "J [N² s]", *TOOLS.values()]
+    keys = dict.fromkeys((line["law"], line["route"]) for line in lines)
+    body: list[list[str]] = []
+    for law, route in keys:
+        own = {m["tool"]: m for m in lines if (m["law"], m["route"]) == (law, route)}
+        costs = sorted({m["J"] for m in own.values() if not m[""]})
+        cost = " ... ".join(dict.fromkeys((costs[0], costs[-1]))) if costs else ""
+        cells = [cell(own[tool]) if tool in own else "" for tool in TOOLS]
+        body.append([f":doc:`{law} </laws/{law}>`", ROUTES[route], cost, *cells])
+    return rst.table(head, body)
+
+
+def cell(line: Row) -> str:
+    """Miss, iterations and seconds of one tool in the move, or the reason why it ended."""
+    if line[""] or line["miss"] in ("nan", "-"):
+        return rst.plain(line[""] or "none")
+    miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")
+    return rst.plain(f"{miss}, {line['it.']}, {line['s']} s")
+
+
+def integrators(lines: Sequence[Row]) -> str:
+    """A row for each of CasADi's integrators, a column for each law: error and time."""
+    laws = dict.fromkeys(line["law"] for line in lines)
+    body: list[list[str]] = []
+    for name in dict.fromkeys(line["integrator"] for line in lines):
+        own = {m["law"]: m for m in lines if m["integrator"] == name}
+        cells = [off(own[law]) for law in laws]
+        shown = "``simulate``, virtual machine" if name == "symfric" else f"``{name}``"
+        body.append([shown, *cells])
+    return rst.table(["", *(f":doc:`{law} </laws/{law}>`" for law in laws)], body)
+
+
+def off(line: Row) -> str:
+    """Error and time of an integrator, or that it stops."""
+    if line[""]:
+        return "stops"
+    if line["error [m]"] == "-":
+        return "not finite"
+    return rst.plain(f"{float(line['error [m]']):.0e} m, {float(line['time ratio']):.1f} times")
+
+
+def write_interop() -> None:
+    """Write the tables where the page includes them; one that is as it was is left alone."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name, text in tables().items():
+        path = FOLDER / f"{name}.rst"
+        if not path.exists() or path.read_text("utf-8") != text:
+            path.write_text(text, "utf-8")

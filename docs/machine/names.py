@@ -41,12 +41,12 @@ class Public:
 
     @property
     def full(self) -> str:
-        """How it is imported."""
+        """The name by which it is imported."""
         return f"{self.front}.{self.name}"
 
     @property
     def object(self) -> Any:
-        """What it is."""
+        """The object itself."""
         return getattr(import_module(self.front), self.name)
 
 

@@ -77,7 +77,7 @@ def written_pages() -> Iterator[Path]:
 
 
 def mark(text: str) -> str:
-    """What the page says about its tests, "" for nothing."""
+    """The mark of a page for its tests, "" for none."""
     found = MARK.search(text)
     return found[1] if found else ""
 
@@ -95,7 +95,7 @@ def commands(block: Block) -> list[tuple[str, str]]:
 
 
 def agrees(printed: str, expected: str) -> bool:
-    """Whether `printed` is what a page says, where `...` stands for anything."""
+    """True if `printed` is the text of a page, where `...` stands for anything."""
     wanted = [re.escape(part) for part in plain(expected).split("...")]
     return re.fullmatch(".*".join(wanted), plain(printed), re.S) is not None
 
@@ -106,7 +106,7 @@ def plain(text: str) -> str:
 
 
 def made_pictures(text: str, folder: Path) -> list[str]:
-    """Names of the pictures that blocks of the page in `folder` leave: those not beside it."""
+    """Names of the pictures that blocks of the page in `folder` leave, not those next to it."""
     return [name for _, name, _ in PICTURE.findall(text) if not (folder / name).exists()]
 
 
@@ -143,7 +143,7 @@ def run(
 
 
 def output(command: str) -> str:
-    """What a line of a console prints: `symfric` here and now, all else in a shell."""
+    """Output of a line of a console: `symfric` runs in this process, all else in a shell."""
     if not command.startswith("symfric ") or set(command) & set("|><&;*`"):
         return in_shell(command)
     from symfric.cli.app import main as symfric  # noqa: PLC0415  (of pages that are run only)

@@ -211,7 +211,7 @@ def _section(title: str, behind: str, lines: list[str], linked: Linked) -> str:
 
 
 def _entry(lines: Iterable[str], linked: Linked) -> Iterator[str]:
-    """What is said of one entry: choices such as `"auto": ...` become a list."""
+    """Paragraphs of one entry: choices such as `"auto": ...` become a list."""
     words: list[str] = []
     for line in lines:
         bare = line.strip()

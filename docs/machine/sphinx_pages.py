@@ -17,9 +17,9 @@ from sphinx.addnodes import pending_xref
 from sphinx.util import logging
 from sphinx.util.math import get_node_equation_number
 
-from docs.machine.api_pages import Place
-from docs.machine.api_pages import place as documented
 from docs.machine.generated import make_all
+from docs.machine.lists import Place
+from docs.machine.lists import place as documented
 from docs.machine.made import MADE, make_page_pictures, place
 from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE
@@ -76,12 +76,12 @@ def make(app: Any) -> None:
 
 
 def say(sentence: str) -> None:
-    """A line on the error stream at once: Sphinx is told to be quiet, the long work is not."""
+    """A line on the error stream at once: Sphinx is set to be quiet, the long work is not."""
     print(f"docs: {sentence}", file=sys.stderr, flush=True)
 
 
 def show_made(app: Any, name: str, content: list[str]) -> None:
-    """Point a picture that is not beside its page to the one that its blocks made."""
+    """Point a picture that does not lie next to its page to the one that its blocks made."""
     page = Path(app.env.doc2path(name))
     if page.suffix != ".md":
         return
@@ -184,7 +184,7 @@ def link(app: Any, tree: nodes.document) -> None:
 
 
 def ancestors(node: nodes.Node) -> list[nodes.Node]:
-    """What holds a node, the nearest first."""
+    """The nodes around a node, the nearest first."""
     found: list[nodes.Node] = []
     while node.parent is not None:
         node = node.parent

@@ -228,9 +228,9 @@ class Fitted:
         Raises:
             ImportError: no pandas.
         """
-        from symfric.results import tables  # noqa: PLC0415 (slow to import)
+        from symfric.results import stored  # noqa: PLC0415 (slow to import)
 
-        pandas = tables.module("to_dataframe", "pandas")
+        pandas = stored.module("to_dataframe", "pandas")
         rows = {name: vars(estimate) for name, estimate in self.parameters.items()}
         frame = pandas.DataFrame.from_dict(rows, orient="index")
         frame.index.name = "parameter"

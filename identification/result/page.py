@@ -25,8 +25,7 @@ from identification.result.text import (
     with_unit,
 )
 from symfric.page import html
-from symfric.page.scale import Axis, around
-from symfric.page.svg import Band, Dots, Level, Mark, Path, Stems, chart
+from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
 
 if TYPE_CHECKING:
     from identification.result.fitted import Fitted

@@ -1,4 +1,4 @@
-"""Where users feel speed beside one long run: many short calls, events, gradients, signals, import.
+"""Speed besides one long run: many short calls, events, gradients, signals, import.
 
 Times are processor time of whole calls from Python, the shortest of rounds in which all contenders
 take turns; ratios are over the first of each task, which is ours.
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from symfric.bench import table
 from symfric.bench.contenders import buffered, compiled, tolerances
-from symfric.bench.timing import interleaved, unwarned
+from symfric.bench.table import interleaved, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.background import wait
@@ -185,7 +185,7 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
 
 
 def _events(quick: bool) -> Iterator[CallRow]:
-    """Exact memory, element by element, beside its smooth form."""
+    """Exact memory, element by element, and its smooth form."""
     elements = 4 if quick else 30
     pairs: dict[str, Callable[[str], Law]] = {
         f"rabinowicz gms, {elements} elements": partial(_gms, elements),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 from symfric.bench import table
 from symfric.bench.codegen_runs import compensation, units
@@ -28,10 +28,6 @@ from symfric.foundation.parameters import check_names
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
 from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import Arm, Drive, Rabinowicz, rabinowicz
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
 """Elements of a tenth of the friction each, of stiffnesses over three decades."""
@@ -192,7 +188,7 @@ class EmbeddedRow:
 
     @property
     def ok(self) -> bool:
-        """Whether it was measured, all numbers are finite, and none is wrong."""
+        """True if it was measured, all numbers are finite, and none is wrong."""
         return self.measured.ok and self.wrong == 0
 
     def to_dict(self) -> dict[str, Any]:
@@ -203,7 +199,7 @@ class EmbeddedRow:
 @final
 @dataclass(frozen=True, eq=False)
 class EmbeddedBenchmark(table.Report):
-    """What was measured; `advice` says which tools are absent, and where to get them."""
+    """Measurements on cores; `advice` names the tools that are absent, and their sources."""
 
     rows: tuple[EmbeddedRow, ...]
     advice: str = ""
@@ -271,7 +267,7 @@ note that says which."""
 @final
 @dataclass(frozen=True, eq=False)
 class CodegenBenchmark(table.Report):
-    """What was measured, section by section."""
+    """Measurements by section."""
 
     sections: Mapping[str, Section] = field(default_factory=dict[str, Section])
 
@@ -290,11 +286,9 @@ class CodegenBenchmark(table.Report):
                 yield table.Table(section.title, section.head, rows)
             yield from (f"{name}: {note}" for note in section.notes)
 
-    def plot(self, path: str | Path) -> "Figure":
-        """How far each number is from its goal; right of the line it is worse."""
-        from symfric.bench.pictures import plot_goals  # noqa: PLC0415  (matplotlib is slow)
-
-        return plot_goals(((g.what, g) for s in self.sections.values() for g in s.goals), path)
+    def drawn(self) -> tuple[Any, ...]:
+        """The distance of each number from its goal; right of the line it is worse."""
+        return "goals", ((g.what, g) for s in self.sections.values() for g in s.goals)
 
 
 def bench_codegen(

@@ -1,4 +1,4 @@
-"""Generated code as it runs: units beside `simulate`; compensators in the loop of a drive."""
+"""Generated code as it runs: units and `simulate`; compensators in the loop of a drive."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -158,7 +158,7 @@ CONTROLLER = Cascade(kp=20.0, kv=60.0, ki=10.0)
 GOAL = 5.0
 """Times that the RMS error is to be smaller."""
 PROVEN = "excess 0"
-"""The case whose numbers stand beside the goals."""
+"""The case whose numbers have goals."""
 
 
 @final
@@ -256,7 +256,7 @@ def _compensated(smaller: float, hunting: float) -> str:
 
 
 def _size() -> str:
-    """What the C of the compensator costs on a small core."""
+    """The cost of the compensator's C on a small core."""
     whole, alone = on_core(trials()[0].blocks[0]), on_core(law_block(BELIEVED))
     if not whole.ok:
         return f"No instructions counted: {whole.status}"

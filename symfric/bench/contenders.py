@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.timing import FASTEST, compile_time
+from symfric.bench.table import FASTEST, compile_time
 from symfric.foundation.numeric import bound
 from symfric.integrator.arguments import chosen
 from symfric.integrator.by_peer import peer

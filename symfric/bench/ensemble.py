@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symfric.bench import table
 from symfric.bench.contenders import Solve, casadi
-from symfric.bench.timing import best_time, interleaved
+from symfric.bench.table import best_time, interleaved
 from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda import on_device
 from symfric.integrator.cuda.device import DeviceError

@@ -182,7 +182,7 @@ Spoil = Callable[[Array], Array]
 
 
 def _harmless(rng: np.random.Generator) -> dict[str, Spoil]:
-    """What a fit has to stand."""
+    """Harmless changes, which a fit has to tolerate."""
 
     def rounded(column: int, step: float) -> Spoil:
         return lambda a: _put(a, slice(None), column, step * np.rint(a[:, column] / step))
@@ -286,7 +286,7 @@ def _physics(rng: np.random.Generator) -> dict[str, Spoil]:
 
 
 def _disturbed(rng: np.random.Generator) -> dict[str, Spoil]:
-    """What acts beside the drive, or between it and its sensors."""
+    """Disturbances that act on the drive, or between it and its sensors."""
     every, x, force = slice(None), 1, 2
 
     def pushed(extra: Callable[[Array, Array, Array], Array]) -> Spoil:

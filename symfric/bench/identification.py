@@ -8,17 +8,13 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Literal, NamedTuple, final
+from typing import Any, Literal, NamedTuple, final
 
 from identification import Dataset, Fit, Fitted, InverseDynamics
 from symfric.bench import table
 from symfric.bench.file_campaign import File, campaign
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import SolveError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 CASES = {
     "lugre": "memory",
@@ -37,7 +33,7 @@ name of the case measures its rows: `case(quick)`."""
 @final
 @dataclass(frozen=True)
 class Row(table.Judged):
-    """One measured number beside its goal.
+    """One measured number and its goal.
 
     Attributes:
         case, what: which problem, and what was measured with its unit.
@@ -59,7 +55,7 @@ class Row(table.Judged):
 @final
 @dataclass(frozen=True, eq=False)
 class IdentificationBenchmark(table.Report):
-    """What was measured, case by case."""
+    """Measurements by case."""
 
     rows: tuple[Row, ...]
 
@@ -73,11 +69,9 @@ class IdentificationBenchmark(table.Report):
              "note": "note"},
         )  # fmt: skip
 
-    def plot(self, path: str | Path) -> "Figure":
-        """How far each number is from its goal; right of the line it is worse."""
-        from symfric.bench.pictures import plot_goals  # noqa: PLC0415  (matplotlib is slow)
-
-        return plot_goals(((f"{row.case}: {row.what}", row) for row in self.rows), path)
+    def drawn(self) -> tuple[Any, ...]:
+        """The distance of each number from its goal; right of the line it is worse."""
+        return "goals", ((f"{row.case}: {row.what}", row) for row in self.rows)
 
 
 def bench_identification(
@@ -112,7 +106,7 @@ EVERY = 5
 
 
 class Outcome(NamedTuple):
-    """How a file ended.
+    """The outcome for one file.
 
     Attributes:
         file: its name.
@@ -136,7 +130,7 @@ def outcomes(quick: bool = False, seed: int = 3) -> Iterator[Outcome]:
 
 
 def outcome(file: File, folder: Path) -> Outcome:
-    """What becomes of one file."""
+    """Read, check and fit one file."""
     path = folder / f"log{file.suffix}"
     path.write_bytes(file.content)
     try:
@@ -170,7 +164,7 @@ def _judged(path: Path, file: File) -> tuple[str, str]:
 
 
 def _is_close(fit: Fitted, name: str) -> bool:
-    """Whether a parameter is right, or is said not to be told by the data."""
+    """True if a parameter is right, or is reported as not identifiable."""
     estimate = fit.parameters[name]
     error = abs(estimate.value - TRUTH[name])
     low, high = estimate.low, estimate.high

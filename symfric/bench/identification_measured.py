@@ -265,7 +265,7 @@ def franka(quick: bool) -> Iterator[Row]:
 
 
 def _bristles() -> Iterator[tuple[str, Law, list[str]]]:
-    """Laws and what is free beside levels, viscous coefficient and Stribeck velocity."""
+    """Laws and what is free besides levels, viscous coefficient and Stribeck velocity."""
     yield "LuGre", LuGre(), ["delta"]
     elements = tuple(Element(1e3, 1 / ELEMENTS) for _ in range(ELEMENTS))
     stiffnesses = [f"k_{i + 1}" for i in range(ELEMENTS)]
@@ -330,7 +330,7 @@ def static_laws() -> list[str]:
 
 
 def outcome(name: str, data: Dataset) -> str:
-    """What becomes of a law: "fits", "refused", or what went wrong."""
+    """Fit a law: "fits", "refused", or the failure."""
     try:
         found = Fit(InverseDynamics(), name, data).solve(throw=False)
     except ValueError as error:

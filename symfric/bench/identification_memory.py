@@ -1,4 +1,4 @@
-"""Friction with memory: six parameters of LuGre, beside single shooting with cvodes; GMS."""
+"""Friction with memory: six parameters of LuGre, compared with single shooting with cvodes; GMS."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ def case(seed: int) -> Case:
 
 
 def within(fit: Fitted) -> bool:
-    """Whether all six are within 5 % and three standard errors of the truth."""
+    """True if all six are within 5 % and three standard errors of the truth."""
     for name, value in TRUTH.items():
         found = fit.parameters[name]
         error = found.standard_error or 0.0

@@ -125,7 +125,7 @@ def _covered(kind: str, rho: float, truth: dict[str, float], found: list[_Seed])
 
 
 def _added(seeds: int) -> Row:
-    """Scatter of the estimates with a noisy velocity beside the position, over that without."""
+    """Scatter of the estimates with a noisy velocity besides the position, over that without."""
     begun = process_time()
     off: dict[str, list[Array]] = {"x": [], "x and v": []}
     true = np.array(list(BLOCK.values()))
@@ -267,7 +267,7 @@ def far(truth: Mapping[str, float], factor: float, seed: int) -> dict[str, float
 
 
 def was_found(fit: Fitted, truth: Mapping[str, float]) -> bool:
-    """Whether a fit claims to be good and is."""
+    """True if a fit claims to be good and is."""
     for name, value in truth.items():
         estimate = fit.parameters[name]
         error = abs(estimate.value - value)
@@ -277,7 +277,7 @@ def was_found(fit: Fitted, truth: Mapping[str, float]) -> bool:
 
 
 def starts(quick: bool = False) -> Iterator[Row]:
-    """How many of 20 fits find the truth, and what the slowest of them takes.
+    """The number of 20 fits that find the truth, and the time of the slowest.
 
     Each seed has other noise and another start, all parameters multiplied by factors drawn
     uniformly in their logarithm. A fit has found the truth where it says so (its status is

@@ -7,9 +7,8 @@ from functools import partial
 from importlib.util import find_spec
 from io import StringIO
 from math import exp, log, nan
-from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from symfric.bench import contenders, table
 from symfric.bench.contenders import Contender, equations, tolerances
 from symfric.bench.ensemble import EnsembleRow, measure_ensemble
-from symfric.bench.timing import best_time, unwarned
+from symfric.bench.table import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.simulate import simulate
@@ -26,9 +25,6 @@ from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import rabinowicz
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 T_END = 20.0
@@ -168,13 +164,9 @@ class Benchmark(table.Report):
         )  # fmt: skip
         yield from table.not_run(self.skipped)
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """Work-precision diagram: time against error, a panel per case."""
-        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
-
-        return plot_work_precision(
-            ((r.case, r.integrator, r.error, r.time_s) for r in self.rows), path
-        )
+        return "work_precision", ((r.case, r.integrator, r.error, r.time_s) for r in self.rows)
 
 
 def bench_integrator(*, quick: bool = False, progress: table.Progress = None) -> Benchmark:

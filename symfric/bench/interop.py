@@ -49,7 +49,7 @@ QUICK = ("brown_mcphee", "lugre")
 
 
 class Move(NamedTuple):
-    """What one tool made of the move.
+    """The move as one tool solved it.
 
     Attributes:
         tool, route, law: who, how, with what.
@@ -73,7 +73,7 @@ class Move(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Run:
-    """One integrator of CasADi on 20 s of stick-slip beside `simulate` at rtol 1e-10.
+    """One integrator of CasADi on 20 s of stick-slip, compared with `simulate` at rtol 1e-10.
 
     Attributes:
         integrator: of `casadi.integrator`, or "symfric".
@@ -166,7 +166,7 @@ def move(tool: str, route: str, law: str) -> Move:
 
 
 def miss(model: Model, controls: Array) -> float:
-    """How far from rest at the goal the model ends under `controls`."""
+    """Distance of the model's end from rest at the goal under `controls`."""
     held = Hold(np.linspace(0.0, T, N + 1)[:-1], controls)
     rest = {v.name: 0.0 for v in model.x}
     run = simulate(model, T, u={"force": held}, x0=rest, rtol=1e-8, throw=False)

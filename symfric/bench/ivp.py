@@ -4,22 +4,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
 from symfric.bench import table
 from symfric.bench.ivp_mechanisms import PROBLEMS
 from symfric.bench.ivp_problems import Problem
-from symfric.bench.timing import best_time
+from symfric.bench.table import best_time
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 METHODS = ("rodas5p", "radau5")
 TOLERANCES = (1e-6, 1e-8, 1e-10)
@@ -80,12 +76,10 @@ class IvpBenchmark(table.Report):
             {f"{r.problem}, {r.method}": r.message for r in self.rows if r.message}
         )
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """Work-precision diagram: time against relative error, a panel per problem."""
-        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
-
         points = ((r.problem, r.method, 10**-r.scd, r.time_s) for r in self.rows if r.scd > -inf)
-        return plot_work_precision(points, path, "relative error [1]")
+        return "work_precision", points, "relative error [1]"
 
 
 def bench_ivp(

@@ -197,7 +197,7 @@ MASS = EPSILON**2 * M / 2
 
 
 def _road(t: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Where the right wheel touches; the left one stands at the origin."""
+    """Place of the right wheel's contact; the left one stands at the origin."""
     y = BUMP * ca.sin(OMEGA * t)
     return ca.sqrt(L**2 - y**2), y
 

@@ -21,7 +21,7 @@ TEST_SET = (
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is integrated, and where it has to end.
+    """An initial-value problem and its published end.
 
     Attributes:
         name: as in the literature.

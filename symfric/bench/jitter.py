@@ -10,8 +10,7 @@ jitter.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -30,9 +29,6 @@ from symfric.integrator.step.attempt import build_fixed
 from symfric.laws import BrownMcPhee, Law, SelfTuning
 from symfric.model import Model, Output
 from symfric.scenes import FourMass
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 SCALES = (0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
@@ -112,11 +108,9 @@ class JitterBenchmark(table.Report):
         head = ["law", "steps", *(f"{name} [{unit}]" for name, unit in units.items())]
         yield table.Table(self.data.title, head, rows)
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """A panel per slider, a colour per way of stepping, the laws by line and marker."""
-        from symfric.bench.pictures import plot_jitter  # noqa: PLC0415
-
-        return plot_jitter(self.data, path)
+        return "jitter", self.data
 
 
 def bench_jitter(*, quick: bool = False, progress: table.Progress = None) -> JitterBenchmark:

@@ -1,4 +1,4 @@
-"""What mechanisms need and how accurate they are: counts, compilation, chains, reference numbers.
+"""Needs and accuracy of mechanisms: counts, compilation, chains, reference numbers.
 
 Source: Haug's spatial four-mass system and slider-crank; the reference numbers are our own
 solutions in minimal coordinates (`tests/mechanics.py`).
@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.timing import best_time, compile_time
+from symfric.bench.table import best_time, compile_time
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import bound
 from symfric.integrator.equations.initial import consistent, first_guess
@@ -36,7 +36,7 @@ METHOD = METHODS["rodas5p"]
 
 
 class CountRow(NamedTuple):
-    """What one variant of a mechanism has.
+    """Counts of one variant of a mechanism.
 
     Attributes:
         states, algebraic: of the model; coordinates and rates, multipliers and normal forces.
@@ -56,7 +56,7 @@ class CountRow(NamedTuple):
 
 
 class CompileRow(NamedTuple):
-    """What it takes to get the step of a mechanism as machine code.
+    """Cost of the step of a mechanism as machine code.
 
     Attributes:
         build_s: time [s] to write its expressions.
@@ -134,7 +134,7 @@ def counts(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[CountR
 
 
 def compile_rows(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[CompileRow]:
-    """What building and compiling a step takes; empty without a compiler."""
+    """Times for building and compiling a step; empty without a compiler."""
     rows: list[CompileRow] = []
     for formulation in formulations if find_compiler() else ():
         for name, mechanism in COMPILED:

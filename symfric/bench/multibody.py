@@ -1,13 +1,12 @@
-"""Mechanisms: run time at equal error beside others, cost of the step, what is counted and met."""
+"""Mechanisms: run time at equal error compared with others, cost of the step, counts."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
 from math import inf, nan
-from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -31,15 +30,11 @@ from symfric.bench.mechanisms import (
     norms,
     scaling,
 )
-from symfric.bench.timing import best_time, unwarned
+from symfric.bench.table import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 OURS, LOOP, EXUDYN = "symfric", "symfric loop", "exudyn"
 ERRORS = (1e-4, 2e-5, 1e-5)
@@ -65,7 +60,7 @@ class Case:
 
     @property
     def times(self) -> Array:
-        """Where positions are compared [s]."""
+        """Times at which positions are compared [s]."""
         return np.linspace(0.0, self.t_end, 26)[1:]
 
 
@@ -126,7 +121,7 @@ class MultibodyBenchmark(table.Report):
         compiled: what building and compiling a step takes.
         counts: unknowns, operations and nonzeros of variants of a mechanism.
         chains: the step of chains of growing length.
-        facts: reference numbers beside ours.
+        facts: reference numbers and ours.
         norms: what constraints leave over.
         drifts: energy of frictionless mechanisms.
         skipped: what did not run -> why.
@@ -142,7 +137,7 @@ class MultibodyBenchmark(table.Report):
     skipped: dict[str, str] = field(default_factory=dict[str, str])
 
     def loosest(self, case: str, integrator: str, bound: float) -> RunRow | None:
-        """The run with the fewest steps asked for whose error is at most `bound`, if any."""
+        """The run with the fewest requested steps whose error is at most `bound`, if any."""
         rows = [r for r in self.runs if (r.case, r.integrator) == (case, integrator)]
         by_steps = integrator == EXUDYN
         rows.sort(key=lambda r: r.setting if by_steps else -r.setting)
@@ -234,13 +229,9 @@ class MultibodyBenchmark(table.Report):
             return {}
         return {column: exponent(self.chains, column) for column in ("instructions", "step_s")}
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """Work-precision diagram: time against error, a panel per case."""
-        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
-
-        return plot_work_precision(
-            ((r.case, r.integrator, r.error, r.time_s) for r in self.runs), path
-        )
+        return "work_precision", ((r.case, r.integrator, r.error, r.time_s) for r in self.runs)
 
 
 def bench_multibody(

@@ -9,10 +9,9 @@ processor time of a whole call, building and checking included.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
-from pathlib import Path
 from statistics import median
 from time import process_time
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,23 +19,17 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import set_valued
-from ocp.problems.catalogue import READY
-from ocp.problems.ready import Ready
-from ocp.result.solution import Solution
+from ocp.problems import READY, Ready
 from ocp.solve import solve
-from ocp.solving.random_starts import perturbed
+from ocp.solving.one_solve import perturbed
+from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, initial_points
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.bench import table
 from symfric.bench.ocp_contenders import Attempt, has_rockit, opti, rockit
 from symfric.bench.ocp_costs import MpcRow, SizeRow, mpc_rows, size_rows
 from symfric.integrator import Hold, simulate
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 Array = NDArray[np.float64]
 STARTS, RANDOM = 12, 50
@@ -130,11 +123,9 @@ class OcpBenchmark(table.Report):
             )  # fmt: skip
         yield from table.not_run(self.skipped)
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def drawn(self) -> tuple[Any, ...]:
         """Miss against time, a panel for each problem with friction."""
-        from symfric.bench.pictures import plot_ocp  # noqa: PLC0415  (matplotlib is slow)
-
-        return plot_ocp(self.rows, path)
+        return "ocp", self.rows
 
 
 def bench_ocp(
@@ -261,7 +252,7 @@ def _middle(values: Sequence[float]) -> float:
 
 
 def attempt_of(solution: Solution, time_s: float) -> Attempt:
-    """What `ocp.solve` found, in the same terms."""
+    """The solution of `ocp.solve` as an `Attempt`."""
     motion, meshes, controls = solution.motions[0], [], []
     for stretch in motion.phases:
         inside = (motion.t_control >= stretch.begin - 1e-12) & (motion.t_control < stretch.end)

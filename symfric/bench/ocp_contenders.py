@@ -17,8 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Free, Span
 from ocp.formulation.problem import Problem
 
 Array = NDArray[np.float64]
@@ -35,7 +34,7 @@ DEGREE = 3
 @final
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """What a solver found.
+    """The solution of a solver.
 
     Attributes:
         cost: J as the solver says.
@@ -244,7 +243,7 @@ def _meet(o: ca.Opti, span: Span, s: float, x: ca.MX) -> None:
 
 
 def has_rockit() -> bool:
-    """Whether rockit is installed."""
+    """True if rockit is installed."""
     return find_spec("rockit") is not None
 
 

@@ -4,19 +4,14 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from symfric.bench.table import Judged
 from symfric.figures import FigureData
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import COLOURS, MARKERS, colour, dash
-
-if TYPE_CHECKING:
-    from symfric.bench.ocp import OcpRow
-    from symfric.bench.regularisation import RegularisationRow
 
 ABREAST = 5
 """Panels in a row."""
@@ -29,15 +24,15 @@ def _filled(number: int) -> str | None:
 
 def plot_work_precision(
     points: Iterable[tuple[str, str, float, float]],
-    path: str | Path | None = None,
     error_label: str = "relative position error [1]",
+    path: str | Path | None = None,
 ) -> Figure:
     """Run time against error, a panel per case, at most five in a row.
 
     Args:
         points: case, integrator, relative error, time [s].
-        path: image file.
         error_label: what the error is.
+        path: image file.
     """
     lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for case, name, error, time in points:
@@ -70,9 +65,7 @@ def plot_work_precision(
     return save(figure, path)
 
 
-def plot_regularisation(
-    rows: "Sequence[RegularisationRow]", path: str | Path | None = None
-) -> Figure:
+def plot_regularisation(rows: Sequence[Any], path: str | Path | None = None) -> Figure:
     """Error of smooth friction above, CPU time below, over its width; drier to the right.
 
     A column per case, a colour per tolerance; the dotted line is the error of the reference.
@@ -110,8 +103,13 @@ def plot_regularisation(
     return save(figure, path)
 
 
-def plot_goals(rows: Iterable[tuple[str, Judged]], path: str | Path | None) -> Figure:
-    """How many decades each number lies beyond its goal, a bar each; left of zero it is met."""
+def plot_goals(rows: Iterable[tuple[str, Any]], path: str | Path | None) -> Figure:
+    """Decades by which each number exceeds its goal, a bar each; left of zero it is met.
+
+    Args:
+        rows: names, and numbers with their goals (`symfric.bench.table.Judged`).
+        path: image file.
+    """
     known = [(name, goal) for name, goal in rows if goal.decades == goal.decades]
     figure, (axis,) = panels(1, 8.0, 0.5 + 0.25 * len(known))
     for name, goal in known:
@@ -130,7 +128,7 @@ LEAST = 1e-14
 """What is drawn for less."""
 
 
-def plot_ocp(rows: "Sequence[OcpRow]", path: str | Path | None = None) -> Figure:
+def plot_ocp(rows: Sequence[Any], path: str | Path | None = None) -> Figure:
     """Relative miss with exact friction against processor time, a panel for each problem.
 
     Crosses are motions that also cost more than 0.1 % above the best one known.

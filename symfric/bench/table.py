@@ -1,12 +1,21 @@
-"""Rows of measurements: they print as tables, turn into JSON, and stand beside their goals."""
+"""Rows of measurements: they print as tables, turn into JSON, and have goals; honest timing."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import os
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from math import isfinite, log10
 from pathlib import Path
-from typing import Any, Literal, TypeVar, final
+from time import perf_counter, process_time
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, final
 
+from symfric.foundation.compiler import find_compiler, no_compiler
 from symfric.foundation.files import write_table
+from symfric.integrator.compiled.compiler import FLAGS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 T = TypeVar("T")
 Cell = str | float
@@ -75,7 +84,7 @@ class Judged:
 
     @property
     def met(self) -> bool:
-        """Whether the goal is met; NaN meets none."""
+        """True if the goal is met; NaN meets none."""
         return self.value <= self.goal if self.better == "<=" else self.value >= self.goal
 
     @property
@@ -92,6 +101,17 @@ class Report:
     def shown(self) -> Iterator[Table | str]:
         """Tables and sentences, as they are printed."""
         raise NotImplementedError
+
+    def drawn(self) -> tuple[Any, ...]:
+        """A picture: the end of its function's name in `symfric.bench.pictures`, and arguments."""
+        raise NotImplementedError
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Draw it; save it to `path` if given."""
+        from symfric.bench import pictures  # noqa: PLC0415  (matplotlib is slow to import)
+
+        name, *given = self.drawn()
+        return getattr(pictures, f"plot_{name}")(*given, path=path)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything by name; numbers that are not finite are None."""
@@ -184,3 +204,78 @@ class Section:
         rows = [dict(zip(self.head, row, strict=True)) for row in self.rows]
         found = {"title": self.title, "rows": rows, "goals": self.goals, "notes": self.notes}
         return plain(found)
+
+
+FASTEST = (*(f for f in FLAGS if f != "-ffp-contract=off"), "-freciprocal-math")
+"""Flags for others, which need not round as CasADi's virtual machine does."""
+
+
+@contextmanager
+def unwarned() -> Generator[None]:
+    """No warnings: loose tolerances are measured on purpose."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def best_time(
+    call: Callable[[], T],
+    budget: float = 0.05,
+    most: int = 30,
+    clock: Callable[[], float] = perf_counter,
+) -> tuple[float, T]:
+    """Shortest time [s] of `call` over repeats within `budget` seconds, and its result.
+
+    The shortest one is what the code costs; the rest is what else the machine does. Of a
+    call that has no threads the processor time (`time.process_time`) is the better clock.
+    """
+    best, spent, result = float("inf"), 0.0, None
+    for _ in range(most):
+        begin = clock()
+        result = call()
+        elapsed = clock() - begin
+        best, spent = min(best, elapsed), spent + elapsed
+        if spent > budget:
+            break
+    return best, result  # pyright: ignore[reportReturnType]  (called at least once)
+
+
+def interleaved(
+    calls: Mapping[str, Callable[[], object]], rounds: int = 7, budget: float = 0.0
+) -> dict[str, float]:
+    """Shortest processor time [s] of each of the `calls`, which take turns.
+
+    What disturbs the machine for a while disturbs all of them alike, so that ratios hold.
+
+    Args:
+        calls: by name; the first call of each is not measured.
+        rounds: how often each is measured at least.
+        budget: time [s] in all up to which further rounds are made.
+    """
+    best = dict.fromkeys(calls, float("inf"))
+    for call in calls.values():
+        call()
+    began, made = perf_counter(), 0
+    while made < rounds or perf_counter() - began < budget:
+        for name, call in calls.items():
+            begin = process_time()
+            call()
+            best[name] = min(best[name], process_time() - begin)
+        made += 1
+    return best
+
+
+def compile_time(source: str, target: str | os.PathLike[str] = os.devnull) -> float:
+    """Processor time [s] of the C compiler on `source`, with the fastest flags.
+
+    Raises:
+        CompileError: no compiler.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise no_compiler()
+    before = os.times()
+    compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
+    after = os.times()
+    user = after.children_user - before.children_user
+    return user + after.children_system - before.children_system

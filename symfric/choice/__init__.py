@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from symfric.choice.friction import Friction as Friction
     from symfric.choice.nature import NEEDS as NEEDS
     from symfric.choice.ranking import Row as Row
-    from symfric.choice.result import Choice as Choice
+    from symfric.choice.select import Choice as Choice
     from symfric.choice.select import select as select
 
 hand_out(__name__)

@@ -1,13 +1,15 @@
 """One law in the user's machine: as soft as the accuracy allows, timed at equal error."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import inf, nan
+from math import ceil, floor, inf, log10, nan
 from time import process_time
 from typing import final
 
+import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.choice import nature
 from symfric.choice.climb import (
@@ -24,18 +26,125 @@ from symfric.choice.climb import (
     nearest,
     short,
 )
-from symfric.choice.fixed_step import Motion, largest
 from symfric.choice.friction import Friction
-from symfric.choice.machine import FAILURES, Candidate, Machine, candidate
+from symfric.choice.machine import FAILURES, OWN, Candidate, Reference, candidate, quiet_run
 from symfric.choice.nature import lacking
 from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
-from symfric.choice.reference import OWN, Reference
 from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
-from symfric.figures.magnitudes import phenomena
-from symfric.figures.regularisation import positions
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.from_model import plant_block
+from symfric.figures.data import phenomena
+from symfric.figures.motion import sampled
+from symfric.figures.regularisation import Machine, positions
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import SolveError, Status
+from symfric.integrator.equations.inputs import Input
 from symfric.laws import Law
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+WORK = 100_000_000
+"""CasADi instructions that one step size may take: what a small step is worth."""
+FEWEST = 100
+"""Whole powers are tried that make so many steps at least."""
+CHUNK = 1000
+"""Steps between looks whether the motion still is one."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion that fixed steps must follow: names of positions, values over times, sizes."""
+
+    names: tuple[str, ...]
+    t: Array
+    values: Array
+    size: Array
+
+
+def largest(
+    machine: Machine, model: Model, method: str, motion: Motion, share: float
+) -> tuple[float | None, str]:
+    """The largest step [s] in which the plant, as its C block steps, follows the motion.
+
+    The plant block of `symfric.codegen` steps from the start to the end of the motion, inputs held
+    at their value in the middle of each step. A step size holds if the positions are finite and
+    within `share` of the size of the motion of the adaptive run of the same law, at every step.
+    The largest of 1, 2, 5 times a power of ten that holds, with the power below it holding, too, is
+    what is found: whole powers first, from large to small, then 2 and 5 times the one that holds.
+    Limits: steps across the fold of a falling law hold or do not by the eighth digit of a
+    parameter.
+
+    Returns:
+        The step, None where none was found, and why.
+    """
+    try:
+        block = plant_block(model, method=method)
+    except ValueError as problem:
+        return None, str(problem).partition("; ")[0]
+    step = _step(block)
+    least = machine.t_end * step.n_instructions() / WORK
+    first = floor(log10(machine.t_end / FEWEST))
+    for power in range(first, floor(log10(least)) - 1, -1):
+        tried = 10.0**power
+        if tried < least:
+            break
+        if _follows(step, tried, block, machine, motion, share):
+            return _refined(step, tried, block, machine, motion, share), ""
+    return None, f"below {max(least, 1e-12):.0e} s, if any: smaller steps were not tried"
+
+
+def _refined(
+    step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
+    share: float,
+) -> float:  # fmt: skip
+    """The larger ones between h, which holds, and ten times that."""
+    for factor in (5.0, 2.0):
+        if _follows(step, factor * h, block, machine, motion, share):
+            return factor * h
+    return h
+
+
+def _step(block: Block) -> ca.Function:
+    """(states, [inputs; h]) -> states after a step."""
+    x = ca.SX.sym("x", len(block.states))
+    u = ca.SX.sym("u", len(block.inputs))
+    h = ca.SX.sym("h")
+    p = [h if v.name == "h" else ca.SX(float(v.start)) for v in block.parameters]  # pyright: ignore[reportArgumentType]
+    after = block.step(x, ca.vertcat(ca.SX(0, 1), *p), u)[0]
+    return ca.Function("step", [x, ca.vertcat(u, h)], [after])
+
+
+def _follows(
+    step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
+    share: float,
+) -> bool:  # fmt: skip
+    """Test for a motion in steps of `h` that is finite and follows."""
+    count = ceil(machine.t_end / h - 1e-9)
+    names = [v.name for v in block.states]
+    rows = [names.index(name) for name in motion.names]
+    x = np.array([float(v.start) for v in block.states])  # pyright: ignore[reportArgumentType]
+    many = step.mapaccum("many", min(CHUNK, count))
+    for begin in range(0, count, CHUNK):
+        k = np.arange(begin, begin + min(CHUNK, count))
+        middle: Array = np.multiply(k + 0.5, h, dtype=np.float64)
+        u = _inputs(block, machine.u or {}, middle)
+        found = many(x, np.vstack([u, np.full(k.size, h)])).full()
+        t = (k + 1) * h
+        seen = t <= machine.t_end * (1 + 1e-9)
+        wanted = np.array([np.interp(t, motion.t, row) for row in motion.values])
+        off = np.abs(found[rows] - wanted)[:, seen] / motion.size[:, None]
+        if not (off <= share).all():  # NaN is not, either
+            return False
+        x = found[:, -1]
+    return True
+
+
+def _inputs(block: Block, given: Mapping[str, Input], t: Array) -> Array:
+    """The inputs at the times `t`, shape (inputs, times); start values where none are given."""
+    rows = [sampled(given.get(v.name, float(v.start)), t) for v in block.inputs]  # pyright: ignore[reportArgumentType]
+    return np.array(rows).reshape(len(rows), t.size)
+
 
 TIGHTER = 1e-2
 """Share of its tolerance at which a law has to keep the accuracy, too."""
@@ -141,7 +250,7 @@ def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
     """The task with the law's own motion as reference, where only the integrator is judged."""
     if task.reference is not OWN:
         return task
-    run = task.machine.run(held.first, held.law, 0.1 * task.asked.fine, 10 * runs.most)
+    run = held.run(held.first, 0.1 * task.asked.fine, 10 * runs.most)
     return replace(task, reference=replace(OWN, motion=run.motion, size=run.size))
 
 
@@ -231,7 +340,7 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
     """Shortest processor time [s] of a few calls; the integrator is built already."""
     best, began = inf, process_time()
     for _ in range(ROUNDS):
-        found = task.machine.run(at.model, law, at.rtol, runs.most)
+        found = quiet_run(task.machine, at.model, law, at.rtol, runs.most)
         best = min(best, found.time_s)
         if process_time() - began > PATIENCE:
             break
@@ -248,7 +357,7 @@ def _stepped(task: Task, held: Candidate, rungs: Ladder, row: Row) -> Row:
         model, law = held.model(s or row.softness), held.law_at(s or row.softness)
         machine = replace(task.machine, of=None, times=None)
         most = max(LEAST, task.work // row.instructions)
-        run = machine.run(model, law, row.rtol if s is None else task.asked.fine, most)
+        run = quiet_run(machine, model, law, row.rtol if s is None else task.asked.fine, most)
     except FAILURES as problem:
         return replace(row, fixed_why=short(problem), explicit_why=short(problem))
     names = positions(model, law)

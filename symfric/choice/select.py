@@ -1,28 +1,123 @@
 """Choose a law: every candidate runs on the user's machine, ranked by work at equal error."""
 
+import csv
+import json
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from math import isfinite
 from multiprocessing import get_all_start_methods, get_context
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkProcess
+from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any, final
 
 from symfric.choice.climb import RUN
 from symfric.choice.friction import Friction
-from symfric.choice.machine import FAILURES, frictions_of, load_of, machine_of
+from symfric.choice.machine import FAILURES, OWN, frictions_of, load_of, reference_of
 from symfric.choice.measured import Task, best_form
 from symfric.choice.nature import forms, needed
-from symfric.choice.ranking import FAILED, Row, ordered
-from symfric.choice.reference import OWN, reference_of
-from symfric.choice.result import Choice
-from symfric.figures.regularisation import Measure
+from symfric.choice.ranking import FAILED, Ranking, Row, ordered
+from symfric.choice.text import lines, verdict
+from symfric.figures.regularisation import Measure, machine_of
 from symfric.foundation import checks
+from symfric.foundation.files import write_text, written
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import ALL_LAWS, BrownMcPhee, Law
 from symfric.laws.base.law import check_law
 from symfric.results.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+SCREEN = 16
+"""Rows of the text that a terminal shows."""
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(Ranking):
+    """A ranking of laws that shows, draws and writes itself; see `Ranking` for its attributes."""
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Recommended laws and reasons, for simulation, optimal control and a controller."""
+        return verdict(self.rows, self.needs, self.accuracy, self.control)
+
+    @property
+    def table(self) -> list[dict[str, Any]]:
+        """A row of plain numbers and texts for each law; what CSV and data frames hold."""
+        return [flat(row) for row in self.rows]
+
+    def __repr__(self) -> str:
+        return "\n".join(lines(self, SCREEN))
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]  (notebooks call it)
+        from symfric.choice.page import body  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return body(self)
+
+    def plot(self, path: str | Path | None = None, *, wide: bool = False) -> "Figure":
+        """Draw error against work, marked by what a law shows; save it to `path` if given.
+
+        It is as wide as a column of print, 85 mm; `wide` puts the panels side by side.
+        """
+        from symfric.choice.page import plot_choice  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return plot_choice(self, path, wide)
+
+    def to_html(self, path: str | Path) -> None:
+        """Write one page that needs nothing from elsewhere: verdict, picture, table."""
+        from symfric.choice.page import page  # noqa: PLC0415  (matplotlib is slow to import)
+
+        write_text(path, page(self))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table, a law a line."""
+        rows = self.table
+        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            sheet = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else ["law"])
+            sheet.writeheader()
+            sheet.writerows(rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data; numbers that are none are null."""
+        best = self.best
+        return {
+            "machine": self.machine,
+            "needs": list(self.needs),
+            "accuracy": self.accuracy,
+            "friction": self.friction,
+            "reference": self.reference,
+            "uncertain": self.uncertain if isfinite(self.uncertain) else None,
+            "control": self.control,
+            "t_end": self.t_end,
+            "best": None if best is None else best.law,
+            "verdict": list(self.verdict),
+            "unmeasured": list(self.unmeasured),
+            "wall_s": self.wall_s,
+            "rows": [row.to_dict() for row in self.rows],
+        }
+
+    def to_json(self, path: str | Path) -> None:
+        """Write `to_dict` as a file."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
+
+
+def flat(row: Row) -> dict[str, Any]:
+    """A row without nested values."""
+    found = row.to_dict()
+    del found["curve"]
+    values = found.pop("values") or {}
+    form = [f"form={row.form}"] if row.form else []
+    found["values"] = " ".join([*form, *(f"{n}={value:g}" for n, value in values.items())])
+    found["phenomena"] = " ".join(row.phenomena)
+    found["hard"] = " ".join(row.hard)
+    return found
+
 
 Progress = Callable[[str, float], None]
 Candidates = Mapping[str, Law | Sequence[Law]] | Sequence[str]
@@ -116,11 +211,11 @@ def select(
         such = "a friction, such as Friction(mu_s=0.2, mu_d=0.15)"
         checks.kind(f"{where}: friction", friction, Friction, such)
     known = laws_of(where, laws)
-    machine = machine_of(f"{where}: scene", scene, t_end, u, of, BrownMcPhee())
+    machine = machine_of(where, scene, t_end, of, u, BrownMcPhee(), "vm")
     frictions = frictions_of(machine, friction, scene)
     load = None
     with suppress(*FAILURES):
-        load = load_of(machine.with_law(BrownMcPhee()))
+        load = load_of(machine.model(BrownMcPhee()))
     given = reference if data is None else data
     compared = OWN
     if misfits is None:

@@ -125,7 +125,7 @@ LEGEND = (
     "Cortex-M4F (C: operations, where there are no tools to count); par: parameters / hard to "
     "measure; class: smoothness, or event: a form whose modes switch by events"
 )
-GROUPS = {
+STANDING_TEXTS = {
     RANKED: "show what is needed and keep the accuracy, by work:",
     INACCURATE: "do not keep the accuracy, by their error, timed where their own error does:",
     LACKING: "do not show what is needed, by their error, timed likewise:",
@@ -143,7 +143,7 @@ def lines(choice: Ranking, most: int | None = None) -> Iterator[str]:
     cores = any(isfinite(row.core) for row in choice.rows)
     yield HEAD if cores else HEAD.replace("M4F", "  C")
     shown = choice.rows if most is None else choice.ranked[:most]
-    for standing, text in GROUPS.items():
+    for standing, text in STANDING_TEXTS.items():
         group = [row for row in shown if row.standing == standing and row.rank]
         if group and most is None:
             yield f"-- {text}"

@@ -10,16 +10,187 @@ import sys
 import warnings
 from collections.abc import Sequence
 from errno import ENOSPC
+from importlib import import_module
+from inspect import cleandoc
 from io import TextIOWrapper
 from re import search
 from types import TracebackType
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, cast, get_type_hints
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from symfric import SolveError, Status, __version__
-from symfric.cli.commands import SETTINGS, Commands, argument_shown, is_option
 from symfric.foundation.programs import ProgramError
+
+COMMANDS = {
+    "laws": "List the friction laws, or show one in full.",
+    "scenes": "List the scenes, or show one in full.",
+    "run": "Simulate SCENE with a friction law.",
+    "report": "Simulate SCENE and write one page: signals, friction, error, laws.",
+    "identify": "Fit friction laws to measured data, and say what they are worth.",
+    "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
+    "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
+    "ocp": "Solve an optimal control problem and check it.",
+    "select": "Rank friction laws on a machine, and say which to take.",
+    "demo": "Simulate, identify, optimise and generate C.",
+    "gallery": "Compute the figures of the papers again.",
+    "bench": "Measure symfric beside other integrators.",
+    "stress": "Judge runs of random laws in random scenes.",
+}
+"""What there is, and the first line of each."""
+MODULES = dict.fromkeys(("bench", "gallery", "stress"), "campaigns") | {"report": "run"}
+"""Commands that do not stand in a module of their own name."""
+
+SETTINGS: dict[str, Any] = {
+    "add_completion": False,
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,  # units in brackets are not markup
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+}
+
+EXAMPLE = "Example: "
+WIDTH = 78
+"""Columns of an example."""
+
+
+TEXTS = (str, str | None, list[str], list[str] | None)
+"""Types of parameters that are texts as they stand."""
+
+
+def convert_as_needed(parameter: Any, is_text: bool) -> Any:
+    """The parameter, which now takes texts, defaults and nothing as they are.
+
+    The conversion of Typer loads pydantic, which takes longer than a simulation.
+    """
+    if "process_value" in vars(parameter):
+        return parameter
+    convert = parameter.process_value
+    several = parameter.nargs == -1 or getattr(parameter, "multiple", False)
+
+    def process_value(ctx: Any, value: Any) -> Any:
+        if parameter.required and not value:
+            return convert(ctx, value)
+        if value is None:
+            return () if several else None
+        if is_text:
+            return list(value) if several else value
+        return value if value is parameter.default else convert(ctx, value)
+
+    parameter.process_value = process_value
+    return parameter
+
+
+class Commands(TyperGroup):
+    """Loads the command that is called, and none for a list of them."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        known: dict[str, Any] = dict.fromkeys(COMMANDS)
+        self.commands = known
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options before a command."""
+        return [convert_as_needed(p, False) for p in super().get_params(ctx)]
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names, in the order of the help."""
+        return [*COMMANDS]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of that name, None where there is no such one."""
+        if cmd_name not in COMMANDS:
+            return None
+        one = typer.Typer(**SETTINGS)
+        name = cmd_name.replace("-", "_")
+        function = getattr(import_module(f"symfric.cli.{MODULES.get(name, name)}"), name)
+        one.command(cls=Command)(function)
+        return typer.main.get_command(one)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command of the first word; an unknown word is refused as everywhere."""
+        if not (args[0] in COMMANDS or ctx.resilient_parsing or args[0].startswith("-")):
+            from symfric.foundation.checks import check_names  # noqa: PLC0415  (CasADi is slow)
+
+            check_names("command", args[:1], COMMANDS)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the table of commands into a help text."""
+        with formatter.section("Commands"):
+            formatter.write_dl([*COMMANDS.items()])
+
+
+class Command(TyperCommand):
+    """A command whose help names arguments as the texts do, and ends in lines to copy."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Arguments and options."""
+        hints = get_type_hints(self.callback) if self.callback else {}
+        found = super().get_params(ctx)
+        return [convert_as_needed(p, hints.get(str(p.name)) in TEXTS) for p in found]
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """The line of usage behind the name."""
+        return ["[OPTIONS]", *(argument_shown(p) for p in arguments(self))]
+
+    def format_help_text(self, ctx: Any, formatter: Any) -> None:
+        """Write what the command does."""
+        formatter.write_paragraph()
+        with formatter.indentation():
+            formatter.write_text(prose_and_examples(self.help or "")[0])
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments and options, one below the other."""
+        positional = [(argument_shown(p), p.help or "") for p in arguments(self)]
+        if positional:
+            with formatter.section("Arguments"):
+                formatter.write_dl(positional)
+        named = [p.get_help_record(ctx) for p in self.get_params(ctx) if is_option(p)]
+        with formatter.section("Options"):
+            formatter.write_dl([record for record in named if record is not None])
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Write the examples."""
+        with formatter.section("Examples"):
+            for line in prose_and_examples(self.help or "")[1]:
+                formatter.write(f"{continued(line, formatter.current_indent)}\n")
+
+
+def is_option(parameter: Any) -> bool:
+    """True if a parameter of a command has a name on the line."""
+    return parameter.opts[0].startswith("-")
+
+
+def arguments(command: Any) -> list[Any]:
+    """The parameters of a command that have a place on the line."""
+    return [p for p in command.params if not is_option(p)]
+
+
+def argument_shown(parameter: Any) -> str:
+    """An argument as a line of usage has it: SCENE, or [NAME] where it may be left out."""
+    name = (parameter.metavar or parameter.name.upper()) + "..." * (parameter.nargs == -1)
+    return name if parameter.required else f"[{name}]"
+
+
+def prose_and_examples(text: str) -> tuple[str, list[str]]:
+    """The prose of a command's docstring, and the lines of its examples."""
+    paragraphs = cleandoc(text).split("\n\n")
+    examples = [" ".join(p.split())[len(EXAMPLE) :] for p in paragraphs if p.startswith(EXAMPLE)]
+    return "\n\n".join(p for p in paragraphs if not p.startswith(EXAMPLE)), examples
+
+
+def continued(line: str, indent: int) -> str:
+    """A line for a shell; a long one goes on with an option, behind a backslash."""
+    start, *rest = line.split(" --")
+    rows = [" " * indent + start]
+    for option in rest:
+        if len(rows[-1]) + len(option) + len(" -- \\") > WIDTH:
+            rows[-1] += " \\"
+            rows.append(" " * (indent + 3))
+        rows[-1] += f" --{option}"
+    return "\n".join(rows)
+
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 
@@ -157,6 +328,6 @@ def _parameter_shown(parameter: Any) -> str:
 
 
 def _value_given(error: Any) -> str:
-    """What was given, from the sentence or from the error behind it."""
+    """The given value, from the sentence or from the error behind it."""
     told = search(r"^'(.*)' is not", error.message)
     return told[1] if told else str(error.__cause__.errors()[0]["input"])

@@ -236,7 +236,7 @@ def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
 def to_dict(
     law: str, generated: Generated, verification: Verification, measured: Sequence[Measured]
 ) -> dict[str, Any]:
-    """What `--json` holds."""
+    """Content of `--json`."""
     return {
         "law": law,
         "files": [str(path) for path in generated.files],
@@ -275,12 +275,12 @@ def show_verification(verification: Verification) -> None:
 
 
 def compared(check: Check) -> str:
-    """How the C compares with CasADi, in words."""
+    """The comparison of the C with CasADi, in words."""
     return "differs" if check.ulp is None and not check.near else bits(check.ulp)
 
 
 def bits(ulp: int | None) -> str:
-    """How near the C in double is to CasADi, in words."""
+    """The distance of the C in double from CasADi, in words."""
     if ulp is None:
         return "within rounding"
     return "bit for bit equal" if ulp == 0 else f"{ulp} ulp apart"

@@ -61,12 +61,12 @@ class Chosen:
 
     @property
     def turning(self) -> bool:
-        """Whether it was fitted to an axis that turns."""
+        """True if it was fitted to an axis that turns."""
         return self.drive is not None and self.drive.turning
 
 
 def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
-    """What C is made of.
+    """The kind of subject that C is made of.
 
     Raises:
         ValueError: a compensator of a scene or of inverse dynamics.
@@ -86,7 +86,7 @@ def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> s
 
 
 def check_applicable(subject: str, given: list[str]) -> None:
-    """Refuse options that say nothing to what is asked for, all at once."""
+    """Refuse options that do not apply to the subject, all at once."""
     problems: list[str] = []
     for option in given:
         fits = [s for s in APPLIES[option] if s != FUNCTION]

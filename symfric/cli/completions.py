@@ -1,4 +1,4 @@
-"""What the shell may complete: names of laws, scenes, figures, problems, and of what `--set` takes.
+"""Completions of the shell: names of laws, scenes, figures, problems, parameters of `--set`.
 
 Nothing is said and nothing raised here: a completion that cannot be found is none.
 """
@@ -29,7 +29,7 @@ def each_law(incomplete: str) -> list[str]:
 
 
 def needs(incomplete: str) -> list[str]:
-    """What a law shall show, in a list with commas."""
+    """Words of `--need`, in a list with commas."""
     from symfric.choice import NEEDS  # noqa: PLC0415  (of one command only)
 
     start, comma, last = incomplete.rpartition(",")
@@ -86,7 +86,7 @@ def plates(incomplete: str) -> list[str]:
 
 def problems(incomplete: str) -> list[str]:
     """Ready problems of optimal control."""
-    from ocp.problems.catalogue import READY  # noqa: PLC0415  (of this command only)
+    from ocp.problems import READY  # noqa: PLC0415  (of this command only)
 
     return _of(READY, incomplete)
 

@@ -139,7 +139,7 @@ def from_file(
 
 
 def to_dict(unit: Exported) -> dict[str, Any]:
-    """What `--json` holds."""
+    """Content of `--json`."""
     return {
         "file": str(unit.path),
         "size": unit.size,

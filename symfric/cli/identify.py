@@ -55,7 +55,7 @@ RULES = {"log": log, "linear": linear}
 @final
 @dataclass(frozen=True)
 class Reading:
-    """How files are read, see `Dataset.read`; `resample`: as equal intervals, cut at gaps."""
+    """Options of `Dataset.read`; `resample`: to equal intervals, cut at gaps."""
 
     columns: dict[str, str] | list[str] | None
     units: dict[str, str] | str | None
@@ -116,7 +116,7 @@ def _units(texts: Sequence[str] | None) -> dict[str, str] | str | None:
 def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
     """The kind of residuals; `windows` [s] or "choose" of simulated motions.
 
-    Of points an `offset` among `free` is taken out of it: a constant force beside friction.
+    Of points an `offset` among `free` is taken out of it: a constant force besides friction.
     """
     check_names("--kind", [name], KINDS)
     if windows is not None and name != "shooting":
@@ -284,11 +284,11 @@ def identify(
 @final
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What there is to show.
+    """Results to show.
 
     Attributes:
         fit: with its errors on other data.
-        profiles: that were asked for.
+        profiles: the requested ones.
         ranking: of several laws, whose best one the fit is.
         failed: why other data or profiles could not be had.
     """
@@ -299,7 +299,7 @@ class Found:
     failed: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """What `--json` holds: the fit, which `Fitted.from_json` reads, and more."""
+        """Content of `--json`: the fit, which `Fitted.from_json` reads, and more."""
         more: dict[str, Any] = {}
         if self.profiles:
             more["profiles"] = [p.to_dict() for p in self.profiles]

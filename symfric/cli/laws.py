@@ -18,7 +18,7 @@ from symfric.cli.options import (
     option,
 )
 from symfric.figures import FIGURES, FigureData, compare
-from symfric.figures.magnitudes import NORMAL_FORCE, parts, phenomena
+from symfric.figures.data import NORMAL_FORCE, parts, phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
@@ -119,7 +119,7 @@ def show_figure(data: FigureData) -> None:
 
 
 def to_dict(law: AnyLaw) -> dict[str, Any]:
-    """What `--json` holds of one law."""
+    """Content of `--json` for one law."""
     return {
         "title": title(law),
         "phenomena": {code: PHENOMENA[code] for code in phenomena(law)},
@@ -150,7 +150,7 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
 
 
 def costs(law: AnyLaw) -> str:
-    """What the instructions of `law` compute."""
+    """The quantities that the instructions of `law` compute."""
     return "a step of one contact" if isinstance(law, Population) else "force and rate"
 
 

@@ -54,7 +54,7 @@ LawOfOption = Annotated[
 def kind_of(
     scene: str, where: str = "scene", preset: str | None = None, law_of: Sequence[str] | None = None
 ) -> Callable[[Law], Scene]:
-    """What makes the scene of a law: a scene by its name, or the robot of a URDF file.
+    """A function law -> scene: a scene by its name, or the robot of a URDF file.
 
     Args:
         scene: its name, or FILE.urdf.
@@ -136,7 +136,7 @@ def formed(machine: Scene, settings: Mapping[str, str | float]) -> Scene:
 
 
 def forms(machine: Scene) -> list[str]:
-    """What --set takes of a scene besides numbers."""
+    """Names that --set takes of a scene besides numbers."""
     return [*options(machine.law), *options(machine), *machine.structures()]
 
 
@@ -145,7 +145,7 @@ def _number(name: str, given: str | float) -> float:
 
 
 def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool | int:
-    """What a text means for a field that holds a value of the kind of `like`."""
+    """The value that a text means for a field that holds a value like `like`."""
     if isinstance(like, str):
         return str(text)
     if isinstance(like, bool):
@@ -157,7 +157,7 @@ def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool 
 @final
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """What drives a scene, from where it starts, and until when it runs.
+    """Inputs, start values and end of a scene's run.
 
     Attributes:
         signals: inputs by name.
@@ -179,14 +179,14 @@ def driven(
     x0: Sequence[str] | None,
     t_end: float | None,
 ) -> Driven:
-    """What texts of --input, --x0 and --t-end mean for a scene.
+    """The meaning of texts of --input, --x0 and --t-end for a scene.
 
     An input that is not given is that of the scene. The last time is that of the samples, or the
     one that shows the scene. Samples of a state whose rate is an input (`Scene.integrals`) are that
     input, and say where the state starts.
 
     Raises:
-        ValueError: unknown names, an input beside its integral, or what `input_from_text` refuses.
+        ValueError: unknown names, an input and its integral, or what `input_from_text` refuses.
     """
     given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
     ways = {state: rate for state, rate in scene.integrals.items() if rate in units}

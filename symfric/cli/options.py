@@ -181,7 +181,7 @@ def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> Non
 def held_by_file(
     command: str, text: str, default: str, values: dict[str, float], wanted: str, kind: Any
 ) -> Any:
-    """What FILE.py[:NAME] holds, or what the function of that name makes of the numbers of --set.
+    """The object in FILE.py[:NAME], or the result of that function with the numbers of --set.
 
     Args:
         command: who asks.
@@ -207,7 +207,7 @@ def held_by_file(
 
 
 def function_of_file(command: str, text: str, default: str, values: dict[str, float]) -> Any:
-    """What FILE.py[:NAME] holds and can be called, with the numbers of --set as its keywords.
+    """The callable in FILE.py[:NAME], with the numbers of --set as its keywords.
 
     Raises:
         ValueError: no such file or name, a file that fails, numbers that do not fit.
@@ -260,7 +260,7 @@ def _named(
 
 
 def _meant(value: object, held: Mapping[str, Any], fits: Callable[[Any], bool]) -> bool:
-    """Whether a name may be offered: what fits, and public functions of the file itself."""
+    """True if a name may be offered: objects that fit, and public functions of the file itself."""
     if isfunction(value) or isclass(value):
         return value.__module__ == held["__name__"] and value.__name__[0] != "_"
     return fits(value)
@@ -286,6 +286,6 @@ def _failed(command: str, file: Path, error: Exception) -> ValueError:
 
 
 def called_with(text: str, make: Any, values: dict[str, float]) -> Any:
-    """What a function makes of the numbers of --set."""
+    """The result of a function with the numbers of --set."""
     check_names(f"--set of {text}", values, list(signature(make).parameters))
     return make(**values)

@@ -1,4 +1,4 @@
-"""What the commands print: tables and notes for people, JSON for programs."""
+"""Output of the commands: tables and notes for people, JSON for programs."""
 
 import json
 import math

@@ -36,7 +36,6 @@ from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
-from symfric.results.report import report as write_report
 from symfric.scenes import MECHANISMS, Scene
 
 
@@ -183,7 +182,7 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
 
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
-    """What `--json` holds."""
+    """Content of `--json`."""
     books: dict[str, Any] = {}
     if is_mechanism(trajectory.model):
         books["energy_balance"] = trajectory.energy_balance().to_dict()
@@ -292,6 +291,8 @@ def report(
 
     Example: symfric report rabinowicz --law lugre --law brown_mcphee --html report.html
     """
+    from symfric.results.report import report as write_report  # noqa: PLC0415  (not for `run`)
+
     check_outputs(html)
     laws = law_names(law)
     machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)

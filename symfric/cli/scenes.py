@@ -124,7 +124,7 @@ def title(machine: Scene) -> str:
 
 
 def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[str, Any]:
-    """What `--json` holds of one scene; parameters and states of laws only with a law."""
+    """Content of `--json` for one scene; parameters and states of laws only with a law."""
     whole = type(machine)(Viscous(), **_without_laws(machine)).model() if law is None else model
     own = {item.name for item in fields(machine)}
     known = {n: p for n, p in parameters(machine).items() if law is not None or n in own}
@@ -178,7 +178,7 @@ def _parameter(p: Parameter) -> dict[str, Any]:
 
 
 def _forms(machine: Scene) -> dict[str, dict[str, str]]:
-    """What `--set` takes besides numbers, of the scene itself."""
+    """Names that `--set` takes besides numbers, of the scene itself."""
     named = {
         o.name: {"value": o.value, "choices": ", ".join(o.choices), "doc": o.doc}
         for o in options(machine).values()

@@ -37,7 +37,7 @@ from symfric.cli.options import (
     option,
     with_settings,
 )
-from symfric.figures.magnitudes import phenomena
+from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import ALL_LAWS
@@ -306,7 +306,7 @@ def fitted(
 
 
 def _paper(scene: str, json: str | None, others: bool) -> None:
-    """Print the paper's tables beside ours.
+    """Print the paper's tables and ours.
 
     Raises:
         ValueError: a scene that is not in the paper, options that change it.

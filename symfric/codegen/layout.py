@@ -18,8 +18,6 @@ from string import Template
 from textwrap import wrap
 from typing import final
 
-import numpy as np
-
 from symfric.codegen.blocks.block import GROUPS, Block
 from symfric.emitter.arrays import Arrays
 from symfric.emitter.c99 import Real
@@ -172,8 +170,7 @@ def folded(line: str, margin: str) -> str:
 
 def number(value: float, real: Real) -> str:
     """`value` rounded to the type as C: a literal, or a macro of math.h for what is not finite."""
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = float(np.float32(value)) if real.size == 4 else value
+    rounded = float(real.rounded(value))
     if math.isnan(rounded):
         return "NAN"
     if math.isinf(rounded):

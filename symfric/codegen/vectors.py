@@ -149,24 +149,18 @@ def _signal(variable: Variable, random: np.random.Generator) -> Array:
 
 def _run(block: Block, real: Real) -> Steps:
     """The steps of a run, as far as it is finite."""
-    inputs, count = rounded(excitation(block), real), len(block.states)
+    inputs, count = real.rounded(excitation(block)), len(block.states)
     after = run_vm(block, real, inputs, guards=False)
     start = np.array([[float(v.start) for v in block.states]])
-    states = rounded(np.vstack([start, after[:-1, :count]]), real)
+    states = real.rounded(np.vstack([start, after[:-1, :count]]))
     broken = ~(np.isfinite(after).all(axis=1) & np.isfinite(states).all(axis=1))
     end = int(np.argmax(broken)) if broken.any() else len(inputs)
     none = np.full(end, -1, np.int64)
     return Steps(states[:end], inputs[:end], none, np.zeros(end))
 
 
-def rounded(values: object, real: Real) -> Array:
-    """Numbers rounded to a floating point type."""
-    with np.errstate(over="ignore", under="ignore"):
-        return np.asarray(values, float).astype(f"f{real.size}").astype(float)
-
-
 def _defaults(block: Block, real: Real) -> Array:
-    return rounded([float(v.start) for v in block.parameters], real)
+    return real.rounded([float(v.start) for v in block.parameters])
 
 
 def _parameters(block: Block, real: Real, steps: Steps) -> Array:
@@ -252,7 +246,7 @@ def _changing(
     block: Block, real: Real, steps: Steps, before: Array, i: int, tolerance: Array
 ) -> Steps:
     """The rows in which changing parameter `i` changes most, relative to the tolerance."""
-    value = float(rounded(changed_value(block.parameters[i]), real))
+    value = float(real.rounded(changed_value(block.parameters[i])))
     changed = np.full(len(steps), i, np.int64)
     new = Steps(steps.states, steps.inputs, changed, np.full(len(steps), value))
     after, _ = made(block, real, new, guards=False)

@@ -12,14 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.compared import TOLERANCE, Run, terms, ulp
-from symfric.codegen.compiler import compile_object, link_program, needed_symbols
-from symfric.codegen.excitation import excitation, spoiled, varied
+from symfric.codegen.compared import TOLERANCE, Run, excitation, spoiled, terms, ulp, varied
 from symfric.codegen.generated import Generated
 from symfric.codegen.guards import HUGE, Status
 from symfric.codegen.layout import prefix
 from symfric.codegen.routines import routines
-from symfric.codegen.runner import program, run_c, run_vm, signals
+from symfric.codegen.runner import (
+    compile_object,
+    link_program,
+    needed_symbols,
+    program,
+    run_c,
+    run_vm,
+    signals,
+)
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation.checks import kind
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler, missing_compiler

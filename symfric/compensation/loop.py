@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
-from symfric.codegen.compiler import FLAGS
 from symfric.codegen.layout import TEMPLATES, called, filled, prefix
+from symfric.codegen.runner import FLAGS
 from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS, Real
@@ -55,7 +55,7 @@ class Members:
             CompileError: the compiler refuses the C, or what it made does not load here.
         """
         self.block, count = block, len(values)
-        kind: Any = np.float32 if real == "float" else np.float64
+        kind = REALS[real].kind
         self.state = np.tile(np.array([v.start for v in block.states], kind), (count, 1))
         self.param = np.tile(np.array([v.start for v in block.parameters], kind), (count, 1))
         self.input = np.zeros((count, len(block.inputs)), kind)

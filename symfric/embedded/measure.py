@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.compiler import link_program
 from symfric.codegen.generated import Generated
 from symfric.codegen.layout import filled, prefix
-from symfric.codegen.runner import program, run_c, run_vm
-from symfric.embedded.subjects import BY, by_casadi, own
+from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.embedded.target import (
+    BY,
     CORES,
     SOURCES,
     Absent,
@@ -25,7 +24,9 @@ from symfric.embedded.target import (
     Target,
     Tools,
     built,
+    by_casadi,
     find_tools,
+    own,
     said,
 )
 from symfric.emitter.c99 import REALS

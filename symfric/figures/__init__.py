@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from symfric.figures.catalogue import figure as figure
     from symfric.figures.data import Curve as Curve
     from symfric.figures.data import FigureData as FigureData
-    from symfric.figures.magnitudes import Scales as Scales
-    from symfric.figures.magnitudes import phenomena as phenomena
-    from symfric.figures.magnitudes import scales as scales
+    from symfric.figures.data import Scales as Scales
+    from symfric.figures.data import phenomena as phenomena
+    from symfric.figures.data import scales as scales
     from symfric.figures.pushing import break_away as break_away
     from symfric.figures.pushing import drift as drift
     from symfric.figures.pushing import push as push
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from symfric.figures.sliding import dwell as dwell
     from symfric.figures.sliding import hysteresis as hysteresis
     from symfric.figures.sliding import lag as lag
+    from symfric.figures.sliding import profile as profile
+    from symfric.figures.sliding import steady_state as steady_state
+    from symfric.figures.sliding import sweep_b as sweep_b
+    from symfric.figures.sliding import sweep_c as sweep_c
+    from symfric.figures.sliding import sweep_e as sweep_e
     from symfric.figures.sliding import transition as transition
     from symfric.figures.sliding import velocity_step as velocity_step
-    from symfric.figures.steady import profile as profile
-    from symfric.figures.steady import steady_state as steady_state
-    from symfric.figures.steady import sweep_b as sweep_b
-    from symfric.figures.steady import sweep_c as sweep_c
-    from symfric.figures.steady import sweep_e as sweep_e
 
 hand_out(__name__)

@@ -4,11 +4,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
-from symfric.figures.data import Curve, FigureData
-from symfric.figures.magnitudes import NORMAL_FORCE, Scales, check_any, scales
+from symfric.figures.data import NORMAL_FORCE, Curve, FigureData, Scales, check_any, scales
 from symfric.figures.pushing import break_away, drift, stiction
-from symfric.figures.sliding import dwell, hysteresis, lag, transition, velocity_step
-from symfric.figures.steady import profile, steady_state, sweep_b, sweep_c, sweep_e
+from symfric.figures.sliding import (
+    dwell,
+    hysteresis,
+    lag,
+    profile,
+    steady_state,
+    sweep_b,
+    sweep_c,
+    sweep_e,
+    transition,
+    velocity_step,
+)
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, distinct
 from symfric.foundation.status import SolveError

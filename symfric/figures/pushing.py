@@ -6,8 +6,17 @@ from math import cbrt, isfinite, sqrt
 import casadi as ca
 import numpy as np
 
-from symfric.figures.data import Array, Curve, FigureData
-from symfric.figures.magnitudes import MASS, NORMAL_FORCE, Scales, check_any, require, scales
+from symfric.figures.data import (
+    MASS,
+    NORMAL_FORCE,
+    Array,
+    Curve,
+    FigureData,
+    Scales,
+    check_any,
+    require,
+    scales,
+)
 from symfric.figures.motion import fine, pushed
 from symfric.foundation import checks
 from symfric.integrator import Linear

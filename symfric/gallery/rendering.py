@@ -15,7 +15,7 @@ from symfric.foundation.files import write_text
 from symfric.foundation.panels import save
 from symfric.gallery.pages import index_page
 from symfric.gallery.plate import chosen, script, scripts
-from symfric.stress.workers import Crashed, TimedOut, WorkerPool
+from symfric.stress.campaign import Crashed, TimedOut, WorkerPool
 
 LIMIT = 600.0
 """Seconds that the figures of one process may take before they count as hanging."""

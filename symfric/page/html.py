@@ -1,9 +1,10 @@
-"""Pieces of one self-contained page: everything that comes from a user is escaped here."""
+"""Pieces of one self-contained page, and its style sheet; text of a user is escaped here."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 
-from symfric.page.style import STYLE
+from symfric.foundation.style import COLOURS, dash
 
 
 def page(title: str, language: str, body: str) -> str:
@@ -145,3 +146,26 @@ def _shade(value: float | None) -> str:
     share = round(60 * abs(value))
     mixed = f"color-mix(in srgb, var(--{colour}) {share}%, transparent)"
     return f'<td style="background:{mixed}">{value:+.2f}</td>'
+
+
+def _lighter(colour: str) -> str:
+    """Half way to white, to be seen on dark paper."""
+    return "#" + "".join(f"{(int(colour[k : k + 2], 16) + 255) // 2:02x}" for k in (1, 3, 5))
+
+
+def _dashes(k: int) -> str:
+    pattern = dash(k)
+    return "none" if isinstance(pattern, str) else " ".join(f"{1.2 * x:.3g}" for x in pattern[1])
+
+
+def _runs(colours: Sequence[str]) -> str:
+    """Classes run0, run1, ...: the colours and dashes that pictures give to simulations."""
+    return "\n".join(
+        f"svg .run{k} {{ stroke: {colour}; stroke-dasharray: {_dashes(k)}; }}"
+        for k, colour in enumerate(colours)
+    )
+
+
+STYLE = f"""{Path(__file__).with_name("page.css").read_text("utf-8")}{_runs(COLOURS)}
+@media screen and (prefers-color-scheme: dark) {{ {_runs([_lighter(c) for c in COLOURS])} }}
+"""

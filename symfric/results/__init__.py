@@ -1,1 +1,1 @@
-"""What a simulation gives back: signals over time that draw, film, balance and save themselves."""
+"""Results of simulations: signals over time that draw, film, balance and save themselves."""

@@ -14,8 +14,7 @@ from symfric.foundation.files import write_table
 from symfric.foundation.shown import Showing, Shown, Table, among, counted, valued
 from symfric.foundation.status import Status
 from symfric.foundation.typed import agree
-from symfric.results.stored import Format
-from symfric.results.tables import module
+from symfric.results.stored import Format, module
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 PLACES = ("end", "least", "greatest")
 MOST = 5_000_000
-"""Numbers that are read without being asked for; of a file every page, for its last column."""
+"""Numbers that are read without a request; of a file every page, for its last column."""
 
 
 @final
@@ -89,12 +88,12 @@ class Ensemble(Showing):
 
     def thumbnail(self) -> "Figure | None":
         """The first signal of the first members over time, small; None for ends alone."""
-        from symfric.results.ensemble_pictures import thumbnail  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.pictures import thumbnail_of_many  # noqa: PLC0415  (matplotlib is slow to import)
 
         if self.t.ndim > 1 or self.t.size < 2:
             return None
         name, values = next(iter(self.signals.items()))
-        return thumbnail(self.t, values, f"{name} [{self.units[name]}]")
+        return thumbnail_of_many(self.t, values, f"{name} [{self.units[name]}]")
 
     def __getitem__(self, name: str) -> Array:
         if name in self.varied:
@@ -156,7 +155,7 @@ class Ensemble(Showing):
         Raises:
             ValueError: unknown names.
         """
-        from symfric.results import ensemble_pictures as pictures  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results import pictures  # noqa: PLC0415  (matplotlib is slow to import)
 
         if not over:
             return pictures.plot_many(self.scene, self.t, self.signals, self.units, names, path)
@@ -173,7 +172,7 @@ class Ensemble(Showing):
     def _at(
         self, where: str, names: Sequence[str], at: float | str
     ) -> tuple[str, dict[str, Array]]:
-        """What the place `at` is called, and name -> values there, shape (members,)."""
+        """The name of the place `at`, and name -> values there, shape (members,)."""
         if isinstance(at, str):
             checks.choice(where, at, PLACES)
             if at == "end":
@@ -293,7 +292,7 @@ def load_ensemble(path: str | Path) -> Ensemble:
 
 
 def _shown(runs: Ensemble) -> Shown:
-    """How many members, how they ended, and least, middle and greatest value at the last time."""
+    """Number of members, their ends, and least, middle and greatest value at the last time."""
     members, times = runs.attempts.size, runs.t.shape[-1]
     first, last = np.min(runs.t), np.max(runs.t)
     span = f"{counted(times, 'time')} from {first:g} to {last:g} s" if times > 1 else f"{last:g} s"

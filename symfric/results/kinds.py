@@ -1,4 +1,4 @@
-"""What the signals of a run are, so that tables and pictures put like to like."""
+"""Kinds of the signals of a run, by which tables and pictures group them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SPEEDS = {"m/s", "rad/s"}
 
 
 def is_mechanism(model: Model) -> bool:
-    """Whether the model is one of bodies and joints."""
+    """True if the model is one of bodies and joints."""
     return model.holonomic is not None
 
 
@@ -51,7 +51,7 @@ class Group:
 
 
 def main(model: Model, units: dict[str, str]) -> list[Group]:
-    """What a run is about: positions, friction, and energy or, without books of it, power.
+    """The main signals of a run: positions, friction, and energy or, without a balance, power.
 
     Speeds instead of positions where no state is a position, as in a clutch. Empty where the model
     has neither positions nor friction.

@@ -19,9 +19,8 @@ from symfric.foundation.parameters import Parameter, parameters
 from symfric.foundation.style import COLOURS
 from symfric.model import Contact
 from symfric.page import html
-from symfric.page.scale import around
 from symfric.page.svg import Path as Line
-from symfric.page.svg import chart
+from symfric.page.svg import around, chart
 from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory
 
@@ -89,7 +88,7 @@ def report(
 
 
 def _verdict(runs: Mapping[str, Trajectory]) -> str:
-    """How the runs ended."""
+    """The ends of the runs."""
     ended = all(run.status.ok for run in runs.values())
     good = ended and not any(run.doubts for run in runs.values())
     said = [f"{name}: {run.message}" for name, run in runs.items()]

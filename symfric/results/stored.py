@@ -1,11 +1,12 @@
-"""Objects in files: one file each, whole or not at all, and back to the bit.
+"""Objects in files: one file each, whole or not at all, and back to the bit; packages for tables.
 
-What a file is, which format, and what it cannot be is said here once for runs, ensembles, fits and
-optimal motions; how objects become arrays is `symfric.foundation.packed`.
+What a file is, which format, and what it cannot be is stated here once for runs, ensembles, fits
+and optimal motions; how objects become arrays is `symfric.foundation.packed`.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from importlib import import_module
 from os import PathLike
 from typing import Any, Generic, TypeVar, final
 
@@ -65,3 +66,18 @@ class Format(Generic[T]):
         except ValueError as error:
             raise ValueError(f"{where}: {error}") from None
         return checks.kind(where, found, self.content, self.what)
+
+
+def module(where: str, name: str) -> Any:
+    """A package that may be missing.
+
+    Raises:
+        ImportError: it is, and what to do.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ImportError(
+            f"{where}: expected the package {name}, got none; install it by 'pip install {name}', "
+            "or take to_csv, which needs nothing"
+        ) from None

@@ -61,7 +61,7 @@ class Stroke:
 @final
 @dataclass(frozen=True, eq=False)
 class View:
-    """How a motion is looked at.
+    """The direction from which a motion is seen.
 
     Attributes:
         low, high: what the picture must show [m], shape (3,).

@@ -1,4 +1,4 @@
-"""How a case is judged: against a referee that shares no code with symfric, or by other methods.
+"""Verdicts on cases, by a referee that shares no code with symfric, or by other methods.
 
     tolerance of a state = rtol max|x| + atol,   error = max over states and times of
                                                          |run - truth| / tolerance
@@ -22,22 +22,27 @@ import numpy as np
 from symfric.foundation.status import SolveError, Status
 from symfric.results.trajectory import Trajectory
 from symfric.stress.cases import Case
-from symfric.stress.measures import (
+from symfric.stress.problem import (
     RIGHT,
+    TIMES,
+    WORK,
+    Answer,
+    Problem,
+    States,
     amplification,
+    answered,
     apart,
     at_steps,
     attempt,
     distance,
     of,
     other_method,
+    problem,
     table,
     third_method,
     tolerances,
     worst_step,
 )
-from symfric.stress.problem import TIMES, WORK, Problem, problem
-from symfric.stress.refereed import Answer, States, answered
 
 CLASSES = {
     "right": "as the reference, within ten tolerances",
@@ -73,7 +78,7 @@ RAW = ("Traceback", ".cpp:", "casadi::", "Assertion")
 @final
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a case.
+    """The verdict on a case.
 
     Attributes:
         kind: one of `CLASSES`.
@@ -97,7 +102,7 @@ class Verdict:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Verdict":
-        """What `to_dict` wrote."""
+        """Restore the output of `to_dict`."""
         return cls(**data)
 
 
@@ -132,7 +137,7 @@ def _refused(group: str, sentence: str, steps: int = 0) -> Verdict:
 
 
 def _failed(ready: Problem, error: SolveError) -> Verdict:
-    """A solve that says it failed; whether another method goes through is told beside it."""
+    """A solve that says it failed; the group says whether another method goes through."""
     if error.status is Status.MAX_STEPS:
         return _stopped(ready, error)
     steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine import bench_pages, items, lists
-from docs.machine.api_pages import pages as api_pages
-from docs.machine.api_pages import place
+from docs.machine import items, lists, measure
 from docs.machine.generated import stale, write
+from docs.machine.lists import place
+from docs.machine.lists import reference_pages as api_pages
 from docs.machine.names import catalogue, known, linked
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
-from symfric.cli.commands import COMMANDS, prose_and_examples
+from symfric.cli.app import COMMANDS, prose_and_examples
 from symfric.scenes import ALL_SCENES
 
 
@@ -65,23 +65,23 @@ def test_every_example_has_its_docstring_and_code() -> None:
 
 
 def test_stored_measurements_say_by_what_where_and_when() -> None:
-    stored = bench_pages.stored()
+    stored = measure.stored()
     assert {"integrator", "ivp", "ensemble", "multibody", "ocp", "interop"} <= {*stored}
     for name, found in stored.items():
         measured = {"tables"} <= {*found}
-        keys = {*bench_pages.KEYS} if measured else {"title", "about"}
+        keys = {*measure.KEYS} if measured else {"title", "about"}
         assert {*found} - {"short"} == keys and (measured or "short" in found), name
-        short = found.get("short", dict.fromkeys(bench_pages.SHORT, "-") | {"tables": []})
-        assert {*short} == {*bench_pages.SHORT} and all(short[k] or k == "tables" for k in short)
+        short = found.get("short", dict.fromkeys(measure.SHORT, "-") | {"tables": []})
+        assert {*short} == {*measure.SHORT} and all(short[k] or k == "tables" for k in short)
         for table in [*found.get("tables", ()), *short["tables"]]:
             assert all(len(row) == len(table["columns"]) for row in table["rows"]), name
-    assert "symfric bench ivp" in bench_pages.page()
+    assert "symfric bench ivp" in measure.page()
 
 
 def test_tools_stand_side_by_side_as_they_were_measured() -> None:
-    shown = bench_pages.tables()
-    measured = {one["columns"][0]: one for one in bench_pages.stored()["interop"]["tables"]}
-    moves = bench_pages.rows(measured["tool"])
+    shown = measure.tables()
+    measured = {one["columns"][0]: one for one in measure.stored()["interop"]["tables"]}
+    moves = measure.rows(measured["tool"])
     for line in moves:
         if not line[""]:
             miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")

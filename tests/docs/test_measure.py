@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine import bench_pages, measure
+from docs.machine import measure
 from symfric.bench.interop import InteropBenchmark, Move, Run
 
 
@@ -16,20 +16,20 @@ def test_a_measurement_is_stored_with_machine_load_and_commit(
     run = Run("cvodes", "lugre", 2e-5, 1.5)
     monkeypatch.setattr(measure, "STORED", tmp_path)
     result = InteropBenchmark((move,), (run,), ("rockit",))
-    monkeypatch.setattr(measure.bench, "bench_interop", lambda quick: result)
+    monkeypatch.setattr("symfric.bench.bench_interop", lambda quick: result)
     monkeypatch.setattr(measure, "commit", lambda: "abc")
     path = tmp_path / "interop.json"
-    short = dict.fromkeys(bench_pages.SHORT, "-") | {"tables": []}
+    short = dict.fromkeys(measure.SHORT, "-") | {"tables": []}
     path.write_text(json.dumps({"title": "T", "about": "A.", "short": short}), "utf-8")
     assert measure.main(["--quick", "interop"]) == 0
     found = json.loads(path.read_text("utf-8"))
-    assert {*found} == {*bench_pages.KEYS, "short"}
+    assert {*found} == {*measure.KEYS, "short"}
     assert (found["title"], found["about"], found["short"]) == ("T", "A.", short)
     assert found["command"] == "symfric bench interop --quick"
     assert all(float(load) >= 0 for load in found["load"].split(" to "))
     assert found["tables"][0]["rows"][0][:3] == ["opti", "flow", "lugre"]
     assert found["tables"][1]["rows"][0][:2] == ["cvodes", "lugre"]
-    page = bench_pages.section("interop", found)
+    page = measure.section("interop", found)
     assert "load " in page and "Condensed by hand" in page
     capsys.readouterr()
 

@@ -42,10 +42,8 @@ def test_what_was_made_with_another_key_is_stale(
 @pytest.mark.parametrize(
     ("changed", "papers"),
     [
-        ("symfric/gallery/belt.py", None),
-        ("symfric/gallery/drawing.py", None),
+        ("symfric/gallery/shared.py", None),
         ("symfric/gallery/rendering.py", None),
-        ("symfric/gallery/signals.py", None),
         ("symfric/gallery/plate.py", None),
         ("symfric/gallery/self_tuning/machines.py", "self_tuning"),
         ("symfric/gallery/self_tuning/__init__.py", "self_tuning"),

@@ -20,7 +20,7 @@ BESIDE = (
         "if not (isinstance(value, ModuleType) and name in self._places):", "if True:", T_FRONTS,
     ),
     Mutant(
-        "the table of commands loads them", "symfric/cli/commands.py",
+        "the table of commands loads them", "symfric/cli/app.py",
         "formatter.write_dl([*COMMANDS.items()])",
         "formatter.write_dl([(n, self.get_command(ctx, n).help) for n in COMMANDS])", T_FRONTS,
     ),

@@ -23,7 +23,7 @@ CHOSEN = (
         "else (exact, law)", "else (law,)", TESTS,
     ),
     Mutant(
-        "every fixed step holds", f"{FOLDER}/fixed_step.py",
+        "every fixed step holds", f"{FOLDER}/measured.py",
         "if not (off <= share).all():", "if (off > 1e9).all():", TESTS,
     ),
     Mutant(

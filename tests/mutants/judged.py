@@ -112,11 +112,11 @@ JUDGED = (
         '"damping": -0.5', '"damping": -1.0', T_JUDGED,
     ),
     Mutant(
-        "the first larger step is the largest", CHOICE + "fixed_step.py",
+        "the first larger step is the largest", CHOICE + "measured.py",
         "for factor in (5.0, 2.0):", "for factor in (2.0, 5.0):", T_STEPS,
     ),
     Mutant(
-        "inputs of a step are those at its start", CHOICE + "fixed_step.py",
+        "inputs of a step are those at its start", CHOICE + "measured.py",
         "np.multiply(k + 0.5, h", "np.multiply(k, h", T_STEPS,
     ),
     Mutant(

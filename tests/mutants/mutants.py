@@ -180,7 +180,7 @@ TRANSCRIPTION = (
         T_SOLVE,
     ),
     Mutant(
-        "what is asked for on the way is asked for at the start", "ocp/transcription/grid.py",
+        "what is asked for on the way is asked for at the start", "ocp/transcription/schemes.py",
         "bound[own.nodes[:, node]] = of(states, span.nodes[fraction])",
         "bound[own.nodes[:, node]] = of(states, span.nodes[0.0])", T_SOLVE,
     ),

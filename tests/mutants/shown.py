@@ -2,7 +2,7 @@
 
 from mutants.mutant import Mutant
 
-BELT = "symfric/gallery/belt.py"
+BELT = "symfric/gallery/shared.py"
 MACHINES = "symfric/gallery/self_tuning/machines.py"
 ORACLE = "symfric/gallery/self_tuning/machines.py"
 PLATE = "symfric/gallery/plate.py"
@@ -135,7 +135,7 @@ SHOWN = (
     ),
     Mutant(
         "a gallery with failures ends well",
-        "symfric/cli/gallery.py",
+        "symfric/cli/campaigns.py",
         "    if done.failures:\n        raise typer.Exit(1)",
         "    pass",
         T_COMMAND,

@@ -109,7 +109,7 @@ TOLD = (
         "groups.setdefault(scripts()[name], [])", "groups.setdefault(name, [])", T_RENDERING,
     ),
     Mutant(
-        "an interrupted gallery ends as one with failures", CLI + "gallery.py",
+        "an interrupted gallery ends as one with failures", CLI + "campaigns.py",
         "INTERRUPTED = 130", "INTERRUPTED = 1", T_COMMAND,
     ),
     Mutant(

@@ -21,7 +21,7 @@ T_STORED = tuple(
 )
 FORMAT = "symfric/results/stored.py"
 T_FILES = ("tests/symfric/integrator/test_stored.py::test_foreign_and_damaged_files_are_refused",)
-OVER = "symfric/results/ensemble_pictures.py"
+OVER = "symfric/results/pictures.py"
 T_STUDIES = ("tests/symfric/results/test_studies.py",)
 MEASURED = "symfric/integrator/simulate.py"
 T_MEASURED = ("tests/symfric/integrator/test_measured.py",)

@@ -9,12 +9,19 @@ from symfric import GenericAsperity
 from symfric.figures import Curve, lag, phenomena, transition
 from symfric.foundation.panels import WIDE, grid
 from symfric.foundation.style import line
-from symfric.gallery.drawing import look
-from symfric.gallery.generalized_maxwell_slip import by_hand
-from symfric.gallery.generalized_maxwell_slip.by_hand import rigid, stribeck
-from symfric.gallery.generalized_maxwell_slip.laws import F_S, SIGNALS, generic, law_grid, laws
+from symfric.gallery.generalized_maxwell_slip import laws as paper
+from symfric.gallery.generalized_maxwell_slip.laws import (
+    F_S,
+    SIGNALS,
+    generic,
+    law_grid,
+    laws,
+    rigid,
+    stribeck,
+)
 from symfric.gallery.generalized_maxwell_slip.laws import C as TABLE_C
 from symfric.gallery.plate import Drawn, plate
+from symfric.gallery.shared import look
 from symfric.laws import AnyLaw, steady_force
 
 Motion = tuple[float, float, tuple[float, ...], int]
@@ -153,7 +160,7 @@ def off_by_hand(
         for curve, f in zip(runs[name], frequencies, strict=True):
             t = np.linspace(0.0, periods / f, periods * steps + 1)
             v = mean + swing * np.sin(2 * np.pi * f * t)
-            found.append(by_hand.difference(name, curve.columns, t, v))
+            found.append(paper.difference(name, curve.columns, t, v))
         numbers[f"difference from the equations by hand, {name} [N]"] = max(found)
     return numbers
 
@@ -185,7 +192,7 @@ def fig_06_frictional_lag(quick: bool) -> Drawn:
     """
     chosen = laws(count=100 if quick else 2000)
     runs = {name: curves(law) for name, law in chosen.items()}
-    written = ("GMS", "LuGre") if quick else by_hand.LAWS
+    written = ("GMS", "LuGre") if quick else paper.LAWS
     lagging = [name for name in written if "L" in phenomena(chosen[name])]
     far = off_by_hand(runs, lagging, LAG, 300 if quick else 3000)
     numbers, areas, off = dict(far), dict[str, list[float]](), dict[str, list[float]]()
@@ -243,7 +250,7 @@ def fig_07_transition(quick: bool) -> Drawn:
     runs = {
         n: transition(law, 1.0, SIGNALS, frequencies, periods).curves for n, law in chosen.items()
     }
-    names = ("GMS", "LuGre") if quick else by_hand.LAWS
+    names = ("GMS", "LuGre") if quick else paper.LAWS
     far = off_by_hand(runs, names, TRANSITION, 1000 if quick else 10_000)
     numbers, ratios, tops = dict(far), dict[str, list[float]](), dict[str, float]()
     for name, each in runs.items():

@@ -9,9 +9,9 @@ from scipy.optimize import root_scalar
 from symfric import LuGre, simulate
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import line
-from symfric.gallery.drawing import legend_below
 from symfric.gallery.laminator_nips.studies import PRINTED, curve
 from symfric.gallery.plate import Drawn, plate
+from symfric.gallery.shared import legend_below
 from symfric.scenes import Prescribed
 
 Array = NDArray[np.float64]

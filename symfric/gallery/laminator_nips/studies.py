@@ -13,9 +13,8 @@ from identification.starts.stribeck import StribeckCurve
 from symfric import SteadyStateLuGre
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, Line
-from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.signals import rms
+from symfric.gallery.shared import look, rms
 
 Array = NDArray[np.float64]
 

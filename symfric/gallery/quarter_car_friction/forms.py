@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from symfric import QuarterCarSimple, Trajectory
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, line
-from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.quarter_car_friction import rig
-from symfric.gallery.quarter_car_friction.readings import as_printed, driven
+from symfric.gallery.quarter_car_friction.rig import as_printed, driven
+from symfric.gallery.shared import look
 from symfric.results.quadrature import integral_between
 
 Array = NDArray[np.float64]

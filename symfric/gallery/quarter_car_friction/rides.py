@@ -5,10 +5,10 @@ import numpy as np
 from symfric import Viscous
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, line
-from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.quarter_car_friction import readings, rig
+from symfric.gallery.quarter_car_friction import rig
 from symfric.gallery.quarter_car_friction.rig import FRICTION, RAMPS, STAGES, WEAK, general, ride
+from symfric.gallery.shared import look
 
 
 @plate("m", within=2e-9)
@@ -121,16 +121,16 @@ def fig_11_body(quick: bool) -> Drawn:
     far = float(np.abs(np.interp(run.t, t, body) - run["X_b"]).max())
     numbers: dict[str, float] = {}
     for name, ridden in {"friction": run, **others}.items():
-        numbers[f"overshoot after the last ramp, {name} [m]"] = readings.overshoot(ridden)
+        numbers[f"overshoot after the last ramp, {name} [m]"] = rig.overshoot(ridden)
     for stage, (end, height) in STAGES.items():
         place = float(np.interp(end, run.t, run["X_b"]))
         numbers[f"body at the end of stage {stage}, less {height:g} m of the paper [m]"] = (
             place - height
         )
-    numbers |= readings.residuals(run) | readings.start(run)
+    numbers |= rig.residuals(run) | rig.start(run)
     printed = ride(general(form="as_printed"))
     numbers["way of the body by equation 12 as printed [m]"] = float(np.ptp(printed["X_b"]))
-    claims = said(numbers) | ({} if quick else readings.bodies(numbers))
+    claims = said(numbers) | ({} if quick else rig.bodies(numbers))
     return figure, far / 0.05, numbers, claims
 
 
@@ -141,17 +141,17 @@ def said(numbers: dict[str, float]) -> dict[str, bool]:
         "friction halves the overshoot, weakly viscous friction makes it larger": (
             2 * over[0] < over[1] < over[2]
         ),
-        "the residual of X_b is larger than any constant leaves": readings.RESIDUAL["X_b"][0]
-        > readings.RANGE / 2,
+        "the residual of X_b is larger than any constant leaves": rig.RESIDUAL["X_b"][0]
+        > rig.RANGE / 2,
         "Coulomb friction improves the residuals by 0.06 and 0.12 %": np.allclose(
-            [100 * (1 - residual / without) for residual, without in readings.RESIDUAL.values()],
+            [100 * (1 - residual / without) for residual, without in rig.RESIDUAL.values()],
             [0.0628, 0.1235],
             atol=1e-4,
         ),
         "the rests are where and until when the road is level": (
             np.allclose([z for _, z in STAGES.values()], rig.heights(50)[1::2])
             and np.allclose([end for end, _ in STAGES.values()][:3], rig.CORNERS[1:6:2])
-            and max(rig.heights(50)) == readings.RANGE
+            and max(rig.heights(50)) == rig.RANGE
         ),
         "equation 12 as printed holds the body for ever": (
             numbers["way of the body by equation 12 as printed [m]"] == 0.0
@@ -211,7 +211,7 @@ def fig_12_friction_loops(quick: bool) -> Drawn:
         )
         / rig.B_D,
     }
-    areas, speeds = readings.areas_and_speeds(run)
+    areas, speeds = rig.areas_and_speeds(run)
     for name, area, speed in zip(RAMPS, areas, speeds, strict=True):
         numbers[f"area of the loop of the {name} ramp [N m/s]"] = area
         numbers[f"largest speed on the {name} ramp [m/s]"] = speed
@@ -224,5 +224,5 @@ def fig_12_friction_loops(quick: bool) -> Drawn:
         "0.0069 m of the spring are more than 193.8 N": rig.K_S * DEFLECTION > BREAK_AWAY,
     }
     if not quick:
-        claims |= readings.loops(numbers)
+        claims |= rig.loops(numbers)
     return figure, far, numbers, claims

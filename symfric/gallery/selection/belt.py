@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric import Trajectory, simulate
-from symfric.gallery.belt import Belt
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.selection import laws
-from symfric.gallery.signals import largest, rms, spread
+from symfric.gallery.shared import Belt, largest, rms, spread
 from symfric.scenes import Rabinowicz
 
 Array = NDArray[np.float64]

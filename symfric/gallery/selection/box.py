@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from symfric import ExactCoulomb, Trajectory, simulate
 from symfric.gallery.selection.laws import FORMS, forms, small_multiples
-from symfric.gallery.signals import acceleration, largest, rms, spread
+from symfric.gallery.shared import acceleration, largest, rms, spread
 from symfric.scenes import PendulumBox
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from symfric.foundation.style import EDGE, QUIET, colour, line
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.selection import box
 from symfric.gallery.selection.laws import FORMS, LAWS, TABLE_8, agree, chosen, forms
-from symfric.gallery.signals import acceleration, largest, rms, spread
+from symfric.gallery.shared import acceleration, largest, rms, spread
 from symfric.scenes import PendulumBox
 
 TOP, HALF = 0.4, 0.2

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from symfric import Awrejcewicz, BengisuAkay, Karnopp, Law, Threlfall, VelocityBased
 from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
-from symfric.gallery.drawing import REFERENCE
 from symfric.gallery.selection.tables import PRINTED
-from symfric.gallery.signals import rms
+from symfric.gallery.shared import REFERENCE, rms
 from symfric.scenes import jing_mi
 
 Array = NDArray[float64]

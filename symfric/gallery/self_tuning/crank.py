@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from symfric import BrownMcPhee, SelfTuning, simulate
 from symfric.foundation.panels import panels
 from symfric.foundation.style import line
-from symfric.gallery.drawing import REFERENCE, legend_below
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.self_tuning.machines import brown_mcphee, self_tuning, slider_crank, solve
-from symfric.gallery.signals import acceleration, largest
+from symfric.gallery.shared import REFERENCE, acceleration, largest, legend_below
 from symfric.scenes import SliderCrank
 from symfric.scenes.linkages import BEARING
 

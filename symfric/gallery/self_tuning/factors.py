@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from symfric import BrittleSelfTuning, SelfTuning
 from symfric.foundation.panels import grid, panels
-from symfric.gallery.drawing import shade
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.signals import largest
+from symfric.gallery.shared import largest, shade
 from symfric.laws.static.self_tuning import brittleness
 
 Array = NDArray[np.float64]

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from symfric import BrittleSelfTuning, BrownMcPhee, Law, SelfTuning, simulate
 from symfric.foundation.panels import grid, panels
 from symfric.foundation.style import QUIET, colour, line
-from symfric.gallery.drawing import REFERENCE, legend_below
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.self_tuning import machines
 from symfric.gallery.self_tuning.machines import fastest, fixed_steps, solve
-from symfric.gallery.signals import acceleration, largest
+from symfric.gallery.shared import REFERENCE, acceleration, largest, legend_below
 from symfric.scenes import FourMass
 
 Array = NDArray[np.float64]

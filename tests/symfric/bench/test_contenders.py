@@ -7,7 +7,7 @@ from backends import needs_compiler
 from symfric import Model, simulate
 from symfric.bench.contenders import MECHANISMS, compiled
 from symfric.bench.multibody import CASES
-from symfric.bench.timing import compile_time
+from symfric.bench.table import compile_time
 
 WHAT = CASES["slider_crank"]
 

@@ -1,6 +1,6 @@
 """Timing: the shortest of several calls, and the result."""
 
-from symfric.bench.timing import best_time, interleaved
+from symfric.bench.table import best_time, interleaved
 
 
 def test_shortest_call_counts_until_the_budget_is_spent() -> None:

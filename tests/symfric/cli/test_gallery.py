@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from symfric.cli import completions
-from symfric.cli import gallery as command
 from symfric.cli.app import main
-from symfric.cli.gallery import brief
+from symfric.cli.campaigns import brief
+from symfric.gallery import rendering
 from symfric.gallery.rendering import Gallery
 
 NAME = "self_tuning/fig_07_shape_factor"
@@ -45,12 +45,12 @@ def test_what_failed_is_told_and_the_status_is_1(
         "seconds": 1.5,
     }
     done = Gallery(tmp_path, ("a", NAME), {NAME: record}, {"a": "ValueError: none"}, 2.0)
-    monkeypatch.setattr(command, "render", lambda *_, **__: done)  # pyright: ignore[reportUnknownArgumentType, reportUnknownLambdaType]
+    monkeypatch.setattr(rendering, "render", lambda *_, **__: done)  # pyright: ignore[reportUnknownArgumentType, reportUnknownLambdaType]
     assert main(["gallery", "--out", str(tmp_path)]) == 1
     told = capsys.readouterr()
     assert "a failed, ValueError: none" in told.err
     part = Gallery(tmp_path, ("a", NAME, "b"), {NAME: record}, {"a": "ValueError: none"}, 2.0)
-    monkeypatch.setattr(command, "render", lambda *_, **__: part)  # pyright: ignore[reportUnknownArgumentType, reportUnknownLambdaType]
+    monkeypatch.setattr(rendering, "render", lambda *_, **__: part)  # pyright: ignore[reportUnknownArgumentType, reportUnknownLambdaType]
     assert main(["gallery", "--out", str(tmp_path)]) == 130
     assert "1 of 3 figures were not computed" in capsys.readouterr().err
     assert "This with that" in told.out

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from symfric.cli import main
-from symfric.cli.commands import COMMANDS, Commands, arguments, is_option, prose_and_examples
+from symfric.cli.app import COMMANDS, Commands, arguments, is_option, prose_and_examples
 
 EVERY: dict[str, Any] = {
     name: Commands(name="symfric").get_command(None, name) for name in COMMANDS

@@ -29,7 +29,7 @@ def test_a_failing_campaign_saves_its_cases_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report = Report(1, 3, {0: Verdict("silent", "far off"), 1: Verdict("right")}, 1.0)
-    monkeypatch.setattr("symfric.cli.stress.campaign", lambda *_, **__: report)
+    monkeypatch.setattr("symfric.stress.campaign.campaign", lambda *_, **__: report)
     assert main(["stress", "--out", str(tmp_path)]) == 1
     assert Case.read(tmp_path / "silent_1_0.json") == draw(1, 0)
     printed = capsys.readouterr()
@@ -46,8 +46,8 @@ def test_the_files_are_written_while_a_campaign_runs(
         progress(Report(1, 3, {0: Verdict("silent", "far off")}, 1.0))
         raise RuntimeError
 
-    monkeypatch.setattr("symfric.cli.stress.campaign", killed)
-    monkeypatch.setattr("symfric.cli.stress.EVERY", -1.0)
+    monkeypatch.setattr("symfric.stress.campaign.campaign", killed)
+    monkeypatch.setattr("symfric.cli.campaigns.EVERY", -1.0)
     target = tmp_path / "stress.json"
     with pytest.raises(RuntimeError):
         main(["stress", "--json", str(target), "--out", str(tmp_path)])

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from symfric import LuGre, QuarterCarGeneral, figure, law_from_text
-from symfric.figures.magnitudes import phenomena, require
+from symfric.figures.data import phenomena, require
 
 
 def test_a_composed_law_shows_what_its_parts_show_in_the_order_of_the_list() -> None:

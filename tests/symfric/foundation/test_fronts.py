@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import symfric
-from symfric.cli.commands import COMMANDS, MODULES
+from symfric.cli.app import COMMANDS, MODULES
 
 ROOT = Path(symfric.__file__).parents[1]
 FRONTS = [

@@ -8,10 +8,10 @@ from oracles import rabinowicz_coulomb, rabinowicz_motion
 from scipy.integrate import solve_ivp
 
 from symfric import SteadyStateLuGre
-from symfric.gallery.belt import Belt
 from symfric.gallery.laminator_nips import sled
 from symfric.gallery.self_tuning import machines
 from symfric.gallery.self_tuning.machines import fixed_steps, solve
+from symfric.gallery.shared import Belt
 
 
 def test_the_belt_has_the_period_and_the_extremes_of_the_closed_form() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from symfric.gallery.drawing import LOOKS, look
+from symfric.gallery.shared import LOOKS, look
 from symfric.laws import ALL_LAWS, POPULATIONS
 
 TOGETHER = (

@@ -11,7 +11,7 @@ from symfric.gallery import rendering
 from symfric.gallery.pages import index_page
 from symfric.gallery.plate import chosen, figure_of, plate_of, plates, script, sections, short
 from symfric.gallery.rendering import draw, read, render, together
-from symfric.stress.workers import Crashed, TimedOut
+from symfric.stress.campaign import Crashed, TimedOut
 
 NAME = "self_tuning/fig_07_shape_factor"
 

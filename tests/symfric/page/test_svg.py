@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from symfric.page import html
-from symfric.page.scale import Axis, around
 from symfric.page.svg import (
     BOTTOM,
     LEFT,
     RIGHT,
     TOP,
+    Axis,
     Band,
     Dots,
     Level,
     Path,
     Stems,
+    around,
     chart,
 )
 

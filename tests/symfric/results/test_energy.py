@@ -18,7 +18,7 @@ from symfric.multibody import (
     Revolute,
     Spherical,
 )
-from symfric.results.energy import EnergyBalance
+from symfric.results.trajectory import EnergyBalance
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank
 
 pytestmark = pytest.mark.heavy

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.collections import PolyCollection
 
 from symfric import BrownMcPhee, rabinowicz, simulate_many
-from symfric.results.ensemble_pictures import plot_many
+from symfric.results.pictures import plot_many
 
 T = np.linspace(0.0, 1.0, 11)
 

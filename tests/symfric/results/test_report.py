@@ -8,7 +8,7 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre, parameters, report, simulate
 from symfric.cli import main
-from symfric.page.style import STYLE
+from symfric.page.html import STYLE
 from symfric.results.pictures import plot_trajectories
 from symfric.scenes import Pendulum, Rabinowicz
 

@@ -7,7 +7,7 @@ import pytest
 
 from symfric.integrator import simulate
 from symfric.laws import BrownMcPhee
-from symfric.results import tables
+from symfric.results import stored
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Pendulum
 
@@ -47,7 +47,7 @@ def test_without_the_packages_there_is_a_sentence(
     def none(name: str) -> Any:
         raise ImportError(name)
 
-    monkeypatch.setattr(tables, "import_module", none)
+    monkeypatch.setattr(stored, "import_module", none)
     with pytest.raises(ImportError, match="to_dataframe: expected the package pandas, got none"):
         run.to_dataframe()
     with pytest.raises(ImportError, match="pip install xarray"):

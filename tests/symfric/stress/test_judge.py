@@ -8,17 +8,18 @@ import pytest
 from symfric.foundation.status import SolveError, Status
 from symfric.stress.cases import Case, Signal
 from symfric.stress.judge import by_methods, judge
-from symfric.stress.measures import (
+from symfric.stress.problem import (
     RIGHT,
+    Problem,
     amplification,
     at_steps,
     distance,
     of,
+    problem,
+    question,
     tolerances,
     worst_step,
 )
-from symfric.stress.problem import Problem, problem
-from symfric.stress.refereed import question
 
 EASY = Case(1, 1, "rabinowicz", "brown_mcphee", t_end=2.0)
 """A block that the belt takes along and loses."""

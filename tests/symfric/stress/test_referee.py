@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 import symfric.stress.referee
 from symfric.laws import ALL_LAWS
 from symfric.stress.cases import Case, Signal
-from symfric.stress.problem import problem
+from symfric.stress.problem import problem, question
 from symfric.stress.referee.laws import LAWS, SIGNS
 from symfric.stress.referee.scenes import SCENES
 from symfric.stress.referee.solve import Motion, knows, solve
-from symfric.stress.refereed import question
 
 Array = NDArray[np.float64]
 PAIRS = [(law, scene) for scene in SCENES for law in LAWS if knows(law, scene)]

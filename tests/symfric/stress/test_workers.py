@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from symfric.stress import workers
-from symfric.stress.workers import Crashed, TimedOut, WorkerPool
+from symfric.stress import campaign as workers
+from symfric.stress.campaign import Crashed, TimedOut, WorkerPool
 
 
 def outcomes(work: object, tasks: list[object], limit: float = 60.0) -> dict[int, object]:

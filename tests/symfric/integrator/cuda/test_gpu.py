@@ -12,7 +12,7 @@ from device_cases import CASES
 
 from symfric import BrownMcPhee, LuGre, rabinowicz, simulate_many
 from symfric.bench.ensemble import measure_cuda, on_graphics_processor
-from symfric.cli.bench import show
+from symfric.cli.campaigns import show
 from symfric.integrator.cuda.device import CupyDevice, DeviceError
 
 

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.problem import Problem
-from ocp.formulation.serialise import Posed, posed
-from ocp.result.motion import Motion, Stored, Stretch, stored_spans, structure_of
-from ocp.solvers.outcome import Iterate, SolverStatistics
+from ocp.formulation.phase import Free
+from ocp.formulation.problem import Posed, Problem, posed
+from ocp.solving.motion import Motion, Stored, Stretch, stored_spans, structure_of
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
 from symfric.foundation import checks, packed
@@ -22,8 +21,7 @@ from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
 from symfric.foundation.status import Status
-from symfric.results import tables
-from symfric.results.stored import Format
+from symfric.results.stored import Format, module
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -305,7 +303,7 @@ class Solution:
         Raises:
             ImportError: no pandas.
         """
-        pandas = tables.module("to_dataframe", "pandas")
+        pandas = module("to_dataframe", "pandas")
         parts = {m.name: pandas.DataFrame({"t": m.t, **m.signals}) for m in self.motions}
         frame = pandas.concat(parts, names=["scenario"]).droplevel(1).set_index("t", append=True)
         frame = frame if len(parts) > 1 else frame.droplevel("scenario")
@@ -366,7 +364,7 @@ def plot_solutions(
     Raises:
         ValueError: no solution, an unknown signal, or an ending that Matplotlib does not write.
     """
-    from ocp.result.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
+    from ocp.solving.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
 
     if not solutions:
         raise checks.refused("plot", "at least one solution", solutions)

@@ -1,0 +1,138 @@
+"""Quantities, looks, and the exact belt that several figures of the gallery share.
+
+Looks of laws, references and sweeps are the same in all pictures; legends stand below panels.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import atan2, hypot, pi, sqrt
+from typing import Any, final
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from symfric import Trajectory
+from symfric.foundation.parameters import check_names
+from symfric.foundation.style import QUIET, Line, line
+
+Array = NDArray[np.float64]
+
+
+def acceleration(run: Trajectory, rate: str, times: ArrayLike | None = None) -> Array:
+    """Derivative of the state `rate`, by the equations of its model."""
+    model = run.model
+    if model.ode is None:
+        raise ValueError(f"acceleration: expected explicit equations, got '{model.name}'")
+    return run.of(model.ode[[v.name for v in model.x].index(rate)], times)
+
+
+def rms(difference: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(difference))))
+
+
+def largest(difference: Array) -> float:
+    """Largest magnitude."""
+    return float(np.abs(difference).max())
+
+
+def spread(x: Array) -> float:
+    """The S x 100 [m] of Jing and Mi: 100 times the standard deviation of positions."""
+    return 100 * float(np.std(x, ddof=1))
+
+
+REFERENCE: Mapping[str, Any] = {"color": QUIET, "linewidth": 3.2, "solid_capstyle": "butt"}
+"""Keywords of a curve that the others are compared with: wide and grey, behind them."""
+
+
+def shade(part: float) -> Any:
+    """Colour of a parameter, from its first value (0, violet) to its last (1, light green)."""
+    return colormaps["viridis"](0.9 * part)
+
+
+def legend_below(figure: Figure, axis: Axes, ncols: int = 3) -> None:
+    """The legend of one panel, under all panels."""
+    entries = axis.get_legend_handles_labels()
+    figure.legend(*entries, loc="outside lower center", ncols=ncols, frameon=False)
+
+
+LOOKS = {
+    "lugre": 0, "dahl": 1, "elasto_plastic": 2, "gonthier": 3, "generic_asperity": 4,
+    "exact_coulomb": 4, "leuven": 5, "maxwell_slip": 6, "bengisu_akay": 7, "karnopp": 8,
+    "velocity_based": 9, "stick_slip": 10, "threlfall": 11, "brown_mcphee": 12, "awrejcewicz": 13,
+    "bliman_sorine": 15, "self_tuning": 16, "gms": 24, "quarter_car_general": 0,
+    "quarter_car_simple": 1, "viscous": 5, "steady_state_lugre": 0,
+}  # fmt: skip
+"""Name in the catalogue -> number in `style.CYCLE`; laws that never meet may share one."""
+
+
+def look(law: str) -> Line:
+    """Colour and line style of a law by its name, as keywords of `Axes.plot`."""
+    check_names("gallery", [law], LOOKS)
+    return line(LOOKS[law])
+
+
+@final
+@dataclass(frozen=True)
+class Belt:
+    """A block of mass m on a belt of velocity v_belt, held by a spring k, with F_S and F_C.
+
+    Exact dry friction, phase by phase in closed form: sticking lines and arcs. It stands beside the
+    laws as what they approximate, and uses nothing of the library.
+
+    Attributes:
+        stops: instants [s] at which the block joins the belt.
+        leaves: instants [s] at which it breaks away.
+    """
+
+    m: float
+    k: float
+    v_belt: float
+    F_S: float
+    F_C: float
+    stops: list[float] = field(default_factory=list[float])
+    leaves: list[float] = field(default_factory=list[float])
+
+    def motion(self, times: Array) -> dict[str, Array]:
+        """Elongation, velocity relative to the belt, acceleration and friction at `times` [s].
+
+        From rest at x = 0; friction opposes the relative velocity, so F < 0 while the belt pulls.
+        """
+        w, centre = sqrt(self.k / self.m), self.F_C / self.k
+        x, v, F = (np.empty_like(times) for _ in range(3))
+        begin, at, rate, sticks = 0.0, 0.0, 0.0, False
+        while begin <= times[-1]:
+            if sticks:
+                lasts = (self.F_S / self.k - at) / self.v_belt
+            else:  # until the velocity is that of the belt from below: a phase behind the crest
+                lasts = self._until_it_stops(at - centre, rate, w)
+            s = times - begin
+            here = (s >= 0) & (s <= lasts)
+            if sticks:
+                x[here], v[here] = at + rate * s[here], rate
+                F[here] = -self.k * x[here]
+            else:
+                a, b = at - centre, rate / w
+                x[here] = centre + a * np.cos(w * s[here]) + b * np.sin(w * s[here])
+                v[here] = w * (b * np.cos(w * s[here]) - a * np.sin(w * s[here]))
+                F[here] = -self.F_C
+            begin += lasts
+            (self.leaves if sticks else self.stops).append(begin)
+            at = self.F_S / self.k if sticks else self._where_it_stops(at - centre, rate, w)
+            rate, sticks = self.v_belt, not sticks
+        return {"x": x, "v_rel": v - self.v_belt, "a": -(self.k * x + F) / self.m, "friction": F}
+
+    def _until_it_stops(self, a: float, rate: float, w: float) -> float:
+        """Time until the velocity of the arc reaches the belt's again."""
+        b, size = rate / w, hypot(a, rate / w)
+        # v = w size cos(w s + phase); it rises through v_belt where the cosine does
+        phase = atan2(a, b)
+        angle = (-np.arccos(min(self.v_belt / (w * size), 1.0)) - phase) % (2 * pi)
+        return float(angle / w) if angle > 1e-9 else 2 * pi / w
+
+    def _where_it_stops(self, a: float, rate: float, w: float) -> float:
+        s = w * self._until_it_stops(a, rate, w)
+        return float(self.F_C / self.k + a * np.cos(s) + rate / w * np.sin(s))
