@@ -11,7 +11,7 @@ to.
 `simulate` with `ExactCoulomb` moves explicit models and mechanisms alike (the tests compare both).
 This engine stays for what that law does not do: any law by its sliding force and static level,
 without building the model again; normal forces that are algebraic unknowns of the friction itself,
-where `symfric.model.holding` refuses the applied force; the most overloaded contact first, after
+where `symfric.model.forces` refuses the applied force; the most overloaded contact first, after
 which all is decided again; and a refusal where no motion, or more than one, is consistent.
 
 Limits: what it cannot decide it does not (`SolveError`): several consistent motions, none (friction
