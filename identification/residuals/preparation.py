@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.dataset import Dataset
+from identification.data.record import Record
 from identification.residuals.evaluation import Channel
 from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
 from identification.residuals.open_loop import (
@@ -25,11 +27,6 @@ from symfric.foundation.parameters import Variable
 from symfric.integrator import Hold, Linear
 from symfric.model import Model
 
-if TYPE_CHECKING:
-    from identification.data.dataset import Dataset
-    from identification.data.record import Record
-    from identification.residuals.shooting import Shooting
-
 Array = NDArray[np.float64]
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
 """Tolerances to choose from, and that of what they are compared with."""
@@ -45,12 +42,19 @@ NOISELESS = 1e-9
 
 @final
 class Preparation:
-    """One set of residuals being made of a kind, a model and data."""
+    """Make the residuals of a model on data.
+
+    Args:
+        kind: a `Shooting`, whose fields say how; `Shooting.prepare` is the only caller.
+        model: of the motion.
+        data: whose records are compared.
+        start: parameter -> value where simulations choose tolerances.
+        every: take every this many windows of a record.
+    """
 
     def __init__(
-        self, kind: "Shooting", model: Model, data: "Dataset", start: Mapping[str, float],
-        every: int = 1,
-    ) -> None:  # fmt: skip
+        self, kind: Any, model: Model, data: Dataset, start: Mapping[str, float], every: int = 1
+    ) -> None:
         self.kind, self.model, self.every = kind, model, every
         self.values = {v.name: float(start.get(v.name, v.start)) for v in model.p}
         self.records = list(data)
@@ -67,7 +71,7 @@ class Preparation:
         """The residuals of all records, cut into windows."""
         estimated = self.kind.estimates_dead_time
         if estimated:
-            low, high = self.kind.dead_time  # type: ignore[misc]
+            low, high = self.kind.dead_time
             unknown = Unknown(
                 DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
             )
@@ -95,7 +99,7 @@ class Preparation:
             own=tuple(self.own),
             channels=tuple(channels),
             shots=tuple(pieces),
-            dead_time=tau,  # type: ignore
+            dead_time=tau,
             rtol=self.kind.rtol or RTOLS[-1],
             backend=backend,
         )
@@ -220,7 +224,7 @@ class Preparation:
 
     # ---- pieces of records
 
-    def _cut(self, number: int, record: "Record", row: int) -> Iterator[Shot]:
+    def _cut(self, number: int, record: Record, row: int) -> Iterator[Shot]:
         """The windows of one record; residuals begin at `row`, a signal after the other."""
         origin = float(record.time[0]) if self.timeless else 0.0
         t = record.time - origin
@@ -302,7 +306,7 @@ class Preparation:
         return Unknown(f"x0.{v.name}{label}", v.unit, value, scale=scale, nuisance=True)
 
     def _channels(
-        self, number: int, record: "Record", pieces: Sequence[Shot], row: int
+        self, number: int, record: Record, pieces: Sequence[Shot], row: int
     ) -> Iterator[Channel]:
         t = np.concatenate([piece.origin + piece.t for piece in pieces])
         breaks = tuple(np.cumsum([piece.t.size for piece in pieces])[:-1].tolist())
