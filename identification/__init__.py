@@ -14,6 +14,14 @@ from symfric.foundation.fronts import hand_out
 if TYPE_CHECKING:
     from identification.cross import cross_validate as cross_validate
     from identification.data.dataset import Dataset as Dataset
+    from identification.data.differentiate import LinearFit as LinearFit
+    from identification.data.differentiate import MotionSignals as MotionSignals
+    from identification.data.differentiate import differentiate as differentiate
+    from identification.data.differentiate import linear_regression as linear_regression
+    from identification.data.differentiate import plateaus as plateaus
+    from identification.data.filters import Filter as Filter
+    from identification.data.filters import central_difference as central_difference
+    from identification.data.filters import lowpass as lowpass
     from identification.data.findings import Finding as Finding
     from identification.data.findings import Findings as Findings
     from identification.data.record import PositionLoop as PositionLoop
@@ -29,14 +37,6 @@ if TYPE_CHECKING:
     from identification.result.fitted import load_fit as load_fit
     from identification.result.series import Estimate as Estimate
     from identification.select import select as select
-    from identification.signals.differentiate import LinearFit as LinearFit
-    from identification.signals.differentiate import MotionSignals as MotionSignals
-    from identification.signals.differentiate import differentiate as differentiate
-    from identification.signals.differentiate import linear_regression as linear_regression
-    from identification.signals.differentiate import plateaus as plateaus
-    from identification.signals.filters import Filter as Filter
-    from identification.signals.filters import central_difference as central_difference
-    from identification.signals.filters import lowpass as lowpass
     from identification.starts.maxwell_slip import fit_elements as fit_elements
     from identification.starts.measured import Measured as Measured
     from identification.starts.measured import break_away as break_away

@@ -173,19 +173,17 @@ class Fit:
         point = made.at(w)
         if isinstance(point, str):
             raise ValueError(f"Fit: {asked.subject.name}: no residuals: {point}")
-        levels = levels_of(asked.subject, asked.strongest(point, self.data), self.data.rotary)
+        return self._live(asked, made, point)
+
+    def _live(self, asked: "Prepared", made: Task, point: Point) -> Live:
+        """The problem with its minimum and what is known of its uncertainty."""
         found = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
+        drive = asked.subject.drive
+        mass = None if drive is None else float(found.get("m", drive.m))
+        largest = strongest(asked.kind, self.data, asked.seen, mass)
+        levels = levels_of(asked.subject, largest, self.data.rotary)
         certain = covariance(made, point, levels)
-        model = asked.subject.close(found).model
-        return Live(
-            kind=asked.kind,
-            subject=asked.subject,
-            data=self.data,
-            task=made,
-            point=point,
-            covariance=certain,
-            model=model,
-        )
+        return Live.of(asked.kind, asked.subject, self.data, made, point, certain)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
         """Values of a fit to other data, from one start and without a verdict."""
@@ -215,12 +213,10 @@ class Fit:
         status, message = _status(end, verdict, remaining(made, point) / max(point.cost, 1e-300))
         if status is Status.DOUBTFUL:
             message += _unseen(asked)
-        levels = levels_of(asked.subject, asked.strongest(point, self.data), self.data.rotary)
         question = Asked(replace(self, kind=asked.kind), dict(made.noise), point.w)
         result = fitted(
-            asked.kind, asked.subject, self.data, made, point, starts, verdict,
-            covariance(made, point, levels), tuple(asked.findings), status=status, message=message,
-            seconds=seconds, call=f"{written(self)}.solve()", asked=question,
+            self._live(asked, made, point), starts, verdict, tuple(asked.findings), status=status,
+            message=message, seconds=seconds, call=f"{written(self)}.solve()", asked=question,
         )  # fmt: skip
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
@@ -247,13 +243,6 @@ class Prepared:
     task: Task
     centre: Any
     seen: Measured | None
-
-    def strongest(self, point: Point, data: Dataset) -> float | None:
-        """Largest force on the friction in the data, with the mass at `point`."""
-        found = dict(zip(self.task.residuals.names, point.values.tolist(), strict=True))
-        drive = self.subject.drive
-        mass = None if drive is None else float(found.get("m", drive.m))
-        return strongest(self.kind, data, self.seen, mass)
 
 
 def _status(end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:

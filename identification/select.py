@@ -73,16 +73,16 @@ class Row:
     """
 
     law: str
-    status: str
-    validation: float
-    fitted: float
-    aicc: float
-    bic: float
-    parameters: int
-    operations: int | None
-    seconds: float
-    sentence: str
-    fit: Fitted | None
+    status: str = ""
+    validation: float = nan
+    fitted: float = nan
+    aicc: float = nan
+    bic: float = nan
+    parameters: int = 0
+    operations: int | None = None
+    seconds: float = 0.0
+    sentence: str = ""
+    fit: Fitted | None = None
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -319,28 +319,12 @@ def _ranked(tried: Sequence[_Tried], data: str, how: str) -> Ranking:
         for t, ins, out, a, b in zip(good, inside, outside, aicc, bic, strict=True)
     ]
     rows.sort(key=lambda row: (row.validation if isfinite(row.validation) else inf, row.bic))
-    lost = [_lost(t) for t in tried if t.fit is None]
+    lost = [Row(t.name, sentence=t.why) for t in tried if t.fit is None]
     return Ranking((*rows, *lost), data, how, n)
 
 
 def _over(value: float, best: float) -> float:
     return value - best if isfinite(best) else nan
-
-
-def _lost(t: _Tried) -> Row:
-    return Row(
-        law=t.name,
-        status="",
-        validation=nan,
-        fitted=nan,
-        aicc=nan,
-        bic=nan,
-        parameters=0,
-        operations=None,
-        seconds=0.0,
-        sentence=t.why,
-        fit=None,
-    )
 
 
 def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -> Row:

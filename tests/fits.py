@@ -13,6 +13,7 @@ from identification.data.findings import Finding
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.result.build import fitted
 from identification.result.fitted import Fitted
+from identification.result.live import Live
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import task
 from identification.unknowns.spec import Unknown
@@ -112,7 +113,6 @@ def make(
     if isinstance(point, str):
         raise ValueError(point)
     verdict = judge(problem, point)
-    return fitted(
-        kind, what, data, problem, point, tried, verdict, covariance(problem, point), findings,
-        status=verdict.status(best.status), seconds=0.1, call=call,
-    )  # fmt: skip
+    live = Live.of(kind, what, data, problem, point, covariance(problem, point))
+    status = verdict.status(best.status)
+    return fitted(live, tried, verdict, findings, status=status, seconds=0.1, call=call)

@@ -158,18 +158,15 @@ FLOORS: dict[str, set[str]] = {
     "ocp.problems": {"symfric", "ocp.formulation"},
     "ocp": {"symfric"},
     "identification.data": {"symfric"},
-    "identification.signals": {"symfric", "identification.data"},
     "identification.unknowns": {"symfric"},
     "identification.residuals": {
         "symfric",
         "identification.data",
-        "identification.signals",
         "identification.unknowns",
     },
     "identification.starts": {
         "symfric",
         "identification.data",
-        "identification.signals",
         "identification.unknowns",
         "identification.residuals",
     },
@@ -184,7 +181,6 @@ FLOORS: dict[str, set[str]] = {
     "identification.result": {
         "symfric",
         "identification.data",
-        "identification.signals",
         "identification.unknowns",
         "identification.residuals",
         "identification.solving",

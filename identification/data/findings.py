@@ -8,7 +8,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import GAP, Record
+from identification.data.record import Record
 from symfric.foundation import checks
 
 Severity = Literal["error", "warning"]
@@ -146,11 +146,7 @@ class View:
         record = self.record
         if record.t is None or record.size < 20:
             return None
-        intervals = np.diff(record.t)
-        usual = float(np.median(intervals))
-        edges = [0, *(np.flatnonzero(intervals > GAP * usual) + 1).tolist(), record.size]
-        k = int(np.argmax(np.diff(edges)))
-        piece = record.at(slice(edges[k], edges[k + 1]))
+        piece = record.at(max(record.pieces, key=lambda part: part.stop - part.start))
         if piece.size < 20:
             return None
         step = (piece.time[-1] - piece.time[0]) / (piece.size - 1)
@@ -203,13 +199,6 @@ class View:
         t = self.record.t
         place = self.record.place(sample)
         return place if t is None else f"t = {t[sample]:.6g} s ({place})"
-
-
-def runs(there: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First and last sample of each run of true ones."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
-    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        yield first, end - 1
 
 
 def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -13,7 +13,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import GAP, Record
+from identification.data.record import GAP, Record, runs
 from identification.data.resample import SHORTEST, hermite, interpolated
 from symfric.foundation import checks
 
@@ -77,24 +77,17 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
     step = max(first.median_step, second.median_step)
     one, two = _Even.of(first, on[0], step), _Even.of(second, on[1], step)
     lag, correlation = _coarse(where, one, two)
-    rigid = _refined(where, one, two, lag, correlation, with_drift=False)
-    free = _refined(where, one, two, lag, correlation, with_drift=True)
-    gained = one.values.size / NEIGHBOURS * (rigid.rest / free.rest - 1)
-    total = abs(free.delay.drift) * one.values.size * step
+    rigid, left = _refined(where, one, two, lag, correlation, with_drift=False)
+    free, least = _refined(where, one, two, lag, correlation, with_drift=True)
+    gained = one.values.size / NEIGHBOURS * (left / least - 1)
+    total = abs(free.drift) * one.values.size * step
     drifts = gained > SURE**2 and total > 0.5 * step
     if drifts and not drift:
         raise ValueError(
-            f"{where}: expected clocks of one speed, got a drift of {1e6 * free.delay.drift:.0f} "
+            f"{where}: expected clocks of one speed, got a drift of {1e6 * free.drift:.0f} "
             f"ppm, {total:.3g} s over the record; write drift='estimate'"
         )
-    return free.delay if drift else rigid.delay
-
-
-@final
-@dataclass(frozen=True)
-class _Fit:
-    delay: Delay
-    rest: float
+    return free if drift else rigid
 
 
 @final
@@ -196,8 +189,8 @@ def _smoothed(signal: _Even) -> Array:
 
 def _refined(
     where: str, one: _Even, two: _Even, lag: int, correlation: float, *, with_drift: bool
-) -> _Fit:
-    """Gauss-Newton on shift, drift, gain and offset."""
+) -> tuple[Delay, float]:
+    """The delay by Gauss-Newton on shift, drift, gain and offset, and what it leaves."""
     y1, y2 = _smoothed(one), _smoothed(two)
     t1 = one.start + one.step * np.arange(y1.size, dtype=np.float64)
     t2 = two.start + two.step * np.arange(y2.size, dtype=np.float64)
@@ -234,7 +227,7 @@ def _refined(
             f"at samples of {one.step:.2g} s; say shift= [s]"
         )
     drift_error = float(np.sqrt(covariance[1, 1])) if with_drift else 0.0
-    return _Fit(Delay(shift, drift, middle, error, drift_error, correlation), rest)
+    return Delay(shift, drift, middle, error, drift_error, correlation), rest
 
 
 def merged(
@@ -286,9 +279,7 @@ def _joined(
     t, at = second.time, delay.second(first.time)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     there = (at >= t[0]) & (at <= t[-1]) & (t[k + 1] - t[k] <= GAP * second.median_step)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
-    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    kept = [slice(a, b) for a, b in runs if b - a >= SHORTEST]
+    kept = [slice(a, b) for a, b in runs(there) if b - a >= SHORTEST]
     if not kept:
         raise ValueError(
             f"{where}: expected a time that both have in common, got {first.time[0]:g} ... "

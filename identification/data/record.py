@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import final
 
 import numpy as np
@@ -69,6 +70,12 @@ GAP = 5.0
 """An interval of more than so many median intervals is a gap."""
 JITTER = 0.01
 """Largest deviation of a sample interval from the mean one, relative, that counts as uniform."""
+
+
+def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First sample and end (not included) of each run of true ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 @final
@@ -246,6 +253,12 @@ class Record:
     def median_step(self) -> float:
         """Median sample interval [s], which gaps do not move."""
         return float(np.median(np.diff(self.time)))
+
+    @property
+    def pieces(self) -> list[slice]:
+        """The samples between gaps."""
+        cuts = np.flatnonzero(np.diff(self.time) > GAP * self.median_step) + 1
+        return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), self.size])]
 
     def uniform(self) -> "Record":
         """The record itself, if its samples are equally spaced to 1 % of the interval.

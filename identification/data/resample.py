@@ -5,7 +5,6 @@ A gap is never bridged silently.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -24,17 +23,9 @@ MOST = 1e8
 """Samples of a record."""
 
 
-def pieces(record: Record) -> list[slice]:
-    """The samples between the gaps of a record."""
-    intervals = np.diff(record.time)
-    cuts = np.flatnonzero(intervals > GAP * record.median_step) + 1
-    edges = [0, *cuts.tolist(), record.size]
-    return [slice(a, b) for a, b in pairwise(edges)]
-
-
 def check_no_gap(record: Record, where: str) -> None:
     """Refuse a record with gaps."""
-    parts = pieces(record)
+    parts = record.pieces
     if len(parts) > 1:
         t, k = record.time, parts[0].stop
         raise ValueError(
@@ -73,7 +64,7 @@ def resampled(
         )
     if gap == "refuse":
         check_no_gap(record, where)
-    parts = [record.at(part) for part in pieces(record) if part.stop - part.start >= SHORTEST]
+    parts = [record.at(part) for part in record.pieces if part.stop - part.start >= SHORTEST]
     kept = [_at_step(part, step) for part in parts if part.time[-1] - part.time[0] >= 9 * step]
     if not kept:
         raise ValueError(

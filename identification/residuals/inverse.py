@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
+from identification.data.filters import Filter
 from identification.residuals.balance import Balance, Row, balance, coordinates
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.motions import Motion, Piece, measure, piece
 from identification.residuals.sampled import Sampled
-from identification.signals.filters import Filter
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks

@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.differentiate import derivatives, uncertain
+from identification.data.filters import Decimation, Filter, Velocity, choose_filter
 from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate
 from identification.residuals.sampled import moving_start
-from identification.signals.differentiate import derivatives, uncertain
-from identification.signals.filters import Decimation, Filter, Velocity, choose_filter
 from symfric.model import Model
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live, errors_of, labels
+from identification.result.live import Asked, Live, errors_of, labels
 from identification.result.series import (
     Curve,
     Estimate,
@@ -24,7 +24,7 @@ from identification.result.series import (
     series,
 )
 from identification.solving.descent import Start
-from identification.solving.task import Point, Task
+from identification.solving.task import Task
 from identification.unknowns.roles import is_coefficient
 from identification.unknowns.spec import Above, Range, Tied
 from identification.unknowns.subject import Subject
@@ -34,10 +34,8 @@ from symfric import __version__
 from symfric.foundation.parameters import Parametric, parameters
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
-from symfric.laws import Law
 from symfric.model import Model
 from symfric.scenes import Drive
-from symfric.scenes.base import Scene
 
 SHOWN = 6
 """Numbers of an array that are written out."""
@@ -99,14 +97,9 @@ MOST = 40
 
 
 def fitted(
-    kind: Kind,
-    subject: Subject,
-    data: Dataset,
-    task: Task,
-    point: Point,
+    live: Live,
     starts: Sequence[Start],
     verdict: Verdict,
-    covariance: Covariance,
     findings: Sequence[Finding] = (),
     *,
     status: Status,
@@ -118,92 +111,73 @@ def fitted(
     """The result.
 
     Args:
-        kind, subject, data: what was asked.
-        task: the problem with the noise levels at the end.
-        point: the end of the best start.
+        live: the problem with the noise levels at the end, and the end of the best start.
         starts: all of them.
-        verdict, covariance: what the residuals say there.
+        verdict: what the residuals say there.
         findings: what is doubtful about the data.
         status: how the fit ended in view of the verdict.
         message: more about the end; the sentence of `status` stands before it.
         seconds: of all starts.
-        call: how it was asked for, as Python.
+        call: how it was called, as Python.
         asked: what puts the problem again, from a file.
     """
-    names = task.residuals.names
-    records = tuple(r.name for r in data)
-    found = dict(zip(names, point.values.tolist(), strict=True))
-    closed = subject.close(found)
-    machine = closed.scene
-    shown = _correlated(task, covariance)
-    timed = all(r.t is not None for r in data)
-    abscissa = "t [s]" if timed else ("v [rad/s]" if data.rotary else "v [m/s]")
+    task, certain, kind = live.task, live.covariance, written(live.kind)
+    records = tuple(r.name for r in live.data)
+    shown = _correlated(task, certain)
     return Fitted(
-        name=subject.name,
-        kind=written(kind),
+        name=live.subject.name,
+        kind=kind,
         records=records,
-        parameters=_estimates(subject, task, found, covariance, data.rotary),
-        names=tuple(covariance.names[i] for i in shown),
-        correlation=covariance.correlation[np.ix_(shown, shown)],
-        undetermined=covariance.undetermined,
-        directions=covariance.sentences,
+        parameters=_estimates(live),
+        names=tuple(certain.names[i] for i in shown),
+        correlation=certain.correlation[np.ix_(shown, shown)],
+        undetermined=certain.undetermined,
+        directions=certain.sentences,
         status=status,
         message=" ".join(part for part in (status.value, message) if part),
         verdict=verdict,
-        errors=errors_of(task.residuals, records, point.evaluation.r, verdict.effective),
+        errors=errors_of(task.residuals, records, live.point.evaluation.r, verdict.effective),
         validation=None,
         noise=dict(task.noise),
         starts=_tried(task, starts),
         findings=tuple(findings),
-        series=_series(task, point, records, verdict, abscissa),
-        curve=_curve(subject, closed.law, machine, data, task),
-        law=closed.law,
-        machine=machine,
+        series=_series(live, records, verdict),
+        curve=_curve(live),
+        law=live.closed.law,
+        machine=live.closed.scene,
         seconds=seconds,
         evaluations=sum(s.evaluations for s in starts),
-        made=_made(call, written(kind)),
-        live=Live(
-            kind=kind,
-            subject=subject,
-            data=data,
-            task=task,
-            point=point,
-            covariance=covariance,
-            model=closed.model,
-        ),
+        made=_made(call, kind),
+        live=live,
         asked=asked,
     )
 
 
-def _estimates(
-    subject: Subject, task: Task, found: Mapping[str, float], made: Covariance, turning: bool
-) -> dict[str, Estimate]:
+def _estimates(live: Live) -> dict[str, Estimate]:
     """Every parameter in the order of the subject, then what belongs to records."""
+    subject, task, made, found = live.subject, live.task, live.covariance, live.values
     own = {u.name: u for u in (*task.unknowns.unknowns, *task.residuals.own)}
-    errors, white = made.standard_errors, made.white_errors
     notes = dict(made.notes) | dict.fromkeys(made.at_bound, "at its bound")
     for group in made.undetermined:
         for name in group:
             others = ", ".join(n for n in group if n != name)
             notes[name] = f"not told from {others}" if others else "without influence"
+    columns = (made.standard_errors, made.low, made.high, made.white_errors)
     estimates: dict[str, Estimate] = {}
     for name in dict.fromkeys([*subject.variables, *task.residuals.names]):
         unknown = own.get(name)
         unit = unknown.unit if unknown else subject.variables[name].unit
+        unit = _in_forces(subject, name, unit, live.data.rotary)
         if name not in found:
             held, note = float(subject.held[name]), subject.reasons.get(name, "")
-            unit = _in_forces(subject, name, unit, turning)
             estimates[name] = Estimate(held, unit, fixed=True, note=note)
             continue
         i = made.names.index(name)
-        other = "tied" if name in subject.ties else ""
-        if not other and _known(errors[i]) is None:
-            other = "not told by the data"
-        estimates[name] = Estimate(
-            found[name], _in_forces(subject, name, unit, turning),
-            _known(errors[i]), _known(made.low[i]), _known(made.high[i]), _known(white[i]),
-            note=notes.get(name, other), nuisance=unknown is not None and unknown.nuisance,
-        )  # fmt: skip
+        error, low, high, white = (_known(column[i]) for column in columns)
+        other = "tied" if name in subject.ties else "not told by the data" * (error is None)
+        note, nuisance = notes.get(name, other), unknown is not None and unknown.nuisance
+        value = found[name]
+        estimates[name] = Estimate(value, unit, error, low, high, white, False, note, nuisance)
     return estimates
 
 
@@ -269,29 +243,29 @@ def _tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
     )
 
 
-def _series(
-    task: Task, point: Point, records: Sequence[str], verdict: Verdict, abscissa: str
-) -> tuple[Series, ...]:
-    channels = task.residuals.channels
+def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Series, ...]:
+    residuals, data = live.task.residuals, live.data
+    channels, r = residuals.channels, live.point.evaluation.r
+    timed = all(record.t is not None for record in data)
+    abscissa = "t [s]" if timed else ("v [rad/s]" if data.rotary else "v [m/s]")
     most = points_each(len(channels))
     return tuple(
-        series(c, records[c.record], point.evaluation.r, verdict.whiteness[label], abscissa, most)
-        for c, label in zip(channels, labels(task.residuals), strict=True)
+        series(c, records[c.record], r, verdict.whiteness[label], abscissa, most)
+        for c, label in zip(channels, labels(residuals), strict=True)
     )
 
 
-def _curve(
-    subject: Subject, law: Law | None, machine: Scene | None, data: Dataset, task: Task
-) -> Curve | None:
+def _curve(live: Live) -> Curve | None:
     """Friction over velocity, of a law that acts in a drive or was fitted to points."""
+    law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
         return of_drive(machine, data.records)
-    load = load_of(subject)
+    load = load_of(live.subject)
     if law is None or load is None:
         return None
     points = {
         data[c.record].name: (c.regressors.get("v", c.t), c.measured)
-        for c in task.residuals.channels
+        for c in live.task.residuals.channels
     }
     return of_points(law, load, points, data.rotary)
 

@@ -16,7 +16,7 @@ from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task
 from identification.unknowns.spec import Tied
-from identification.unknowns.subject import Subject
+from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import Covariance
 from symfric.foundation import checks
@@ -85,7 +85,7 @@ class Live:
         task: with the noise levels at the end.
         point: the minimum.
         covariance: of the values there.
-        model: with numbers.
+        closed: law, machine and model with numbers.
     """
 
     kind: Kind
@@ -94,7 +94,21 @@ class Live:
     task: Task
     point: Point
     covariance: Covariance
-    model: Model
+    closed: Closed
+
+    @classmethod
+    def of(
+        cls, kind: Kind, subject: Subject, data: Dataset, task: Task, point: Point,
+        covariance: Covariance,
+    ) -> "Live":  # fmt: skip
+        """The problem with the numbers of `point`."""
+        found = dict(zip(task.residuals.names, point.values.tolist(), strict=True))
+        return cls(kind, subject, data, task, point, covariance, subject.close(found))
+
+    @property
+    def model(self) -> Model:
+        """The model with numbers."""
+        return self.closed.model
 
     @property
     def values(self) -> dict[str, float]:

@@ -9,9 +9,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.differentiate import differentiate
 from identification.data.record import Record
 from identification.residuals.evaluation import Channel
-from identification.signals.differentiate import differentiate
 from identification.verdict.colour import Whiteness
 from symfric.foundation.brief import brief
 from symfric.foundation.status import Status

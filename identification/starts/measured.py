@@ -9,6 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.record import runs
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -195,8 +196,7 @@ def _events(measured: Measured, record: slice, rest: float, offset: float) -> It
     t, v = np.asarray(measured.t)[record], measured.v[record]
     F = measured.F[record] - offset
     still = np.abs(v) < rest * measured.fastest
-    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(int)))
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in runs(still):
         if end - begin < SHORTEST or end >= v.size:
             continue
         side = int(np.sign(v[end]))

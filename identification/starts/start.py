@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
+from identification.data.differentiate import differentiate
 from identification.data.findings import Findings
 from identification.residuals.points import Points
-from identification.signals.differentiate import differentiate
 from identification.starts.law_fit import fit_law, law_curve, velocity
 from identification.starts.maxwell_slip import HEADROOM, carrying, element_values, scaled, shared
 from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled

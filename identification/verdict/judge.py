@@ -222,16 +222,8 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
 
 def _white(name: str, found: Whiteness, colour: Colour) -> Test:
     if not found.lags.size:
-        return Test(
-            channel=name,
-            name="whiteness",
-            statistic=0.0,
-            p=1.0,
-            limit=WHITE,
-            passed=True,
-            decides=False,
-            sentence=f"{name}: not ordered in time.",
-        )
+        text = f"{name}: not ordered in time."
+        return Test(name, "whiteness", 0.0, 1.0, WHITE, True, False, text)
     passed = found.p >= WHITE
     text = f"The residuals of {name} look like white noise."
     if not passed:
@@ -243,16 +235,7 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
             if colour.order
             else ", too little to matter for the intervals."
         )
-    return Test(
-        channel=name,
-        name="whiteness",
-        statistic=found.statistic,
-        p=found.p,
-        limit=WHITE,
-        passed=passed,
-        decides=False,
-        sentence=text,
-    )
+    return Test(name, "whiteness", found.statistic, found.p, WHITE, passed, False, text)
 
 
 def _independent(
@@ -272,17 +255,8 @@ def _independent(
         )
         if passed:
             text = f"The residuals of {name} do not depend on {d.what}."
-        test = Test(
-            channel=name,
-            name=f"independence of {d.what}",
-            statistic=d.statistic,
-            p=d.p,
-            limit=limit,
-            passed=passed,
-            decides=True,
-            sentence=text,
-        )
-        yield test
+        test = f"independence of {d.what}"
+        yield Test(name, test, d.statistic, d.p, limit, passed, True, text)
 
 
 def _level(found: Minimum, channel: Channel) -> float:
@@ -308,21 +282,13 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     rms = float(np.sqrt(np.mean(left**2)))
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
     p = float(chdtrc(free, free * (rms / sigma) ** 2))
-    passed = p >= ALARM / len(found.channels) or rms <= resolution(channel.measured, channel.unit)
+    limit = ALARM / len(found.channels)
+    passed = p >= limit or rms <= resolution(channel.measured, channel.unit)
     text = (
         f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the noise "
         f"that was given."
     )
-    yield Test(
-        channel=name,
-        name="size",
-        statistic=rms / sigma,
-        p=p,
-        limit=ALARM / len(found.channels),
-        passed=passed,
-        decides=True,
-        sentence=text,
-    )
+    yield Test(name, "size", rms / sigma, p, limit, passed, True, text)
 
 
 def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:

@@ -20,8 +20,8 @@ MODULES = (
     "ocp.transcription.unknowns", "ocp.transcription.schemes",
     "identification.data.", "identification.fit", "identification.residuals.closed_loop",
     "identification.residuals.inverse", "identification.residuals.points",
-    "identification.residuals.shooting", "identification.result.", "identification.signals.filters",
-    "identification.unknowns.spec", "identification.verdict.",
+    "identification.residuals.shooting", "identification.result.", "identification.unknowns.spec",
+    "identification.verdict.",
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
 MOVED = {
@@ -76,7 +76,9 @@ MOVED = {
     "identification.data.loop": "identification.data.record",
     "identification.result.curve": "identification.result.series",
     "identification.result.estimate": "identification.result.series",
-    "identification.signals.velocity": "identification.signals.filters",
+    "identification.signals.differentiate": "identification.data.differentiate",
+    "identification.signals.filters": "identification.data.filters",
+    "identification.signals.velocity": "identification.data.filters",
     "identification.verdict.whiteness": "identification.verdict.colour",
 }
 """Module in older files -> module that holds its classes now."""

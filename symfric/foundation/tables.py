@@ -6,7 +6,6 @@ One reader for records to identify from and for inputs of a simulation.
 import csv
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from math import pi
 from pathlib import Path
 from re import fullmatch
 from typing import final
@@ -14,26 +13,18 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.units import parsed
+
 Array = NDArray[np.float64]
 Rows = list[tuple[int, list[str]]]
 """Row number in the file, cells."""
 
-FACTORS: dict[str, dict[str, float]] = {
-    "s": {
-        "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0,
-        "a": 365.25 * 86400.0, "yr": 365.25 * 86400.0,
-    },
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6},
-    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6},
-    "N m": {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "rev": 2 * pi},
-    "rad/s": {"rad/s": 1.0, "deg/s": pi / 180, "rpm": pi / 30},
+USUAL: Mapping[str, str] = {
+    "s": "s, ms, us, µs, min, h, d, a, yr", "m": "m, mm, cm, um, µm", "N": "N, mN, kN",
+    "m/s": "m/s, mm/s, um/s, µm/s", "N m": "N m, Nm, mN m, mNm, kN m, kNm",
+    "rad": "rad, mrad, deg, °, rev", "rad/s": "rad/s, deg/s, rpm",
 }  # fmt: skip
-"""Units a column may have and their factors, by SI unit; of other units only the unit itself.
-
-A rate may have any length or angle over any time, such as mm/a.
-"""
+"""SI unit -> units that are usual for it, for messages; a column may have any of its dimension."""
 
 
 @final
@@ -150,9 +141,9 @@ def _places(
             if factor is not None:
                 found[key] = hits[0], factor
             else:
-                taken = ", ".join(_known(column.unit))
+                usual = USUAL.get(column.unit, column.unit)
                 problems.append(
-                    f"column '{header[hits[0]]}': expected a unit of {taken} in brackets, "
+                    f"column '{header[hits[0]]}': expected a unit of {usual} in brackets, "
                     f"got {given or 'none'}"
                 )
         elif column.needed:
@@ -165,17 +156,12 @@ def _places(
     return found
 
 
-def _known(si: str) -> Mapping[str, float]:
-    return FACTORS.get(si, {si: 1.0})
-
-
 def _factor(si: str, given: str) -> float | None:
     """What numbers in the unit `given` are multiplied by to be in `si`; None for another unit."""
-    if given in _known(si):
-        return _known(si)[given]
-    above, _, below = map(str.strip, given.partition("/"))
-    of, over = FACTORS.get(si.removesuffix("/s"), {}), FACTORS["s"]
-    return of[above] / over[below] if si.endswith("/s") and above in of and below in over else None
+    meant, wanted = parsed(given or "?"), parsed(si)
+    if meant is None or wanted is None or meant.powers != wanted.powers:
+        return 1.0 if given == si else None
+    return meant.factor / wanted.factor
 
 
 def _label(cell: str) -> tuple[str, str]:

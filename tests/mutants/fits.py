@@ -2,11 +2,7 @@
 
 from mutants.mutant import Mutant
 
-DATA, SIGNALS, UNKNOWNS = (
-    "identification/data/",
-    "identification/signals/",
-    "identification/unknowns/",
-)
+DATA, UNKNOWNS = "identification/data/", "identification/unknowns/"
 RESIDUALS, SOLVING = "identification/residuals/", "identification/solving/"
 VERDICT, RESULT = "identification/verdict/", "identification/result/"
 STARTS = "identification/starts/"
@@ -17,10 +13,10 @@ T_DATASET = (f"{TESTS}data/test_dataset.py",)
 T_MERGE = (f"{TESTS}data/test_merge.py",)
 T_FAULTS = (f"{TESTS}data/test_check_faults.py",)
 T_GOOD = (f"{TESTS}data/test_check_good_records.py",)
-T_FILTERS = (f"{TESTS}signals/test_signals_filters.py",)
-T_DIFFERENTIATE = (f"{TESTS}signals/test_differentiate.py",)
-T_VELOCITY = (f"{TESTS}signals/test_velocity.py",)
-T_REGRESS = (f"{TESTS}signals/test_signals_regress.py",)
+T_FILTERS = (f"{TESTS}data/test_signals_filters.py",)
+T_DIFFERENTIATE = (f"{TESTS}data/test_differentiate.py",)
+T_VELOCITY = (f"{TESTS}data/test_velocity.py",)
+T_REGRESS = (f"{TESTS}data/test_signals_regress.py",)
 T_UNKNOWNS = (f"{TESTS}unknowns/test_unknowns.py",)
 T_SUBJECT = (f"{TESTS}unknowns/test_subject.py",)
 T_POINTS = (f"{TESTS}residuals/test_points.py",)
@@ -76,32 +72,32 @@ MEASURED = (
         "FROZEN = 8", "FROZEN = 1000", T_FAULTS,
     ),
     Mutant(
-        "the low pass has half its order", SIGNALS + "filters.py",
+        "the low pass has half its order", DATA + "filters.py",
         "gain = 1 / (1 + ratio ** (2 * order))", "gain = 1 / (1 + ratio**order)", T_FILTERS,
     ),
     Mutant(
-        "accelerations are differences of differences", SIGNALS + "differentiate.py",
+        "accelerations are differences of differences", DATA + "differentiate.py",
         "a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / step**2",
         "a = central_difference(central_difference(x, step), step)", T_DIFFERENTIATE,
     ),
     Mutant(
-        "what the low pass mixes with a reversal stays", SIGNALS + "differentiate.py",
+        "what the low pass mixes with a reversal stays", DATA + "differentiate.py",
         "around = ceil(0.5 / (filter.cutoff * step))", "around = 0", T_DIFFERENTIATE,
     ),
     Mutant(
-        "noise of the velocity is that before the low pass", SIGNALS + "filters.py",
+        "noise of the velocity is that before the low pass", DATA + "filters.py",
         "np.mean(gain**2 * self.noise[inside])", "np.mean(self.noise[inside])", T_VELOCITY,
     ),
     Mutant(
-        "the noisier one of two velocities weighs more", SIGNALS + "filters.py",
+        "the noisier one of two velocities weighs more", DATA + "filters.py",
         "weight = np.divide(of_x, both", "weight = np.divide(of_v, both", T_VELOCITY,
     ),
     Mutant(
-        "a difference of positions falls short of nothing", SIGNALS + "filters.py",
+        "a difference of positions falls short of nothing", DATA + "filters.py",
         "lost = 1 - np.sinc(2 * frequency)", "lost = 0 * frequency", T_VELOCITY,
     ),
     Mutant(
-        "Coulomb friction and offset are one column", SIGNALS + "differentiate.py",
+        "Coulomb friction and offset are one column", DATA + "differentiate.py",
         '"offset": np.ones_like(v)', '"offset": sign', T_REGRESS,
     ),
 )  # fmt: skip
@@ -304,7 +300,7 @@ JUDGED = (
 STORED = (
     Mutant(
         "the ends of an interval change places", RESULT + "build.py",
-        "_known(made.low[i]), _known(made.high[i])", "_known(made.high[i]), _known(made.low[i])",
+        "made.low, made.high, made.white_errors", "made.high, made.low, made.white_errors",
         T_FITTED,
     ),
     Mutant(
@@ -366,7 +362,7 @@ COMPARED = (
         "float(np.abs(left).max(initial=0.0))", "float(left.max(initial=0.0))", T_FITTED,
     ),
     Mutant(
-        "noise counts to the bandwidth of a force", SIGNALS + "filters.py",
+        "noise counts to the bandwidth of a force", DATA + "filters.py",
         "np.cumsum(power - noise)", "np.cumsum(power)", T_FILTERS,
     ),
     Mutant(

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
+from identification.data.differentiate import LinearFit, differentiate, linear_regression
+from identification.data.filters import Filter
 from identification.data.record import Record
 from identification.data.synthetic import synthetic_drive_data
-from identification.signals.differentiate import LinearFit, differentiate, linear_regression
-from identification.signals.filters import Filter
 from symfric.laws import Coulomb
 
 PUBLISHED = {

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
-from identification.signals.differentiate import plateaus
+from identification.data.differentiate import plateaus
 from symfric.laws import Stribeck
 
 LEVELS = (0.02, 0.05, 0.1, 0.2, -0.2, -0.1, -0.05, -0.02)

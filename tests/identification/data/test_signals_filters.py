@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identification.signals.filters import (
+from identification.data.filters import (
     Decimation,
     Filter,
     bandwidth,

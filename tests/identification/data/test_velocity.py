@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from identification.data.differentiate import derivatives, differentiate, linear_regression
+from identification.data.filters import Filter, Velocity, lowpass
 from identification.data.record import Record
 from identification.data.synthetic import synthetic_drive_data
-from identification.signals.differentiate import derivatives, differentiate, linear_regression
-from identification.signals.filters import Filter, Velocity, lowpass
 from symfric import law_from_text
 from symfric.foundation.parameters import with_values
 

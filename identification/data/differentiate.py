@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.record import Record
-from identification.signals.filters import (
+from identification.data.filters import (
     Decimation,
     Filter,
     Velocity,
@@ -24,6 +23,7 @@ from identification.signals.filters import (
     choose_filter,
     lowpass,
 )
+from identification.data.record import Record, runs
 from symfric.foundation import checks
 from symfric.foundation.brief import brief
 
@@ -271,9 +271,7 @@ def _stretches(v: Array, step: float, shortest: float, change: float) -> list[tu
     smooth = lowpass(v, cutoff, step)
     steady = np.abs(central_difference(smooth, step)) * shortest < change * np.abs(smooth)
     steady &= np.abs(smooth) > REST * np.abs(smooth).max()
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(int)))
-    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(b, e) for b, e in runs if (e - b) * step >= shortest]
+    return [(b, e) for b, e in runs(steady) if (e - b) * step >= shortest]
 
 
 RANK = 1e-7

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from identification.data.differentiate import differentiate
+from identification.data.filters import Filter, Velocity, lowpass
 from identification.data.record import Record
-from identification.signals.differentiate import differentiate
-from identification.signals.filters import Filter, Velocity, lowpass
 
 T = np.arange(4001) * 1e-3
 W = 2 * np.pi * 1.5

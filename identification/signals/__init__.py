@@ -1,1 +1,0 @@
-"""Filters, derivatives and features of measured signals."""
