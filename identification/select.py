@@ -34,6 +34,7 @@ from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
+from identification.result.text import columns
 from identification.solving.many_starts import Progress
 from symfric.foundation import checks
 from symfric.foundation.shown import Shown, Table
@@ -148,16 +149,9 @@ class Ranking:
 
     def __str__(self) -> str:
         lines = [HEADER[:-1], *(row.cells[:-1] for row in self.rows if row.fit is not None)]
-        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        widths[0] = max(widths[0], *(len(row.law) for row in self.rows), 0)
-        texts = [
-            "  ".join(
-                text.rjust(w) if j in NUMBERS else text.ljust(w)
-                for j, (text, w) in enumerate(zip(line, widths, strict=True))
-            ).rstrip()
-            for line in lines
-        ]
-        lost = [f"{r.law:{widths[0]}}  {LOST}: {r.sentence}" for r in self.rows if r.fit is None]
+        width = max(len(name) for name in (HEADER[0], *(row.law for row in self.rows)))
+        texts = columns([(f"{law:{width}}", *cells) for law, *cells in lines], NUMBERS)
+        lost = [f"{r.law:{width}}  {LOST}: {r.sentence}" for r in self.rows if r.fit is None]
         return "\n".join([self.title, *texts, *lost])
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]

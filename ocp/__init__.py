@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from ocp.checking.verification import Miss as Miss
     from ocp.checking.verification import Verification as Verification
     from ocp.checking.verify import verify as verify
-    from ocp.formulation.bounds import FREE as FREE
-    from ocp.formulation.bounds import Free as Free
-    from ocp.formulation.bounds import Range as Range
     from ocp.formulation.expressions import TIME as TIME
     from ocp.formulation.expressions import Cost as Cost
     from ocp.formulation.expressions import Signals as Signals
@@ -23,27 +20,30 @@ if TYPE_CHECKING:
     from ocp.formulation.expressions import integral as integral
     from ocp.formulation.expressions import track as track
     from ocp.formulation.expressions import worst as worst
+    from ocp.formulation.phase import FREE as FREE
     from ocp.formulation.phase import Chain as Chain
+    from ocp.formulation.phase import Free as Free
     from ocp.formulation.phase import Phase as Phase
+    from ocp.formulation.phase import Range as Range
     from ocp.formulation.problem import Problem as Problem
-    from ocp.formulation.templates import rest_to_rest as rest_to_rest
+    from ocp.formulation.problem import rest_to_rest as rest_to_rest
     from ocp.friction.event_check import set_valued as set_valued
     from ocp.friction.event_check import verify_exactly as verify_exactly
     from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
     from ocp.mpc.closed_loop import plot_loops as plot_loops
     from ocp.mpc.controller import Controller as Controller
     from ocp.mpc.controller import controller_of as controller_of
-    from ocp.result.solution import Mode as Mode
-    from ocp.result.solution import Solution as Solution
-    from ocp.result.solution import load as load
-    from ocp.result.solution import plot_solutions as plot_solutions
     from ocp.solve import solve as solve
-    from ocp.solvers.methods import Fatrop as Fatrop
-    from ocp.solvers.methods import Ipopt as Ipopt
-    from ocp.solvers.methods import Sqp as Sqp
-    from ocp.solvers.outcome import Progress as Progress
-    from ocp.solvers.outcome import SolverStatistics as SolverStatistics
+    from ocp.solving.methods import Fatrop as Fatrop
+    from ocp.solving.methods import Ipopt as Ipopt
+    from ocp.solving.methods import Sqp as Sqp
+    from ocp.solving.solution import Mode as Mode
+    from ocp.solving.solution import Solution as Solution
+    from ocp.solving.solution import load as load
+    from ocp.solving.solution import plot_solutions as plot_solutions
     from ocp.solving.starts import Guess as Guess
+    from ocp.transcription.program import Progress as Progress
+    from ocp.transcription.program import SolverStatistics as SolverStatistics
     from ocp.transcription.schemes import Legendre as Legendre
     from ocp.transcription.schemes import Radau as Radau
     from ocp.transcription.schemes import Shooting as Shooting

@@ -25,12 +25,12 @@ from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.checking.verify import verified
 from ocp.formulation.problem import Problem
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Iterate, Report
-from ocp.solving.one_solve import Clock, solution_of
+from ocp.solving.methods import Ipopt
+from ocp.solving.one_solve import solution_of
+from ocp.solving.prepared import Clock
+from ocp.solving.solution import Solution
 from ocp.solving.starts import start_of
-from ocp.transcription.program import Program
+from ocp.transcription.program import Iterate, Program, Report
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from ocp.formulation.problem import Problem, cost_size, sized
 from ocp.formulation.validate import doubts
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Fatrop, Ipopt, Sqp
-from ocp.solvers.outcome import Report
-from ocp.solving.one_solve import Clock, Solver
+from ocp.solving.methods import Fatrop, Ipopt, Sqp
+from ocp.solving.one_solve import Solver
+from ocp.solving.prepared import Clock
+from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
+from ocp.transcription.program import Report
+from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
 

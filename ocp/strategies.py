@@ -18,14 +18,14 @@ from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
 from ocp.friction.smooth_models import has_jumps, own_level, speeds_at
 from ocp.original_law import STEPS, OriginalLaw
-from ocp.result.motion import Stored
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Report
-from ocp.solving.one_solve import Clock, Solver
+from ocp.solving.methods import Ipopt
+from ocp.solving.motion import Stored
+from ocp.solving.one_solve import Solver
+from ocp.solving.prepared import Clock
+from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau, Scheme, Shooting
+from ocp.transcription.program import Report
+from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 

@@ -12,7 +12,7 @@ from symfric import Model, Variable
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
-from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.record import Dense
 from symfric.integrator.step.attempt import build_dense_step, build_fixed
 
 Array = NDArray[np.float64]

@@ -2,9 +2,8 @@
 
 import casadi as ca
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import TIME, at_end, integral, worst
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
 from symfric import BrownMcPhee, Model, Output, Variable, drive
 from symfric.multibody import JointSpringDamper, Mechanism, Revolute

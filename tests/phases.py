@@ -4,9 +4,8 @@ from typing import Any
 
 from motions import double_integrator, stage
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import TIME, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
 
 UNIT = double_integrator()

@@ -1,9 +1,9 @@
 """Opens built pages in headless Chromium: `python -m docs.machine.browser out/docs`.
 
 Each page is shown narrow, on a tablet, wide, dark and in print, and refused for what `look.js`
-finds (wider than the screen, cut, unreadable, not told to those who do not see it), for an error on
-its console and for anything it asks of the network. The search must find something. `--shots
-FOLDER` keeps a picture of each page in each of these; names behind it choose pages.
+finds (wider than the screen, cut, unreadable, without a text for those who do not see it), for an
+error on its console and for anything it asks of the network. The search must find something.
+`--shots FOLDER` keeps a picture of each page in each of these; names behind it choose pages.
 """
 
 import base64
@@ -141,7 +141,7 @@ LOOK = Path(__file__).with_name("look.js").read_text("utf-8")
 QUIET = ("search.html", "genindex.html", "py-modindex.html")
 """Pages that are nearly empty before somebody asks."""
 SOUGHT = "stribeck"
-"""What the search is asked for."""
+"""Word that the search must find."""
 
 
 @final

@@ -123,8 +123,8 @@ def place(text: str) -> Place | None:
     command = COMMAND.match(text)
     if command is not None and command[1] in COMMANDS:
         return "std", "ref", f"symfric-{command[1]}"
-    if bare in FRONTS:
-        return "std", "doc", f"/reference/{bare}"
+    if bare in FRONTS:  # a package whose names all stand on the page of its parent has none
+        return "std", "doc", f"/reference/{bare if catalogue()[bare] else bare.rpartition('.')[0]}"
     public = known().get(bare.rpartition(".")[2])
     if public is None or bare not in (public.name, public.full) or not callable(public.object):
         return None
@@ -277,7 +277,7 @@ SOURCES = re.compile(
 )
 YEAR = re.compile(r"\b1[6-9]\d\d\b|\b20\d\d\b")
 ASIDE = ("laws", "gallery", "bench", "stress", "cli")
-"""Rooms of symfric whose sources stand elsewhere, or are those of tables."""
+"""Packages of symfric whose sources stand elsewhere, or are those of tables."""
 
 
 def literature_page() -> str:

@@ -17,7 +17,7 @@ from docs.machine.pages import DOCS, ROOT, blocks, made_pictures, written_pages
 
 PACKAGES = ("symfric", "ocp", "identification")
 ASIDE = ("cli", "stress", "bench", "gallery", "embedded", "fmu")
-"""Rooms that pictures of laws, scenes and pages do not come from."""
+"""Packages that pictures of laws, scenes and pages do not come from."""
 
 
 @cache
@@ -42,7 +42,7 @@ def _is_text(statement: object) -> bool:
 
 @cache
 def code_hash() -> str:
-    """Of all code that pictures come from, less the rooms that stand aside."""
+    """Of all code that pictures come from, less the packages that are left out."""
     files = [p for name in PACKAGES for p in sorted((ROOT / name).rglob("*.py"))]
     kept = [p for p in files if p.relative_to(ROOT).parts[1] not in ASIDE]
     return digest(f"{p.relative_to(ROOT)} {code_of(p)}" for p in kept)

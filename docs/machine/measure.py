@@ -6,7 +6,7 @@ side by side.
 
 What `symfric bench SUBJECT` prints is kept as tables in `docs/benchmarks/SUBJECT.json`, with
 machine, load, versions, date and commit; the pages are made of these files alone. Measure on a
-machine that does nothing else; what else ran is told by the load, the mean number of processes that
+machine that does nothing else; the load shows what else ran, the mean number of processes that
 wanted a processor, before and after. `--quick` takes fewer points, and the page says so.
 """
 

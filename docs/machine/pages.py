@@ -106,7 +106,7 @@ def plain(text: str) -> str:
 
 
 def made_pictures(text: str, folder: Path) -> list[str]:
-    """Names of the pictures that blocks of the page in `folder` leave: those not beside it."""
+    """Names of the pictures that blocks of the page in `folder` leave, not those next to it."""
     return [name for _, name, _ in PICTURE.findall(text) if not (folder / name).exists()]
 
 

@@ -76,12 +76,12 @@ def make(app: Any) -> None:
 
 
 def say(sentence: str) -> None:
-    """A line on the error stream at once: Sphinx is told to be quiet, the long work is not."""
+    """A line on the error stream at once: Sphinx is set to be quiet, the long work is not."""
     print(f"docs: {sentence}", file=sys.stderr, flush=True)
 
 
 def show_made(app: Any, name: str, content: list[str]) -> None:
-    """Point a picture that is not beside its page to the one that its blocks made."""
+    """Point a picture that does not lie next to its page to the one that its blocks made."""
     page = Path(app.env.doc2path(name))
     if page.suffix != ".md":
         return

@@ -216,11 +216,3 @@ def count_of(y: Array) -> float:
     smallest = float(np.quantile(steps, 0.05))
     off = np.abs(steps / smallest - np.rint(steps / smallest)) if smallest > 0 else np.ones(1)
     return smallest if np.median(off) < 0.02 and smallest > 1e-12 * np.ptp(y) else 0.0
-
-
-def noise_of(y: Array) -> float:
-    """Standard deviation of the white part of a smooth signal, from its third differences."""
-    if y.size < 8:
-        return 0.0
-    third = np.diff(y, 3)
-    return float(1.4826 * np.median(np.abs(third - np.median(third))) / np.sqrt(20))

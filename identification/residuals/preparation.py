@@ -6,7 +6,6 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
@@ -27,7 +26,6 @@ from symfric.foundation.parameters import Variable
 from symfric.integrator import Hold, Linear
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
 """Tolerances to choose from, and that of what they are compared with."""
 BIAS = 0.1
@@ -69,13 +67,11 @@ class Preparation:
 
     def shots(self) -> Shots:
         """The residuals of all records, cut into windows."""
-        estimated = self.kind.estimates_dead_time
-        if estimated:
-            low, high = self.kind.dead_time
-            unknown = Unknown(
-                DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
-            )
-            self.own.append(unknown)
+        given = self.kind.dead_time
+        tau = None if isinstance(given, tuple) else given
+        if isinstance(given, tuple):
+            middle, width = sum(given) / 2, given[1] - given[0]
+            self.own.append(Unknown(DEAD_TIME, "s", middle, *given, width, nuisance=True))
         pieces, channels, rows = list[Shot](), list[Channel](), 0
         for number, record in enumerate(self.records):
             found = list(self._cut(number, record, rows))
@@ -84,14 +80,13 @@ class Preparation:
             rows = channels[-1].rows.stop
         model = plain(self.model, self.signals)
         names = tuple(v.name for v in model.p)
-        if estimated:
+        if tau is None:
             sampled = [n for n, given in self.inputs.items() if isinstance(given, str)]
             if not sampled:
                 raise ValueError(
                     "Shooting: dead_time: expected an input that is a channel, got none"
                 )
             model = delayed(model, sampled)
-        tau = self.kind.dead_time if not estimated else None
         backend = "compiled" if find_compiler() else "vm"
         shots = Shots(
             model=model,

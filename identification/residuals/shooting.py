@@ -219,11 +219,6 @@ class Shooting:
         object.__setattr__(self, "dead_time", numbers if len(numbers) == 2 else numbers[0])
 
     @property
-    def estimates_dead_time(self) -> bool:
-        """Whether the dead time is an unknown."""
-        return isinstance(self.dead_time, tuple)
-
-    @property
     def seconds(self) -> float | None:
         """Length of windows [s], once it is known; None: whole records.
 

@@ -5,7 +5,6 @@ from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.result.outcome import (
     MANY,
@@ -28,8 +27,6 @@ from identification.result.stored import source_of
 from identification.verdict.judge import Test
 from symfric.page import html
 from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
-
-Array = NDArray[np.float64]
 
 WINDOWS = 60
 """Beginnings of windows that are drawn."""

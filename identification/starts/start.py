@@ -6,7 +6,6 @@ from math import isfinite, sqrt
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.differentiate import differentiate
@@ -22,8 +21,6 @@ from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
 from symfric.scenes.blocks import Drive
-
-Array = NDArray[np.float64]
 
 STEADY = ("level", "viscous", "velocity scale", "")
 """Roles that the steady curve of a law tells."""

@@ -1,12 +1,4 @@
-"""How fine a measured signal is: below that, residuals say nothing of a model.
-
-Records that begin slowly with residuals far above the rest: states that nobody knew there.
-
-Bristles are taken as relaxed where a record begins near rest. If it was loaded before, the force is
-wrong until they have slid once, and stiffness and damping make up for it.
-
-
-What a fit is worth in view of its residuals.
+"""Judge a fit by the residuals that it leaves.
 
 A least-squares fit ends at a minimum whatever model it is given. A right model leaves noise that
 has nothing to do with what was applied and how the machine moved; white noise of the size that the
@@ -18,6 +10,11 @@ sensor has, if one is lucky. So
   value at its bound where much is left;
 * colour alone does not: intervals carry it, see `covariance`;
 * errors in the data, a mass at its bound, or residuals as large as the signal are no physics.
+
+Two limits precede the tests. Below the `resolution` of a measured signal, residuals say nothing of
+a model. Bristles are taken as relaxed where a record begins near rest; if the machine was loaded
+before, the force is wrong until they have slid once, and stiffness and damping make up for it
+(`beginnings`).
 """
 
 from collections.abc import Iterator, Mapping

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
 from ocp.transcription.blocks import Entries, Piece, Selection
-from ocp.transcription.grid import split
+from ocp.transcription.schemes import split
 from ocp.transcription.transcription import LARGEST, Transcription
 from ocp.transcription.unknowns import SpanLayout
 from symfric.foundation.parameters import Variable

@@ -16,12 +16,12 @@ from ocp.checking.interval_errors import local_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, near_runs
 from ocp.formulation.problem import Problem
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Report, in_stage
-from ocp.solvers.prepared import Prepared
+from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver, solve_on
+from ocp.solving.prepared import Prepared
+from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
+from ocp.transcription.program import Report, in_stage
 from ocp.transcription.schemes import Radau, Scheme, Shooting
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Skeleton

@@ -3,7 +3,7 @@
 An `Arc` is the optimised motion of one span as numbers that a simulation takes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final
@@ -183,19 +183,27 @@ class Run:
         return float((half * GAUSS_WEIGHTS * values).sum())
 
 
-def resimulated(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Run, ...]:
+def resimulated(
+    arcs: Sequence[Arc],
+    rtol: float = RTOL,
+    follow: Callable[[Arc, Mapping[str, float]], Run | None] | None = None,
+) -> tuple[Run, ...]:
     """Runs of the models under the controls that were optimised, held on each interval.
 
     A phase starts where the one before it really ended, as its links say; states without a link
     start where the optimiser put them. Behind a run that fails the rest of its scenario is left
     out: there is no place where it could start.
+
+    `follow` makes the run of an arc from its start, or none; by default the user's model does.
     """
     runs: list[Run] = []
     for arc in arcs:
         before = runs[-1] if arc.span.phase and runs else None
         if arc.span.phase and (before is None or not before.ok or _behind(before, arc)):
             continue
-        runs.append(run_from(arc, 0, start_after(arc, before), rtol))
+        start = start_after(arc, before)
+        made = run_from(arc, 0, start, rtol) if follow is None else follow(arc, start)
+        runs += [] if made is None else [made]
     return tuple(runs)
 
 

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
 from ocp.checking.verification import Miss, Verification
-from ocp.formulation.bounds import (
+from ocp.formulation.phase import (
     FREE,
     Box,
+    Row,
     fixed,
 )
-from ocp.formulation.phase import Row
 from ocp.formulation.problem import Problem
-from ocp.result.solution import Solution
+from ocp.solving.solution import Solution
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 from symfric.foundation.symbols import stacked
@@ -289,7 +289,7 @@ def _judged(
     """What runs of the arcs, in the order of time, say."""
     bad = next((run for run in runs if not run.ok), None)
     value = float("nan") if bad else cost_of(problem, runs)
-    checked = [*_looked(problem, runs), *map(_local, arcs, errors)]
+    checked = [*looked(problem, runs), *map(_local, arcs, errors)]
     if bad is None:
         checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, _size(runs, value)))
     return Verification(
@@ -304,15 +304,15 @@ def _judged(
     )
 
 
-def _looked(problem: Problem, runs: Sequence[Run]) -> Iterator[Miss]:
-    """Everything that runs were to do."""
+def looked(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
+    """Everything that runs were to do; with `optimised` their ends against those of the solver."""
     for _, of_arc in groupby(runs, lambda run: run.arc.number):
         yield from between_nodes(list(of_arc))
     for run in runs:
         if run.trajectory.span[1] < run.end:
             continue
         yield from at_nodes(run)
-        yield from against_optimised(run)
+        yield from against_optimised(run) if optimised else ()
     for before, after in pairwise(runs):
         if before.ok and after.ok and after.arc.number == before.arc.number + 1:
             yield from joined(before, after) if after.arc.span.phase else ()

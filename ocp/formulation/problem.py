@@ -1,4 +1,4 @@
-"""An optimal control problem, and nominal values from its ends and bounds.
+"""An optimal control problem, nominal values from its ends and bounds, and its form in files.
 
 Solvers see unknowns and costs over their typical magnitudes. A `nominal` of 1 is what a variable
 has that was given none: far from the wanted values it is taken from these, and so is one that is
@@ -18,21 +18,14 @@ from typing import Any, Literal, final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.bounds import Free, Range, as_box
-from ocp.formulation.expressions import arguments
-from ocp.formulation.phase import Chain, Span
+from ocp.formulation.expressions import TIME, arguments, integral
+from ocp.formulation.phase import Chain, Free, Phase, Range, Span, as_box
 from ocp.formulation.resolve import function_problems, resolved
-from ocp.formulation.statement import (
-    Choice,
-    Statement,
-    chosen_of,
-    rate_name,
-    rebuilt,
-    settings_of,
-)
+from ocp.formulation.statement import Choice, Statement, chosen_of, rate_name, rebuilt, settings_of
 from ocp.formulation.validate import input_problems, kind_problems
+from symfric.foundation import checks
 from symfric.foundation.variable import Variable
-from symfric.model import Model
+from symfric.model import Model, check_model
 
 FAR = 100.0
 """Factor between a size and 1 from which on it counts."""
@@ -210,3 +203,101 @@ def _with_nominals(model: Model, sizes: Sizes) -> Model:
 
     again = partial(_with_nominals, sizes=sizes)
     return rebuilt(model, again, x=named(model.x), u=named(model.u))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PosedPhase:
+    """A phase: name, model as it was given, and duration [s]."""
+
+    name: str
+    model: Model
+    T: float | Free
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Posed:
+    """A problem of a file: enough to verify and to draw a solution, and to start others from it.
+
+    Costs, conditions and links are expressions in `spans`; the functions that users wrote are
+    not kept, so that it is not solved again: write the problem, and give the solution as `guess`.
+
+    Attributes:
+        name, spans, chain, chosen, kind, scenario_names, shared_inputs: as those of a `Problem`.
+        periodic, choose: names.
+        durations: numbers of the phases whose durations add up to something.
+    """
+
+    name: str
+    spans: tuple[Span, ...]
+    chain: tuple[PosedPhase, ...]
+    chosen: tuple[Choice, ...]
+    kind: Literal["sum", "mean", "worst"]
+    scenario_names: tuple[str, ...]
+    shared_inputs: tuple[str, ...]
+    periodic: tuple[str, ...]
+    choose: tuple[str, ...]
+    durations: tuple[tuple[int, ...], ...]
+
+    def __repr__(self) -> str:
+        return f"<problem '{self.name}' of a file: {len(self.chain)} phases>"
+
+    def __getattr__(self, name: str) -> object:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise AttributeError(
+            f"problem '{self.name}' of a file: expected what a file keeps, got {name}; write the "
+            "problem again, and give the loaded solution as guess"
+        )
+
+
+def posed(problem: Problem | Posed) -> Posed:
+    """The part of a problem that a file keeps."""
+    if isinstance(problem, Posed):
+        return problem
+    return Posed(
+        problem.name,
+        problem.spans,
+        tuple(PosedPhase(phase.name, phase.model, phase.T) for phase in problem.chain),
+        problem.chosen,
+        problem.kind,
+        problem.scenario_names,
+        problem.shared_inputs,
+        tuple(problem.periodic),
+        tuple(problem.choose),
+        tuple(tuple(phases) for phases, _ in problem.durations),
+    )
+
+
+def rest_to_rest(
+    model: Model,
+    distance: float,
+    T: float | Free,
+    *,
+    limit: float,
+    position: str = "x",
+    velocity: str = "v",
+    force: str = "force",
+) -> Problem:
+    """Move a mass over `distance` [m] from rest to rest, with |force| <= `limit` [N].
+
+    With a given duration `T` [s] the move of least effort, min int force^2 dt; with
+    `T=Free(lower, upper)` the fastest one, min T.
+
+    Raises:
+        ValueError: what `Problem` finds wrong, such as a model without these signals.
+    """
+    check_model("rest_to_rest", model)
+    names = [v.name for group in (model.x, model.u) for v in group]
+    for name in (position, velocity, force):
+        checks.choice(f"rest_to_rest of '{model.name}'", name, names)
+    limit = checks.number("rest_to_rest: limit", limit, unit="N", above=0.0)
+    move = Phase(
+        model,
+        T,
+        start={position: 0.0, velocity: 0.0},
+        end={position: distance, velocity: 0.0},
+        bounds={force: (-limit, limit)},
+    )
+    return Problem(move, TIME if isinstance(T, Free) else integral(lambda s: s[force] ** 2))

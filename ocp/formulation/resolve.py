@@ -12,9 +12,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.bounds import FREE, Box, Free, as_box, fixed, meet
 from ocp.formulation.evaluate_callbacks import Written, gathered, written
-from ocp.formulation.phase import Array, Link, Row, Span
+from ocp.formulation.phase import FREE, Array, Box, Free, Link, Row, Span, as_box, fixed, meet
 from ocp.formulation.statement import (
     Choice,
     Setting,

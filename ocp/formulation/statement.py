@@ -12,9 +12,18 @@ from typing import Any, TypeVar, final
 
 import casadi as ca
 
-from ocp.formulation.bounds import Box, Free, Range, as_box, is_range
 from ocp.formulation.expressions import Cost
-from ocp.formulation.phase import Chain, PathCondition, Phase, Ranges
+from ocp.formulation.phase import (
+    Box,
+    Chain,
+    Free,
+    PathCondition,
+    Phase,
+    Range,
+    Ranges,
+    as_box,
+    is_range,
+)
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
 from symfric.model import Model
@@ -252,17 +261,25 @@ def _with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
     }
     added = symbols_of(rates[v.name] for v in states)
     inputs = tuple(rates.get(v.name, v) for v in model.u)
-    changes: dict[str, Any] = {"x": (*model.x, *states), "u": inputs}
-    mechanics = model.holonomic
-    if mechanics is not None:
-        inner = mechanics.inner
-        if inner is not None:  # an unknown of its own, which no other equation makes
-            inner = replace(inner, groups=(*inner.groups, symbols_of(states)))
-        together = ca.vertcat(mechanics.rates, added)
-        changes["holonomic"] = replace(mechanics, rates=together, inner=inner)
-    elif model.ode is not None:
-        changes["ode"] = ca.vertcat(ca.SX(model.ode), added)
-    return rebuilt(model, partial(with_rates, nominal=nominal), **changes)
+    changes = further_states(model, states, added)
+    return rebuilt(model, partial(with_rates, nominal=nominal), u=inputs, **changes)
+
+
+def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:
+    """Changed fields of `model` with further `states`, behind its own, that change at `rates`.
+
+    In a mechanism they join `holonomic.rates`; no other equation makes them.
+    """
+    x, mechanics = (*model.x, *states), model.holonomic
+    if mechanics is None:
+        ode = ca.SX(0, 1) if model.ode is None else ca.SX(model.ode)
+        return {"x": x, "ode": ca.vertcat(ode, rates)}
+    inner = mechanics.inner
+    if inner is not None and states:
+        inner = replace(inner, groups=(*inner.groups, symbols_of(states)))
+    together = replace(mechanics, rates=ca.vertcat(mechanics.rates, rates), inner=inner)
+    # ode and alg are made of `holonomic` once more
+    return {"x": x, "holonomic": together, "ode": None, "alg": ca.SX(0, 1)}
 
 
 def with_parameters(model: Model, units: Mapping[str, str]) -> Model:

@@ -8,9 +8,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import inf, isfinite
 from typing import Any
 
-from ocp.formulation.bounds import RANGE, Free, as_box, is_range
 from ocp.formulation.expressions import Cost
-from ocp.formulation.phase import Chain, Phase
+from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range
 from ocp.formulation.statement import (
     Statement,
     costs_of,

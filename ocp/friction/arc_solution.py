@@ -15,17 +15,15 @@ from ocp.formulation.phase import (
     Span,
 )
 from ocp.formulation.problem import Problem
-from ocp.friction.arc_models import CAUGHT, FIRST, PULLED, STOPPED, breaks_away
 from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.mode_models import SIDES
 from ocp.friction.sequence import Leg, flat, placed, shown, tracks_of
-from ocp.friction.transfer import Known, points_in
-from ocp.result.motion import Motion, motion_of
-from ocp.result.solution import Mode, Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics
-from ocp.solvers.prepared import Option
-from ocp.solving.one_solve import Clock
+from ocp.friction.transfer import CAUGHT, FIRST, PULLED, STOPPED, Known, breaks_away, points_in
+from ocp.solving.methods import Ipopt
+from ocp.solving.motion import Motion, motion_of
+from ocp.solving.prepared import Clock, Option
+from ocp.solving.solution import Mode, Solution
+from ocp.transcription.program import Iterate, Outcome, Report, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
@@ -99,33 +97,28 @@ class Solved:
         found: list[NDArray[np.bool_]] = []
         spans, arcs = self.transcription.problem.spans, flat(self.legs)
         for span, arc, points in zip(spans, arcs, self.points.spans, strict=True):
-            model, n = span.model, points.u.shape[1]
             rooms = [
-                model.outputs[f"{name}{FIRST}{side}"].expression
+                span.model.outputs[f"{name}{FIRST}{side}"].expression
                 for name, mode in arc.modes.items()
                 for side in SIDES.values()
                 if not mode
             ]
-            rows = ca.Function("rooms", span.symbols, [stacked(map(ca.SX, rooms))]).map(n)
-            t, z, p = np.zeros((1, n)), points.z[:, :: points.z.shape[1] // n], span.p[:, None]
-            values = rows(t, points.nodes[:, :-1], z, points.u, np.tile(p, (1, n))).full()
-            found.append((values < 0.0).any(axis=0))
+            outside = _at_starts(span, points, rooms) < 0.0
+            found.append(np.any(outside, axis=0))
         return tuple(found)
 
     def pressed(self, margin: float) -> bool:
         """Whether some rest, or what ends or begins one, is as close to its level as it may be."""
         spans = self.transcription.problem.spans
         for span, points in zip(spans, self.points.spans, strict=True):
-            n, outputs = points.u.shape[1], span.model.outputs
+            outputs = span.model.outputs
             rooms = {name: o.expression for name, o in outputs.items() if FIRST in name}
             rooms |= {
                 name: ca.SX(o.expression) + (0 if PULLED in name else margin)
                 for name, o in outputs.items()
                 if name.endswith((PULLED, CAUGHT, STOPPED))
             }
-            column = ca.Function("rooms", span.symbols, [stacked(map(ca.SX, rooms.values()))])
-            z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
-            values = column.map(n)(np.zeros((1, n)), points.nodes[:, :-1], z, points.u, p).full()
+            values = _at_starts(span, points, [*rooms.values()])
             for name, row in zip(rooms, values, strict=True):
                 if (row if FIRST in name else row[:1]).min() < NEAR * margin:
                     return True
@@ -219,6 +212,14 @@ class ModeSolver:
         outcome = self.clock.run(transcription, prepared, cold, self.progress, stage)
         durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]
         return Solved(placed(legs, durations), discretisation, transcription, outcome)
+
+
+def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> Array:
+    """Return values of expressions at the starts of all intervals of a span, (rows, N)."""
+    n = points.u.shape[1]
+    rows = ca.Function("rows", span.symbols, [stacked(map(ca.SX, expressions))]).map(n)
+    z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
+    return rows(np.zeros((1, n)), points.nodes[:, :-1], z, points.u, p).full()
 
 
 def _sawn(problem: Problem) -> dict[int, list[Row]]:

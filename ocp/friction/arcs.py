@@ -32,13 +32,12 @@ from typing import TypeVar, final
 
 import casadi as ca
 
-from ocp.formulation.bounds import Free, Range, meet
-from ocp.formulation.phase import Chain, Phase, Start
+from ocp.formulation.phase import Chain, Free, Phase, Range, Start, meet
 from ocp.formulation.problem import Problem
 from ocp.formulation.statement import Duration
-from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
 from ocp.friction.mode_models import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
+from ocp.friction.transfer import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
 from symfric.foundation.symbols import stacked
 from symfric.model import Contact, Model
 

@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.statement import further_states
 from ocp.friction.mode_models import loops_of, mode_model, nominal_load, slip_change
 from ocp.friction.smooth_models import jumps
 from symfric.foundation.parameters import Variable
@@ -218,14 +219,8 @@ def _ending(model: Model, events: tuple[Event, ...], rooms: Mapping[str, ca.SX])
     overload of what rests: nothing moves there.
     """
     states = tuple(Variable(name, "s") for name in rooms)
-    changes: dict[str, Any] = {"events": events, "x": (*model.x, *states)}
     rates = ca.vertcat(ca.SX(0, 1), *rooms.values())
-    if model.holonomic is None:
-        changes["ode"] = ca.vertcat(_rates(model), rates)
-    else:
-        mechanics = replace(model.holonomic, rates=ca.vertcat(model.holonomic.rates, rates))
-        changes |= {"holonomic": mechanics, "ode": None, "alg": ca.SX(0, 1)}
-    return replace(model, **changes)
+    return replace(model, events=events, **further_states(model, states, rates))
 
 
 def _rates(model: Model) -> ca.SX:

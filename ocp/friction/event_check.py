@@ -1,11 +1,18 @@
-"""The motion with exact Coulomb friction and stiction, by events: the referee of all that smooths.
+"""The motion with exact Coulomb friction and stiction, by events: the check of all that smooths.
 
     slip    F = law.sliding(v, N, side)     until v = 0
     stick   F with dv/dt = 0                until it reaches the static level of a side
 
 in pieces that end at changes of mode and where an input jumps. Each piece is a run of the model in
 its modes (`mode_models`), smooth from end to end, to a tolerance of its own; between the pieces
-`decide` says which contacts rest. No width, no penalty: what smooth laws tend to.
+`decided` (`contact_modes`) says which contacts stick. No width, no penalty: what smooth laws tend
+to.
+
+`simulate` with `ExactCoulomb` moves explicit models and mechanisms alike (the tests compare both).
+This engine stays for what that law does not do: any law by its sliding force and static level,
+without building the model again; normal forces that are algebraic unknowns of the friction itself,
+where `symfric.model.holding` refuses the applied force; the most overloaded contact first, after
+which all is decided again; and a refusal where no motion, or more than one, is consistent.
 
 Limits: what it cannot decide it does not (`SolveError`): several consistent motions, none (friction
 that jams), reactions without a solution; contacts of a loop of several degrees of freedom are no
@@ -14,25 +21,23 @@ more than these. Contacts in balls keep their laws.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.checking.resimulate import Arc, Run, arcs_of
+from ocp.checking.resimulate import Arc, Run, arcs_of, resimulated
 from ocp.checking.verification import Miss, Verification
-from ocp.checking.verify import at_nodes, between_nodes, cost_of, joined, periodic
-from ocp.formulation.problem import Problem
+from ocp.checking.verify import cost_of, looked
 from ocp.friction.contact_modes import Instant, Machine, Modes, decided
 from ocp.friction.exact_motion import Given, Inputs, Piece, SetValued
-from ocp.result.solution import Solution
+from ocp.solving.solution import Solution
 from symfric import Hold, Trajectory, simulate
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
-from symfric.foundation.symbols import stacked, symbols_of
+from symfric.foundation.symbols import symbols_of
 from symfric.integrator.equations.initial import JammedError
 from symfric.model import Model
 from symfric.model.model import check_model
@@ -286,10 +291,9 @@ def verify_exactly(
     tolerance = checks.number("verify_exactly: tolerance", tolerance, above=0.0)
     problem = solution.problem
     arcs = arcs_of(problem, solution.meshes, solution.points)
-    found, failed = _followed(arcs, rtol)
-    runs = [Run(arc, motion.trajectory, arc.end) for arc, motion in found]
+    runs, _, failed = _followed(arcs, rtol)
     value = float("nan") if failed else cost_of(problem, runs)
-    checked = list(_asked(problem, runs))
+    checked = list(looked(problem, runs, optimised=False))
     if not failed:
         size = max(abs(value), abs(solution.cost)) or 1.0
         checked.append(Miss("cost", "the cost", runs[-1].end, value, solution.cost, size))
@@ -312,52 +316,27 @@ def motions(solution: Solution, rtol: float = RTOL) -> tuple[SetValued, ...]:
         ValueError: as `verify_exactly`.
     """
     arcs = arcs_of(solution.problem, solution.meshes, solution.points)
-    return tuple(motion for _, motion in _followed(arcs, rtol)[0])
+    return tuple(_followed(arcs, rtol)[1])
 
 
-def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[list[tuple[Arc, SetValued]], str]:
-    """Arcs with their motions, one after the other, and why that of one has no end."""
-    found: list[tuple[Arc, SetValued]] = []
-    failed = ""
-    for arc in arcs:
-        before = found[-1] if arc.span.phase and found else None
-        if arc.span.phase and (before is None or before[0].number != arc.number - 1):
-            continue
+def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[SetValued], str]:
+    """Runs of the arcs with exact friction, their motions, and why that of one has no end."""
+    found, failures = list[SetValued](), list[str]()
+
+    def follow(arc: Arc, start: Mapping[str, float]) -> Run | None:
         rows = zip(arc.span.model.u, arc.u, strict=True)
         try:
             motion = set_valued(
-                arc.span.model, arc.end, t_start=float(arc.times[0]), x0=_start_of(arc, before),
+                arc.span.model, arc.end, t_start=float(arc.times[0]),
+                x0={name: x for name, x in start.items() if np.isfinite(x)},
                 u={v.name: Hold(arc.times[:-1], row) for v, row in rows}, p=arc.parameters(),
                 t_eval=arc.times, rtol=rtol,
             )  # fmt: skip
         except SolveError as error:
-            failed = failed or str(error)
-            continue
-        found.append((arc, motion))
-    return found, failed
+            failures.append(str(error))
+            return None
+        found.append(motion)
+        return Run(arc, motion.trajectory, arc.end)
 
-
-def _start_of(arc: Arc, before: tuple[Arc, SetValued] | None) -> dict[str, float]:
-    """Where the model starts: as the links of its phase say, else where it was optimised."""
-    start = arc.state(0)
-    if before is not None and arc.span.links:
-        motion = before[1]
-        column = stacked(link.expression for link in arc.span.links)
-        ends = motion.trajectory.of(column, np.array([motion.span[1]]))
-        start |= {link.state: float(x) for link, x in zip(arc.span.links, ends[:, 0], strict=True)}
-    return {name: x for name, x in start.items() if np.isfinite(x)}
-
-
-def _asked(problem: Problem, runs: Sequence[Run]) -> Iterator[Miss]:
-    """Everything that the runs were to do."""
-    for run in runs:
-        yield from at_nodes(run)
-        yield from between_nodes([run])
-    for before, after in pairwise(runs):
-        if after.arc.span.phase and before.arc.number == after.arc.number - 1:
-            yield from joined(before, after)
-    if problem.periodic:
-        last = {run.arc.number: run for run in runs}
-        for first in (run for run in runs if run.arc.span.phase == 0):
-            end = last.get(first.arc.number + len(problem.chain) - 1)
-            yield from periodic(problem, first, end) if end is not None else ()
+    runs = resimulated(arcs, follow=follow)
+    return runs, found, next(iter(failures), "")

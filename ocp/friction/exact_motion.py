@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.friction.contact_modes import Modes
-from ocp.result.solution import Mode
+from ocp.solving.solution import Mode
 from symfric import Hold, Linear, Statistics, Trajectory
 from symfric.foundation import checks
 from symfric.foundation.status import Status

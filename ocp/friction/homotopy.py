@@ -30,23 +30,21 @@ from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
-from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Free
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scale, Scales, same_size, scales_of, widths_at
-from ocp.result.motion import (
+from ocp.solving.methods import Ipopt
+from ocp.solving.motion import (
     Stored,
     stored_spans,
 )
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics
-from ocp.solvers.prepared import Prepared
-from ocp.solving.one_solve import Clock, Solver, solution_of
-from ocp.solving.random_starts import starts_around
+from ocp.solving.one_solve import Solver, solution_of, starts_around
+from ocp.solving.prepared import Clock, Prepared
+from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start, resample, start_of
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Scheme
+from ocp.transcription.program import Iterate, Outcome, Report, SolverStatistics
+from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points

@@ -41,10 +41,10 @@ from ocp.friction.sequence import (
     shown,
 )
 from ocp.friction.transfer import Known, Reading, sequence_of, sizes_of, starts_at_rest
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Report
-from ocp.solving.one_solve import Clock
+from ocp.solving.methods import Ipopt
+from ocp.solving.prepared import Clock
+from ocp.solving.solution import Solution
+from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ocp.formulation.phase import Chain, Span
 from ocp.formulation.problem import Problem
+from ocp.solving.one_solve import along_points
 from ocp.transcription.unknowns import (
     Points,
     SpanPoints,
@@ -18,7 +19,7 @@ from ocp.transcription.unknowns import (
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
-from symfric.foundation.symbols import at_start
+from symfric.foundation.symbols import at_start, strays
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
@@ -301,12 +302,7 @@ def values_at(span: Span, contact: Contact, points: SpanPoints) -> Array:
 
     A normal force that needs the friction force of another contact is zero here.
     """
-    at = ca.Function(
-        "at", span.symbols, [ca.vertcat(contact.slip, ca.SX(contact.N))], {"allow_free": True}
-    )
-    if at.has_free():
-        at = ca.Function("at", span.symbols, [ca.vertcat(contact.slip, 0.0)])
-    count = points.inner.shape[1]
-    held = np.repeat(points.u, count // points.u.shape[1], axis=1)
-    p = np.tile(span.p[:, None], count)
-    return np.asarray(at.map(count)(np.zeros((1, count)), points.inner, points.z, held, p))
+    column = ca.vertcat(contact.slip, ca.SX(contact.N))
+    if strays(column, ca.vertcat(*span.symbols)):
+        column = ca.vertcat(contact.slip, 0.0)
+    return along_points(span, points, column)

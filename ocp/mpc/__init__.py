@@ -2,9 +2,9 @@
 
 from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
 from ocp.mpc.controller import Controller as Controller
+from ocp.mpc.controller import ControllerCheck as ControllerCheck
+from ocp.mpc.controller import GeneratedController as GeneratedController
 from ocp.mpc.controller import controller_of as controller_of
 from ocp.mpc.design import CycleStatus as CycleStatus
 from ocp.mpc.session import Action as Action
 from ocp.mpc.session import Session as Session
-from ocp.mpc.to_c import ControllerCheck as ControllerCheck
-from ocp.mpc.to_c import GeneratedController as GeneratedController

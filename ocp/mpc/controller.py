@@ -1,4 +1,4 @@
-"""Model predictive controllers made of problems."""
+"""Model predictive controllers made of problems, and their C in files."""
 
 from __future__ import annotations
 
@@ -7,25 +7,136 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from re import fullmatch
+from tempfile import TemporaryDirectory
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.problem import Problem
-from ocp.mpc.closed_loop import ClosedLoop, Reference, run_closed_loop
-from ocp.mpc.design import Control, Design, Settings
-from ocp.mpc.from_problem import horizon_of
-from ocp.mpc.horizon import Horizon
+from ocp.mpc.closed_loop import SLACK, ClosedLoop, Optimality, Reference, run_closed_loop
+from ocp.mpc.design import Control, CycleData, CycleStatus, Design, Settings
+from ocp.mpc.horizon import Horizon, horizon_of
 from ocp.mpc.session import BACKENDS, Session
-from ocp.mpc.source import timed
-from ocp.mpc.to_c import GeneratedController, write_c
+from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
+from symfric.codegen.runner import compile_object, needed_symbols
+from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
+from symfric.foundation.files import write_text
 from symfric.model import Model
 
 Array = NDArray[np.float64]
+
+ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
+    "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos", "memcpy", "memmove",
+    "memset", "_GLOBAL_OFFSET_TABLE_",
+}  # fmt: skip
+"""Symbols that the object file may need: math.h, and copies that the compiler itself makes."""
+
+TINY = float(np.finfo(float).tiny)
+
+
+@final
+@dataclass(frozen=True)
+class ControllerCheck:
+    """Result of checking generated C.
+
+    Attributes:
+        status: "verified", or the reason in a sentence.
+        cycles: that were judged.
+        warnings: what the compiler warned of.
+        foreign: what the object file needs besides functions of math.h; None without `nm`.
+        difference: largest relative difference of a control from its plan, and of a residual, as
+            far as it is above the tolerance, from the second opinion; rounding is allowed.
+        bytes: size of the struct that holds plan and work space.
+    """
+
+    status: str
+    cycles: int
+    warnings: tuple[str, ...]
+    foreign: tuple[str, ...] | None
+    difference: float
+    bytes: int
+
+    @property
+    def ok(self) -> bool:
+        """No warnings, nothing foreign, plans as optimal as reported."""
+        return self.status == "verified"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GeneratedController:
+    """Files that `Controller.to_c` wrote.
+
+    Attributes:
+        folder: where the files are.
+        files: header and source.
+        design: of the controller.
+    """
+
+    folder: Path
+    files: tuple[Path, Path]
+    design: Design
+
+    def verify(self, cycles: int = 100) -> ControllerCheck:
+        """Compile the files and judge what they compute by a second opinion; see `ControllerCheck`.
+
+        The loop is closed through the controller's own model, with noise, references that jump,
+        far states, and measured numbers that are not finite. The second opinion on each residual is
+        that of `Controller.simulate`: derivatives by CasADi of the whole program.
+        """
+        compiler, design = find_compiler(), self.design
+        if compiler is None:
+            reason = "not verified: no C compiler found; install gcc or clang, or set CC"
+            return ControllerCheck(reason, 0, (), None, np.inf, 0)
+        try:
+            with TemporaryDirectory(prefix="symfric-") as name:
+                target = Path(name) / "controller.o"
+                warnings = tuple(compile_object(compiler, self.files[1], target))
+                needed = needed_symbols(target)
+            session = Session(design, *(f.read_text("utf-8") for f in self.files))
+            difference = _difference(design, session, cycles)
+        except CompileError as error:
+            return ControllerCheck(f"not verified: {error}", 0, (), None, np.inf, 0)
+        foreign = None if needed is None else tuple(sorted(needed - ALLOWED))
+        wrong = [f"{len(warnings)} warnings"] * bool(warnings)
+        wrong += [f"needs {', '.join(foreign)}"] if foreign else []
+        wrong += [f"differs by {difference:.1e}"] * (difference > SLACK)
+        status = f"failed: {'; '.join(wrong)}" if wrong else "verified"
+        return ControllerCheck(status, cycles, warnings, foreign, difference, session.bytes)
+
+
+def _difference(design: Design, session: Session, cycles: int) -> float:
+    """Largest relative difference over a loop that is hard on the controller."""
+    h, random, opinion = design.horizon, np.random.default_rng(0), Optimality(design)
+    own = list(design.measured)
+    nominal, settings = h.model.nominal("x")[own], design.settings
+    measured, worst, goals = design.x0[own], 0.0, design.r0
+    for k in range(cycles):
+        if k % 25 == 0:
+            goals = design.r0 + random.normal(size=design.r0.size)
+        if k % 100 == 99:
+            measured = 10.0 * nominal * random.normal(size=nominal.size)
+        if k % 60 == 59:
+            measured = np.full(nominal.size, np.nan)
+        t = h.step * (k + np.arange(h.count + 1.0))
+        data = CycleData(np.tile(goals, (h.count + 1, 1)), t, design.p0, design.bounds)
+        action = session.cycle(measured, data, settings.tolerance, settings.iterations)
+        plan, pairs = session.plan, list[tuple[float, float, float]]()
+        if action.status is not CycleStatus.FAILED:
+            planned = (c.of(plan.X, plan.U, data.b) for c in design.controls)
+            given = zip(action.controls.values(), planned, strict=True)
+            pairs += [(u, v, TINY) for u, v in given]
+        if action.status not in (CycleStatus.FAILED, CycleStatus.BAD_INPUT):
+            pairs += [(x, y, TINY) for x, y in zip(plan.X[0, own], measured, strict=True)]
+            pairs.append((action.residual, opinion.residual(plan, data), settings.tolerance))
+        worst = max([worst, *(abs(a - b) / max(abs(b), size) for a, b, size in pairs)])
+        measured = plan.X[1, own] + 0.01 * nominal * random.normal(size=nominal.size)
+    return float(worst)
+
 
 OWN = ("residual", "violation", "iterations", "program_iterations", "status", "converged")
 """Members of what the C hands out, besides the controls."""
@@ -128,18 +239,9 @@ class Controller:
             CompileError: as `start`.
         """
         return run_closed_loop(
-            self.design,
-            self.start(backend),
-            plant,
-            t_end,
-            references or {},
-            x0=x0,
-            p=p,
-            plant_p=plant_p,
-            noise=noise,
-            seed=seed,
-            check=check,
-        )
+            self.design, self.start(backend), plant, t_end, references or {},
+            x0=x0, p=p, plant_p=plant_p, noise=noise, seed=seed, check=check,
+        )  # fmt: skip
 
     def to_c(self, folder: str | Path) -> GeneratedController:
         """Write the controller as C99: `NAME.h` and `NAME.c`.
@@ -151,7 +253,11 @@ class Controller:
         Raises:
             ValueError: no folder, or an operation that C99 lacks.
         """
-        return write_c(self.design, folder)
+        design, place = self.design, checks.path("to_c: folder", folder)
+        files = place / f"{design.name}.h", place / f"{design.name}.c"
+        for file, text in zip(files, (header(design), source(design)), strict=True):
+            write_text(file, text)
+        return GeneratedController(place, files, design)
 
 
 def controller_of(

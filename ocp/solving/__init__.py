@@ -1,1 +1,1 @@
-"""One solve of a problem on meshes, and where it starts."""
+"""Solvers, one solve of a problem on meshes, where it starts, and its solution by name."""

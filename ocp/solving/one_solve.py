@@ -1,93 +1,198 @@
 """One solve: a problem on meshes, a solver and a start make a solution, as it is.
 
-Nothing is refined, sharpened or verified here; `ocp.solve` does these by calling this.
+Nothing is refined, sharpened or verified here; `ocp.solve` does these by calling this. Random
+starts near a given one keep its ends, and take other ways between them.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from math import isfinite, pi
 from time import perf_counter
-from typing import Any, final
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Box, Free, Span
 from ocp.formulation.problem import Problem
-from ocp.result.motion import Motion, motion_of
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Fatrop, Ipopt, Sqp
-from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
-from ocp.solvers.prepared import Prepared
-from ocp.solving.starts import Start, start_of
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.program import Place
-from ocp.transcription.schemes import Radau, Scheme
+from ocp.solving.methods import Fatrop, Ipopt, Sqp
+from ocp.solving.motion import Motion, motion_of
+from ocp.solving.prepared import Prepared
+from ocp.solving.solution import Solution
+from ocp.solving.starts import Start, rates_of, start_of
+from ocp.transcription.program import Outcome, Report
+from ocp.transcription.schemes import Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
-from ocp.transcription.unknowns import (
-    Points,
-    SpanPoints,
-)
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import Status
 from symfric.model.contact import Contact
 
-LEAST = 1e-3
-"""A solver is given some time at least [s], and stops at once."""
 Array = NDArray[np.float64]
+WAVES = 4
+"""Half waves of which a perturbation is made."""
+Wave = Callable[[Array], Array]
+HALF_WAVES = np.arange(1, 4)
+"""Numbers of half waves over the whole motion of which a deviation is made."""
+STILL = 0.3
+"""Share of the nominal value by which a state deviates that stays where it is in the given start
+and has no other of its unit to take the size from."""
+
+
+def perturbed(into: Transcription, points: Points, scale: float, seed: int) -> Points:
+    """`points` with a random smooth deviation, the same one on every mesh.
+
+    Each signal is moved by a sum of half waves whose standard deviation is `scale` times its
+    magnitude: half the width of its bounds where these are finite, else its largest value or its
+    nominal one. Free durations and chosen parameters are multiplied by exp(scale r / 2), r normal.
+    Values that are asked for stay: solvers put them back to their bounds.
+
+    Args:
+        into: what the points belong to.
+        points: what to start from, `initial_points(into)`.
+        scale: 0.1 is close by, 1 anywhere within the bounds.
+        seed: of NumPy's default generator.
+    """
+    checks.number("perturbed: scale", scale, lower=0.0)
+    random = np.random.default_rng(seed)
+    spans: list[SpanPoints] = []
+    for number, (span, old) in enumerate(zip(into.problem.spans, points.spans, strict=True)):
+        mesh, inner = into.meshes[number], into.inner_fractions(number)
+        model = span.model
+        x = [_wave(random, scale * _size(span.box(v.name), v.nominal, row))
+             for v, row in zip(model.x, old.nodes, strict=True)]  # fmt: skip
+        z = [_wave(random, scale * _size(span.box(v.name), v.nominal, row))
+             for v, row in zip(model.z, old.z, strict=True)]  # fmt: skip
+        u = [_wave(random, scale * _size(span.box(v.name), v.nominal, row))
+             for v, row in zip(model.u, old.u, strict=True)]  # fmt: skip
+        factor = float(np.exp(0.5 * scale * random.standard_normal()))
+        spans.append(
+            SpanPoints(
+                _within(old.T * factor, span.T) if isinstance(span.T, Free) else old.T,
+                old.nodes + _rows(x, mesh),
+                old.inner + _rows(x, inner),
+                old.z + _rows(z, inner),
+                old.u + _rows(u, (mesh[1:] + mesh[:-1]) / 2),
+            )
+        )
+    chosen = {
+        c.name: float(
+            np.clip(
+                points.chosen[c.name] * np.exp(0.5 * scale * random.standard_normal()),
+                c.lower,
+                c.upper,
+            )
+        )
+        for c in into.problem.chosen
+    }
+    return Points(tuple(spans), chosen)
+
+
+def _within(value: float, box: Free) -> float:
+    return min(max(value, box.lower), box.upper)
+
+
+def _wave(random: np.random.Generator, size: float) -> Wave:
+    """A random sum of half waves over [0, 1] with standard deviation `size`."""
+    a = random.standard_normal((2, WAVES)) * size / np.sqrt(WAVES)
+
+    def at(fractions: Array) -> Array:
+        angles = pi * np.arange(1, WAVES + 1)[:, None] * fractions
+        return a[0] @ np.sin(angles) + a[1] @ np.cos(angles)
+
+    return at
+
+
+def _rows(waves: Sequence[Wave], fractions: Array) -> Array:
+    table = [wave(fractions) for wave in waves]
+    return np.array(table).reshape(len(table), fractions.size)
+
+
+def _size(box: Box, nominal: float, row: Array) -> float:
+    """The magnitude of a signal."""
+    low, high = box
+    if isfinite(low) and isfinite(high):
+        return 0.5 * (high - low)
+    return float(max(nominal, np.abs(row).max(initial=0.0)))
+
+
+def starts_around(
+    into: Transcription, begin: Points, seeds: Iterable[int], spread: float
+) -> tuple[Points, ...]:
+    """`begin` for the seed 0, a random smooth deviation from it for any other.
+
+    A state deviates by half waves over the whole motion, `spread` times the distance it goes in
+    `begin`, less in short waves; the rate of another state (x' = v) by the rate of its deviation,
+    so that both belong together. Inputs deviate by `spread` times a quarter of their range.
+
+    Args:
+        into: what the points belong to.
+        begin: the first start.
+        seeds: of NumPy's default generator.
+        spread: of the deviations; 0.5 leads to most local optima of a swing-up.
+    """
+    return tuple(_around(into, begin, spread, seed) if seed else begin for seed in seeds)
+
+
+def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Points:
+    problem, phases = into.problem, len(into.problem.chain)
+    random = np.random.default_rng(seed)
+    names = {v.name for s in problem.spans for group in (s.model.x, s.model.u) for v in group}
+    waves = {name: spread * random.standard_normal(HALF_WAVES.size) for name in sorted(names)}
+    sizes = _distances(into, begin)
+    spans: list[SpanPoints] = []
+    for number, (span, old) in enumerate(zip(problem.spans, begin.spans, strict=True)):
+        first = number - span.phase
+        whole = sum(points.T for points in begin.spans[first : first + phases])
+        start = sum(points.T for points in begin.spans[first:number]) / whole
+        mesh, inner = into.meshes[number], into.inner_fractions(number)
+        positions = rates_of(span.model)
+        nodes, points, u = old.nodes.copy(), old.inner.copy(), old.u.copy()
+        for states, fractions in ((nodes, mesh), (points, inner)):
+            at = pi * (start + old.T / whole * fractions)[:, None] * HALF_WAVES
+            for row, v in zip(states, span.model.x, strict=True):
+                name = positions.get(v.name)
+                if name is None:
+                    row += sizes[v.name] * (np.sin(at) / HALF_WAVES) @ waves[v.name]
+                else:
+                    row += sizes[name] * pi / whole * np.cos(at) @ waves[name]
+        middles = pi * (start + old.T / whole * (mesh[1:] + mesh[:-1]) / 2)[:, None] * HALF_WAVES
+        for row, v in zip(u, span.model.u, strict=True):
+            row += _reach(span.box(v.name), v.nominal) * np.sin(middles) @ waves[v.name]
+        spans.append(SpanPoints(old.T, nodes, points, old.z, u))
+    return Points(tuple(spans), begin.chosen)
+
+
+def _distances(into: Transcription, begin: Points) -> dict[str, float]:
+    """State -> how far it goes in `begin`, over all spans."""
+    ranges: dict[str, list[float]] = {}
+    units: dict[str, str] = {}
+    nominals: dict[str, float] = {}
+    for span, points in zip(into.problem.spans, begin.spans, strict=True):
+        for v, row in zip(span.model.x, points.nodes, strict=True):
+            ranges.setdefault(v.name, []).extend((float(row.min()), float(row.max())))
+            units[v.name], nominals[v.name] = v.unit, v.nominal
+    gone = {name: max(found) - min(found) for name, found in ranges.items()}
+    alike = {
+        unit: max(gone[name] for name in gone if units[name] == unit) for unit in units.values()
+    }
+    return {name: way or alike[units[name]] or STILL * nominals[name] for name, way in gone.items()}
+
+
+def _reach(box: Box, nominal: float) -> float:
+    """How far an input deviates."""
+    low, high = box
+    return 0.25 * (high - low) if isfinite(low) and isfinite(high) else nominal
+
+
 NARROW = 0.02
 """A width below this share of the largest sliding velocity is one that Newton steps jump over."""
 NAMED = 3
 """Contacts that a sentence names."""
 Solver = Ipopt | Fatrop | Sqp
-
-
-@final
-@dataclass(frozen=True)
-class Clock:
-    """Runs from when it is made.
-
-    Attributes:
-        allowed: wall time [s] for all, or None for any.
-    """
-
-    allowed: float | None = None
-    started: float = field(default_factory=perf_counter)
-
-    @property
-    def left(self) -> float | None:
-        """What is left [s]; None for any."""
-        if self.allowed is None:
-            return None
-        return max(LEAST, self.allowed - (perf_counter() - self.started))
-
-    @property
-    def over(self) -> bool:
-        """Whether nothing is left."""
-        return self.left == LEAST
-
-    def within(self, prepared: Prepared) -> Prepared:
-        """`prepared` with what is left as its limit, if that is less than its own."""
-        left = self.left
-        if left is None or (prepared.max_time is not None and prepared.max_time <= left):
-            return prepared
-        return replace(prepared, max_time=left, told_time=self.allowed)
-
-    def run(
-        self,
-        transcription: Transcription,
-        prepared: Prepared,
-        start: Iterate,
-        progress: Report | None,
-        stage: str,
-        values: ArrayLike | None = None,
-    ) -> Outcome:
-        """One solve within what is left, whose progress is that of a `stage`."""
-        at = partial(when, transcription)
-        return self.within(prepared).run(start, values, in_stage(progress, stage), at=at)
 
 
 def narrow_widths(transcription: Transcription, points: Points) -> str:
@@ -110,7 +215,7 @@ def narrow_widths(transcription: Transcription, points: Points) -> str:
 
 def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
     """Widths of a contact that are small against how it moves, each with its number."""
-    slip = _along(span, at, contact.slip)
+    slip = along_points(span, at, contact.slip)[0]
     fastest = float(np.abs(slip).max(initial=0.0))
     turns = slip.size > 0 and bool(slip.min() <= 0.0 <= slip.max())
     law: Any = contact.law  # which is Parametric
@@ -131,15 +236,15 @@ def _width_number(value: Any, span: Span) -> float:
     return float(function(span.p))
 
 
-def _along(span: Span, at: SpanPoints, expression: ca.SX) -> Array:
-    """An expression at the collocation points, or at the nodes where there are none."""
+def along_points(span: Span, at: SpanPoints, column: ca.SX) -> Array:
+    """Values at the collocation points, or at the nodes where there are none, (rows, points)."""
     inner = at.inner.shape[1]
     x, n = (at.inner, inner) if inner else (at.nodes[:, :-1], at.u.shape[1])
     u = np.repeat(at.u, n // at.u.shape[1], axis=1)
     z = at.z if at.z.shape[1] == n else np.zeros((at.z.shape[0], n))
     p = np.tile(span.p[:, None], (1, n))
-    function = ca.Function("along", span.symbols, [expression])
-    return function.map(n)(np.zeros((1, n)), x, z, u, p).full().ravel()
+    function = ca.Function("along", span.symbols, [column])
+    return function.map(n)(np.zeros((1, n)), x, z, u, p).full()
 
 
 def solve_once(
@@ -201,7 +306,7 @@ def solve_on(
         numbers,
         progress,
         fits if warm is None else warm and fits,
-        partial(when, transcription),
+        transcription.when,
     )
     return solution_of(transcription, outcome)
 
@@ -246,19 +351,3 @@ def motions_of(transcription: Transcription, points: Points) -> tuple[Motion, ..
         meshes = transcription.meshes[part]
         found.append(motion_of(name, spans, points.spans[part], meshes, scheme, points.chosen))
     return tuple(found)
-
-
-def when(transcription: Transcription, w: Array, place: Place) -> str:
-    """The time of a place, in words; its phase and scenario where there are several."""
-    problem = transcription.problem
-    span, phases = problem.spans[place.span], len(problem.chain)
-    words: list[str] = []
-    if np.isfinite(place.fraction):
-        durations = [part.T for part in transcription.unpack(w).spans]
-        begin = sum(durations[place.span - span.phase : place.span])
-        words.append(f"at t = {begin + place.fraction * durations[place.span]:.4g} s")
-    if phases > 1:
-        words.append(f"in {span.name}")
-    if problem.scenario_names:
-        words.append(f"of scenario {problem.scenario_names[span.scenario]}")
-    return " ".join(words)

@@ -9,12 +9,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.formulation.bounds import Box, Free
-from ocp.formulation.phase import Link, Span
+from ocp.formulation.phase import Box, Free, Link, Span
 from ocp.formulation.problem import Problem
-from ocp.result.motion import Stored, StoredSpan, along, structure_of
-from ocp.result.solution import Solution
-from ocp.solvers.outcome import Iterate
+from ocp.solving.motion import Stored, StoredSpan, along, structure_of
+from ocp.solving.solution import Solution
+from ocp.transcription.program import Iterate
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks

@@ -21,8 +21,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.bounds import Box, Free, fixed, meet
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Box, Free, Span, fixed, meet
 from ocp.transcription.blocks import Array, Block, Indices, Piece, Rows, block, order_of
 from ocp.transcription.schemes import Coefficients
 from ocp.transcription.unknowns import Data, Layout, Local, SpanPoints

@@ -8,8 +8,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Row, Span
+from ocp.formulation.phase import Free, Row, Span
 from ocp.formulation.problem import Problem
 from ocp.transcription.blocks import (
     LAST,

@@ -8,12 +8,13 @@ the discrete map. Bounds and path conditions hold at the nodes.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Span
+from ocp.formulation.statement import further_states
 from ocp.transcription.blocks import LAST, Block, Piece, Rows, block, order_of, select
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Data, Layout, Local
@@ -91,20 +92,12 @@ def with_cost(span: Span) -> tuple[Model, int]:
     shifted = model.t + start.symbol
     cost = () if span.running.is_zero() else (Variable("shooting_cost", "1"),)
     rates = stacked([ca.substitute(span.running, model.t, shifted)] if cost else [])
-    changes: dict[str, Any] = {"x": (*model.x, *cost), "p": (*model.p, start)}
+    changes = further_states(model, cost, rates)
     if model.holonomic is None:
-        ode, alg = ca.substitute(
-            [model.function("ode")(*span.symbols), model.alg], [model.t], [shifted]
-        )
+        ode = model.function("ode")(*span.symbols)
+        ode, alg = ca.substitute([ode, model.alg], [model.t], [shifted])
         changes |= {"ode": ca.vertcat(ode, rates), "alg": alg}
-    else:
-        mechanics = model.holonomic
-        inner = mechanics.inner
-        if inner is not None:
-            inner = replace(inner, groups=(*inner.groups, *(v.symbol for v in cost)))
-        together = replace(mechanics, rates=ca.vertcat(mechanics.rates, rates), inner=inner)
-        changes |= {"holonomic": together, "ode": None, "alg": ca.SX(0, 1)}
-    return replace(model, **changes), len(cost)
+    return replace(model, p=(*model.p, start), **changes), len(cost)
 
 
 def _check(span: Span) -> None:

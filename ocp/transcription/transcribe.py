@@ -14,8 +14,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.bounds import Box, Free
-from ocp.formulation.phase import Row
+from ocp.formulation.phase import Box, Free, Row
 from ocp.formulation.problem import Problem
 from ocp.transcription.assembly import Slot, assemble
 from ocp.transcription.blocks import Array, Piece
@@ -38,9 +37,16 @@ from ocp.transcription.conditions import (
     plain_links,
     whole,
 )
-from ocp.transcription.grid import bounds_of, check_meshes, nodes_of, scale_of
 from ocp.transcription.program import Program
-from ocp.transcription.schemes import Coefficients, Scheme, Shooting
+from ocp.transcription.schemes import (
+    Coefficients,
+    Scheme,
+    Shooting,
+    bounds_of,
+    check_meshes,
+    nodes_of,
+    scale_of,
+)
 from ocp.transcription.shooting import Shot, pieces_of_intervals, shot
 from ocp.transcription.transcription import LARGEST, Skeleton, Transcription, numbers_of
 from ocp.transcription.unknowns import Data, Layout, Local, Sizes, lay_out

@@ -9,15 +9,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Free, Span
 from ocp.formulation.problem import Problem
 from ocp.transcription.assembly import Assembled
 from ocp.transcription.blocks import Array, Indices, Piece
 from ocp.transcription.closed_loops import Closing
-from ocp.transcription.grid import check_meshes
-from ocp.transcription.program import Places, Program, Stages, stages_of
-from ocp.transcription.schemes import Scheme
+from ocp.transcription.program import Place, Places, Program, Stages, stages_of
+from ocp.transcription.schemes import Scheme, check_meshes
 from ocp.transcription.unknowns import Layout, Points, SpanPoints
 from symfric.foundation.parameters import check_names
 
@@ -147,6 +145,20 @@ class Transcription:
         """T of a span [s], chosen or fixed."""
         T = self.problem.spans[span].T
         return points.spans[span].T if isinstance(T, Free) else float(T)
+
+    def when(self, w: Array, place: Place) -> str:
+        """Return the time of a place in words; its phase and scenario where there are several."""
+        problem, span = self.problem, self.problem.spans[place.span]
+        words: list[str] = []
+        if np.isfinite(place.fraction):
+            durations = [part.T for part in self.unpack(w).spans]
+            begin = sum(durations[place.span - span.phase : place.span])
+            words.append(f"at t = {begin + place.fraction * durations[place.span]:.4g} s")
+        if len(problem.chain) > 1:
+            words.append(f"in {span.name}")
+        if problem.scenario_names:
+            words.append(f"of scenario {problem.scenario_names[span.scenario]}")
+        return " ".join(words)
 
     def inner_fractions(self, span: int) -> Array:
         """Collocation points of a span as fractions of T, shape (N d,)."""

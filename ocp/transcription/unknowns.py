@@ -8,8 +8,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Free, Span
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, select
 from symfric.foundation.symbols import stacked
 

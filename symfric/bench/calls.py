@@ -185,7 +185,7 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
 
 
 def _events(quick: bool) -> Iterator[CallRow]:
-    """Exact memory, element by element, beside its smooth form."""
+    """Exact memory, element by element, and its smooth form."""
     elements = 4 if quick else 30
     pairs: dict[str, Callable[[str], Law]] = {
         f"rabinowicz gms, {elements} elements": partial(_gms, elements),

@@ -1,4 +1,4 @@
-"""Generated code as it runs: units beside `simulate`; compensators in the loop of a drive."""
+"""Generated code as it runs: units and `simulate`; compensators in the loop of a drive."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -158,7 +158,7 @@ CONTROLLER = Cascade(kp=20.0, kv=60.0, ki=10.0)
 GOAL = 5.0
 """Times that the RMS error is to be smaller."""
 PROVEN = "excess 0"
-"""The case whose numbers stand beside the goals."""
+"""The case whose numbers have goals."""
 
 
 @final

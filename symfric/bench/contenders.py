@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench.table import FASTEST, compile_time
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.arguments import chosen
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.compiler import library
@@ -31,9 +31,9 @@ from symfric.integrator.equations.initial import (
 )
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
@@ -274,15 +274,7 @@ def _beginning(model: Model, whole: System) -> Callable[..., Array]:
 def buffered(function: ca.Function) -> tuple[Array, Callable[[], None], Array]:
     """First argument, call and first result of a Function, without conversions."""
     given, found = np.zeros(function.numel_in(0)), np.zeros(function.numel_out(0))
-    buffer, call = cast(tuple[Any, Any], function.buffer())
-    buffer.set_arg(0, flat_view(given))
-    buffer.set_res(0, flat_view(found))
-
-    def evaluate(_: object = buffer) -> None:
-        # the raw call does not keep its buffer alive; the default argument does
-        call()
-
-    return given, evaluate, found
+    return given, bound(function, (given,), (found,)), found
 
 
 def compiled(function: ca.Function) -> tuple[ca.Function, float]:

@@ -33,7 +33,7 @@ name of the case measures its rows: `case(quick)`."""
 @final
 @dataclass(frozen=True)
 class Row(table.Judged):
-    """One measured number beside its goal.
+    """One measured number and its goal.
 
     Attributes:
         case, what: which problem, and what was measured with its unit.

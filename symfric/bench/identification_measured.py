@@ -265,7 +265,7 @@ def franka(quick: bool) -> Iterator[Row]:
 
 
 def _bristles() -> Iterator[tuple[str, Law, list[str]]]:
-    """Laws and what is free beside levels, viscous coefficient and Stribeck velocity."""
+    """Laws and what is free besides levels, viscous coefficient and Stribeck velocity."""
     yield "LuGre", LuGre(), ["delta"]
     elements = tuple(Element(1e3, 1 / ELEMENTS) for _ in range(ELEMENTS))
     stiffnesses = [f"k_{i + 1}" for i in range(ELEMENTS)]

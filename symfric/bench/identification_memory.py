@@ -1,4 +1,4 @@
-"""Friction with memory: six parameters of LuGre, beside single shooting with cvodes; GMS."""
+"""Friction with memory: six parameters of LuGre, compared with single shooting with cvodes; GMS."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

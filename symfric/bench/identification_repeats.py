@@ -125,7 +125,7 @@ def _covered(kind: str, rho: float, truth: dict[str, float], found: list[_Seed])
 
 
 def _added(seeds: int) -> Row:
-    """Scatter of the estimates with a noisy velocity beside the position, over that without."""
+    """Scatter of the estimates with a noisy velocity besides the position, over that without."""
     begun = process_time()
     off: dict[str, list[Array]] = {"x": [], "x and v": []}
     true = np.array(list(BLOCK.values()))

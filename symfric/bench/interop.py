@@ -73,7 +73,7 @@ class Move(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Run:
-    """One integrator of CasADi on 20 s of stick-slip beside `simulate` at rtol 1e-10.
+    """One integrator of CasADi on 20 s of stick-slip, compared with `simulate` at rtol 1e-10.
 
     Attributes:
         integrator: of `casadi.integrator`, or "symfric".

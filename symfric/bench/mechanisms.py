@@ -6,9 +6,8 @@ solutions in minimal coordinates (`tests/mechanics.py`).
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from symfric.bench.table import best_time, compile_time
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
@@ -229,12 +228,7 @@ def step_time(made: Integrator) -> float:
     S = State.at(0.0, 1e-4, y)
     R = Given.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
     S_out, D = np.zeros(S.size), np.zeros(made.step.numel_out(1))
-    buffer, evaluate = cast(tuple[Any, Any], made.step.buffer())
-    for i, column in enumerate((S, R)):
-        buffer.set_arg(i, flat_view(column))
-    for i, column in enumerate((S_out, D)):
-        buffer.set_res(i, flat_view(column))
-    return best_time(partial(evaluate), budget=0.1, most=1000)[0]
+    return best_time(bound(made.step, (S, R), (S_out, D)), budget=0.1, most=1000)[0]
 
 
 SMOOTH = Viscous(sigma_2=0.0)

@@ -1,4 +1,4 @@
-"""Mechanisms: run time at equal error beside others, cost of the step, what is counted and met."""
+"""Mechanisms: run time at equal error compared with others, cost of the step, counts."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -121,7 +121,7 @@ class MultibodyBenchmark(table.Report):
         compiled: what building and compiling a step takes.
         counts: unknowns, operations and nonzeros of variants of a mechanism.
         chains: the step of chains of growing length.
-        facts: reference numbers beside ours.
+        facts: reference numbers and ours.
         norms: what constraints leave over.
         drifts: energy of frictionless mechanisms.
         skipped: what did not run -> why.
@@ -137,7 +137,7 @@ class MultibodyBenchmark(table.Report):
     skipped: dict[str, str] = field(default_factory=dict[str, str])
 
     def loosest(self, case: str, integrator: str, bound: float) -> RunRow | None:
-        """The run with the fewest steps asked for whose error is at most `bound`, if any."""
+        """The run with the fewest requested steps whose error is at most `bound`, if any."""
         rows = [r for r in self.runs if (r.case, r.integrator) == (case, integrator)]
         by_steps = integrator == EXUDYN
         rows.sort(key=lambda r: r.setting if by_steps else -r.setting)

@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import set_valued
-from ocp.problems.catalogue import READY
-from ocp.problems.ready import Ready
-from ocp.result.solution import Solution
+from ocp.problems import READY, Ready
 from ocp.solve import solve
-from ocp.solving.random_starts import perturbed
+from ocp.solving.one_solve import perturbed
+from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, initial_points
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.bench import table
 from symfric.bench.ocp_contenders import Attempt, has_rockit, opti, rockit

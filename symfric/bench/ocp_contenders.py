@@ -17,8 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Free, Span
 from ocp.formulation.problem import Problem
 
 Array = NDArray[np.float64]

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from ocp.formulation.expressions import at_end, effort, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.problems.friction import cart_pendulum, guide
-from ocp.solvers.methods import Ipopt
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.problems import cart_pendulum, guide
+from ocp.solving.methods import Ipopt
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.bench.table import interleaved
 from symfric.foundation.compiler import find_compiler

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from symfric.bench import table
 from symfric.figures.regularisation import (
-    Bed,
+    Machine,
     Regularisation,
     Sample,
     distance,
@@ -235,16 +235,16 @@ def _measured(
     """The rows of a case: tolerance by tolerance, width by width."""
     knob = regularisation("bench", case.law)
     model = case.scene(case.law).model(knob.names)
-    bed = Bed(case.name, lambda _: model, case.t_end, case.of, free=True, backend=backend)
-    reference, of_what, uncertain = _reference(case, knob, bed, factors)
-    cycles = replace(bed, of=last_cycle) if case.cycle else None
+    machine = Machine(case.name, lambda _: model, case.t_end, case.of, free=True, backend=backend)
+    reference, of_what, uncertain = _reference(case, knob, machine, factors)
+    cycles = replace(machine, of=last_cycle) if case.cycle else None
     exact = _reference(case, knob, cycles, factors)[0] if cycles else None
     name, unit = knob.names[0], parameters(case.law)[knob.names[0]].unit
     rows: list[RegularisationRow] = []
     for rtol in rtols:
         before: tuple[float, float] | None = None
         for s in factors:
-            run = _at(bed, knob, s, rtol, rounds)
+            run = _at(machine, knob, s, rtol, rounds)
             error, in_cycle, order = distance(run, reference), nan, nan
             if cycles and exact:
                 in_cycle = distance(_at(cycles, knob, s, rtol), exact)
@@ -271,22 +271,22 @@ def _measured(
     return rows
 
 
-def _at(bed: Bed, knob: Regularisation, s: float, rtol: float, rounds: int = 1) -> Sample:
-    return sample(bed, knob.law, rtol, s, knob.values(s), rounds)
+def _at(machine: Machine, knob: Regularisation, s: float, rtol: float, rounds: int = 1) -> Sample:
+    return sample(machine, knob.law, rtol, s, knob.values(s), rounds)
 
 
 def _reference(
-    case: Case, knob: Regularisation, bed: Bed, factors: Sequence[float]
+    case: Case, knob: Regularisation, machine: Machine, factors: Sequence[float]
 ) -> tuple[Sample, str, float]:
     """The motion with dry friction, what it is, and its error."""
     if case.exact is not None:
         law = case.exact(case.law)
         exact = case.scene(law).model()
-        own = Bed(case.name, lambda _: exact, case.t_end, bed.of, backend="vm")
+        own = Machine(case.name, lambda _: exact, case.t_end, machine.of, backend="vm")
         fine = sample(own, law, FINE)
         return fine, type(law).__name__, max(FINE, distance(sample(own, law, 10 * FINE), fine))
     last = factors[-1] * BEYOND
-    coarse, middle, finest = (_at(bed, knob, last * r**2, FINE) for r in (4.0, 2.0, 1.0))
+    coarse, middle, finest = (_at(machine, knob, last * r**2, FINE) for r in (4.0, 2.0, 1.0))
     wide, near = distance(coarse, middle), distance(middle, finest)
     order = log(wide / near) / log(4.0) if wide > near > 0 else nan
     name = knob.names[0]

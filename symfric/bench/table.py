@@ -1,4 +1,4 @@
-"""Rows of measurements: they print as tables, turn into JSON, and stand beside their goals."""
+"""Rows of measurements: they print as tables, turn into JSON, and have goals; honest timing."""
 
 import os
 import warnings

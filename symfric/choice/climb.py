@@ -17,10 +17,13 @@ from dataclasses import dataclass, field
 from math import inf, nan
 from typing import Any, final
 
-from symfric.choice.machine import FAILURES, Candidate, Machine, Reference
+from symfric.choice.machine import FAILURES, Candidate, Reference
 from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
-from symfric.figures.regularisation import Sample, apart
+from symfric.figures.regularisation import Machine, Sample, apart
 from symfric.foundation.status import SolveError, Status
+from symfric.integrator.arguments import chosen
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.running.integrator import built
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 
@@ -92,7 +95,7 @@ class Budget:
             return self._runs[s, rtol]
         allowed = min(most or self.most, self.most)
         try:
-            found = self.held.machine.run(self.model(s), self.held.law, rtol, allowed)
+            found = self.held.run(self.model(s), rtol, allowed)
         except SolveError as problem:
             run = problem.partial
             if isinstance(run, Trajectory):
@@ -104,9 +107,11 @@ class Budget:
 
 
 def counted(machine: Machine, model: Model, rtol: float) -> tuple[int, str]:
-    """Instructions of an attempt at this tolerance, and the method."""
-    instructions, method = machine.instructions(model, rtol)
-    return max(1, instructions) + (EVENTS if model.events else 0), method
+    """CasADi instructions of an attempt at this tolerance, and the method."""
+    formula = chosen("simulate", "auto", rtol)
+    inputs = input_data(model, machine.u, 0.0, machine.t_end)
+    instructions = built(model, inputs, formula)[0].instructions
+    return max(1, instructions) + (EVENTS if model.events else 0), formula.name
 
 
 LOOSEST, PER_DECADE = 1e-3, 2

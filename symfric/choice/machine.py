@@ -1,10 +1,10 @@
 """The user's machine with any law in it, what one run costs, and references of errors."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import inf, log
 from typing import Any, final
 
@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 
 from symfric.choice.friction import Friction, alike, friction_of
 from symfric.choice.softness import OF_BRISTLES, Softness, softness
-from symfric.figures.regularisation import Bed, Measure, Sample, apart, driven, positions, sample
+from symfric.figures.regularisation import Machine, Sample, apart, positions, sample
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.status import OverloadWarning, SolveError, Status
-from symfric.integrator.arguments import chosen
-from symfric.integrator.equations.inputs import Input, input_data
-from symfric.integrator.running.integrator import built
 from symfric.laws import BrownMcPhee, Law, Stribeck
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
@@ -34,106 +31,19 @@ FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, Ar
 """Errors that a law, or a function of the user that makes a machine of it, may raise."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Machine:
-    """A machine that takes any law.
-
-    Attributes:
-        name: what it is called.
-        make: law -> scene or model.
-        places: fields of the scene that hold the candidate; None for all that hold its kind.
-        t_end: how long a motion is [s].
-        of: what is compared; None for the positions.
-        u: inputs.
-        times: at which motions are compared [s]; None for 2001 equal intervals.
-    """
-
-    name: str
-    make: Callable[[Law], object]
-    places: tuple[str, ...] | None
-    t_end: float
-    of: Measure | None = None
-    u: Mapping[str, Input] | None = None
-    times: Array | None = None
-
-    def bed(self, model: Model) -> Bed:
-        """The bed in which runs of `model` are compared."""
-        return Bed(
-            self.name, lambda _: model, self.t_end, self.of, u=self.u, backend="vm",
-            times=self.times,
-        )  # fmt: skip
-
-    def with_law(self, law: Law) -> Model:
-        """The model with `law` as it is.
-
-        Raises:
-            ValueError: the machine refuses it, or gives neither scene nor model.
-        """
-        made = self.make(law)
-        if isinstance(made, Scene):
-            return made.model()
-        return checks.kind(f"{self.name}({type(law).__name__})", made, Model, "a scene or a Model")
-
-    def run(self, model: Model, law: Law, rtol: float, most: int) -> Sample:
-        """One run; `most` attempts are allowed.
-
-        Raises:
-            SolveError: it failed.
-        """
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # loose tolerances are tried on purpose
-            warnings.simplefilter("error", OverloadWarning)
-            try:
-                return sample(self.bed(model), law, rtol, max_steps=most)
-            except OverloadWarning:
-                raise SolveError(OVERLOAD, Status.SOLVER_FAILED) from None
-
-    def instructions(self, model: Model, rtol: float) -> tuple[int, str]:
-        """CasADi instructions of one attempt at this tolerance, and the method."""
-        formula = chosen("simulate", "auto", rtol)
-        inputs = input_data(model, self.u, 0.0, self.t_end)
-        return built(model, inputs, formula)[0].instructions, formula.name
-
-
-def machine_of(
-    where: str,
-    scene: object,
-    t_end: float | None,
-    u: Mapping[str, Input] | None,
-    of: Measure | None,
-    probe: Law,
-) -> Machine:
-    """A scene, a class of scenes, or a function law -> scene or model, as a machine.
-
-    A scene is driven as it is when nobody says how, unless `u` says so.
+def quiet_run(machine: Machine, model: Model, law: Law, rtol: float, most: int) -> Sample:
+    """One run of `model` without warnings; `most` attempts are allowed.
 
     Raises:
-        ValueError: none of these, no end where nothing says one.
+        SolveError: it failed.
     """
-    if of is not None and not callable(of):
-        of = checks.names(f"{where}: of", of)
-    places: tuple[str, ...] | None = ("law",)
-    make: Callable[[Law], object]
-    if isinstance(scene, Scene):
-        make, kind, name = partial(_in_scene, scene), type(scene), type(scene).__name__
-    elif isinstance(scene, type) and issubclass(scene, Scene):
-        make, kind, name = scene, scene, scene.__name__
-    elif callable(scene):
-        make, places = scene, None
-        first = make(probe)
-        if not isinstance(first, Scene | Model):
-            called = f"{where}: scene({type(probe).__name__})"
-            raise checks.refused(called, "a scene or a Model", first)
-        kind, name = type(first), first.name if isinstance(first, Model) else type(first).__name__
-    else:
-        raise checks.refused(where, "a scene such as Rabinowicz, or a function law -> Model", scene)
-    end, given = driven(where, kind, t_end, u)
-    return Machine(name, make, places, end, of, given)
-
-
-def _in_scene(scene: Scene, law: Law) -> Scene:
-    return replace(scene, law=law)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # loose tolerances are tried on purpose
+        warnings.simplefilter("error", OverloadWarning)
+        try:
+            return sample(machine, law, rtol, max_steps=most, model=model)
+        except OverloadWarning:
+            raise SolveError(OVERLOAD, Status.SOLVER_FAILED) from None
 
 
 @final
@@ -169,9 +79,13 @@ class Candidate:
             ValueError: beyond a bound of the law, or the machine refuses it.
         """
         if self.scene is None:
-            return self.machine.with_law(self.law_at(s))
+            return self.machine.model(self.law_at(s))
         laws: dict[str, Any] = {place: knob.at(s) for place, knob in self.knobs.items()}
         return replace(self.scene, **laws).model()
+
+    def run(self, model: Model, rtol: float, most: int) -> Sample:
+        """One run of the law in `model`, the machine at some softness; see `quiet_run`."""
+        return quiet_run(self.machine, model, self.law, rtol, most)
 
     @cached_property
     def first(self) -> Model:
@@ -334,13 +248,13 @@ def _of_data(where: str, machine: Machine, given: Mapping[str, Any]) -> tuple[Re
 
 
 def _of_law(machine: Machine, law: Law) -> Reference:
-    run = machine.run(machine.with_law(law), law, FINE, ATTEMPTS)
+    run = quiet_run(machine, machine.model(law), law, FINE, ATTEMPTS)
     return Reference(type(law).__name__, run.motion, run.size, FINE)
 
 
 def _exact(machine: Machine, frictions: Mapping[str, Friction], load: float | None) -> Reference:
     held = candidate(machine, frictions[""].exact, frictions, load, own=False)
-    fine, coarse = (machine.run(held.first, held.law, rtol, ATTEMPTS) for rtol in (FINE, 10 * FINE))
+    fine, coarse = (held.run(held.first, rtol, ATTEMPTS) for rtol in (FINE, 10 * FINE))
     uncertain = apart(coarse.motion, fine.motion, fine.size)
     return Reference(
         "exact dry friction (ExactCoulomb)", fine.motion, fine.size, max(uncertain, FINE)
@@ -357,7 +271,7 @@ def _sharpest(
     for k in range(SHARPEST):
         s = RATIO**-k
         try:
-            runs.append(machine.run(held.model(s), law, max(1e-10, 1e-4 * accuracy), ATTEMPTS))
+            runs.append(held.run(held.model(s), max(1e-10, 1e-4 * accuracy), ATTEMPTS))
         except SolveError:
             if not runs:
                 raise

@@ -27,7 +27,7 @@ from symfric.choice.climb import (
     short,
 )
 from symfric.choice.friction import Friction
-from symfric.choice.machine import FAILURES, OWN, Candidate, Machine, Reference, candidate
+from symfric.choice.machine import FAILURES, OWN, Candidate, Reference, candidate, quiet_run
 from symfric.choice.nature import lacking
 from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
 from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
@@ -35,7 +35,7 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_model import plant_block
 from symfric.figures.data import phenomena
 from symfric.figures.motion import sampled
-from symfric.figures.regularisation import positions
+from symfric.figures.regularisation import Machine, positions
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.inputs import Input
@@ -250,7 +250,7 @@ def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
     """The task with the law's own motion as reference, where only the integrator is judged."""
     if task.reference is not OWN:
         return task
-    run = task.machine.run(held.first, held.law, 0.1 * task.asked.fine, 10 * runs.most)
+    run = held.run(held.first, 0.1 * task.asked.fine, 10 * runs.most)
     return replace(task, reference=replace(OWN, motion=run.motion, size=run.size))
 
 
@@ -340,7 +340,7 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
     """Shortest processor time [s] of a few calls; the integrator is built already."""
     best, began = inf, process_time()
     for _ in range(ROUNDS):
-        found = task.machine.run(at.model, law, at.rtol, runs.most)
+        found = quiet_run(task.machine, at.model, law, at.rtol, runs.most)
         best = min(best, found.time_s)
         if process_time() - began > PATIENCE:
             break
@@ -357,7 +357,7 @@ def _stepped(task: Task, held: Candidate, rungs: Ladder, row: Row) -> Row:
         model, law = held.model(s or row.softness), held.law_at(s or row.softness)
         machine = replace(task.machine, of=None, times=None)
         most = max(LEAST, task.work // row.instructions)
-        run = machine.run(model, law, row.rtol if s is None else task.asked.fine, most)
+        run = quiet_run(machine, model, law, row.rtol if s is None else task.asked.fine, most)
     except FAILURES as problem:
         return replace(row, fixed_why=short(problem), explicit_why=short(problem))
     names = positions(model, law)

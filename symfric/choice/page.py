@@ -15,11 +15,7 @@ from matplotlib.transforms import Bbox
 from symfric.choice.nature import GROUPS, NEEDS, shown
 from symfric.choice.ranking import Ranking, Row
 from symfric.choice.text import STANDING_TEXTS, interrupted, number, verdict
-from symfric.foundation.panels import (
-    blank,
-    dressed,
-    save,
-)
+from symfric.foundation.panels import blank, dressed, save
 from symfric.foundation.shown import data_uri
 from symfric.foundation.style import MARKERS, colour
 from symfric.page import html
@@ -28,14 +24,14 @@ KINDS = (*GROUPS.values(), "sliding")
 """Groups of laws by the most that they show."""
 SMALL = 7
 OFFSETS = ((5, 3), (5, -9), (-5, 3), (-5, -9), (0, 8), (0, -13), (9, 9), (9, -15), (-9, 9))
-"""Places of a label beside its point [points], the best first."""
+"""Places of a label next to its point [points], the best first."""
 BEHIND = {"fc": "w", "alpha": 0.75, "lw": 0.0, "pad": 0.6}
 GAP = 3.0
 """Around a name [pixel], so that its ground hides nothing of the next."""
 APART = 1e-2
 """Ranked laws of less than this share of the error allowed stand apart, and are named there."""
 COLUMN, PLANE, ROW = 3.35, 2.1, 0.135
-"""Width of a column of print, height of the plane and of a name beside it [inch]."""
+"""Width of a column of print, height of the plane and of a name next to it [inch]."""
 LEAST = 3
 """Ticks of an axis of work."""
 MOST = 80
@@ -117,7 +113,7 @@ def _told(choice: Ranking, rows: Sequence[Row]) -> list[Row]:
 
 
 def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]) -> None:
-    """Names beside points where they hide nothing; a name without such a place is left out."""
+    """Names next to points where they hide nothing; a name without such a place is left out."""
     figure.draw_without_rendering()
     size = 5.0 * figure.dpi / 72
     taken = [_around(axis, row, size) for row in rows]

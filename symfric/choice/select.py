@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, final
 
 from symfric.choice.climb import RUN
 from symfric.choice.friction import Friction
-from symfric.choice.machine import FAILURES, OWN, frictions_of, load_of, machine_of, reference_of
+from symfric.choice.machine import FAILURES, OWN, frictions_of, load_of, reference_of
 from symfric.choice.measured import Task, best_form
 from symfric.choice.nature import forms, needed
 from symfric.choice.ranking import FAILED, Ranking, Row, ordered
 from symfric.choice.text import lines, verdict
-from symfric.figures.regularisation import Measure
+from symfric.figures.regularisation import Measure, machine_of
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.integrator.equations.inputs import Input
@@ -211,11 +211,11 @@ def select(
         such = "a friction, such as Friction(mu_s=0.2, mu_d=0.15)"
         checks.kind(f"{where}: friction", friction, Friction, such)
     known = laws_of(where, laws)
-    machine = machine_of(f"{where}: scene", scene, t_end, u, of, BrownMcPhee())
+    machine = machine_of(where, scene, t_end, of, u, BrownMcPhee(), "vm")
     frictions = frictions_of(machine, friction, scene)
     load = None
     with suppress(*FAILURES):
-        load = load_of(machine.with_law(BrownMcPhee()))
+        load = load_of(machine.model(BrownMcPhee()))
     given = reference if data is None else data
     compared = OWN
     if misfits is None:

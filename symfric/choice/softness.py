@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
-from symfric.figures.regularisation import scaled
+from symfric.figures.regularisation import Regularisation
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.families import Sticking
@@ -41,17 +41,14 @@ OF_BRISTLES = 0.45, 0.5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Softness:
+class Softness(Regularisation):
     """Parameters that make `law` smooth, scaled together by a factor s.
 
     Attributes:
-        powers: parameter -> power of s.
         mu_s, load: the peak that static laws are to keep at every s, and the normal force [N].
         velocities: the power of s for velocities; 0 where nothing is scaled.
     """
 
-    law: Law
-    powers: dict[str, float]
     mu_s: float
     load: float | None
     velocities: float = 0.0
@@ -65,8 +62,7 @@ class Softness:
         if not self.powers:
             return self.law
         known = parameters(self.law)
-        values = scaled(self.law, self.powers, s)
-        law = with_values(self.law, {n: _within(known[n], x) for n, x in values.items()})
+        law = with_values(self.law, {n: _within(known[n], x) for n, x in self.values(s).items()})
         return peaked(law, self.mu_s, self.load)
 
 

@@ -86,7 +86,7 @@ def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> s
 
 
 def check_applicable(subject: str, given: list[str]) -> None:
-    """Refuse options that say nothing to what is asked for, all at once."""
+    """Refuse options that do not apply to the subject, all at once."""
     problems: list[str] = []
     for option in given:
         fits = [s for s in APPLIES[option] if s != FUNCTION]

@@ -86,7 +86,7 @@ def plates(incomplete: str) -> list[str]:
 
 def problems(incomplete: str) -> list[str]:
     """Ready problems of optimal control."""
-    from ocp.problems.catalogue import READY  # noqa: PLC0415  (of this command only)
+    from ocp.problems import READY  # noqa: PLC0415  (of this command only)
 
     return _of(READY, incomplete)
 

@@ -24,7 +24,7 @@ from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
 STAGE = Path("..", "shared", "data", "EMPS")
-"""Where the measured stage is looked for: the EMPS benchmark beside the working folder."""
+"""Where the measured stage is looked for: the EMPS benchmark next to the working folder."""
 
 RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
 """Record to identify from and record to validate on."""
@@ -170,7 +170,7 @@ def optimal_moves(folder: Path, found: Fitted) -> Chapter:
 
     The speed is bounded by the largest one in the record: beyond it friction is a guess.
     """
-    from ocp.result.solution import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
+    from ocp.solving.solution import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
 
     speed = 0.1 if found.curve is None else float(abs(found.curve.law.t).max())
 

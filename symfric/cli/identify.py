@@ -116,7 +116,7 @@ def _units(texts: Sequence[str] | None) -> dict[str, str] | str | None:
 def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
     """The kind of residuals; `windows` [s] or "choose" of simulated motions.
 
-    Of points an `offset` among `free` is taken out of it: a constant force beside friction.
+    Of points an `offset` among `free` is taken out of it: a constant force besides friction.
     """
     check_names("--kind", [name], KINDS)
     if windows is not None and name != "shooting":
@@ -288,7 +288,7 @@ class Found:
 
     Attributes:
         fit: with its errors on other data.
-        profiles: that were asked for.
+        profiles: the requested ones.
         ranking: of several laws, whose best one the fit is.
         failed: why other data or profiles could not be had.
     """

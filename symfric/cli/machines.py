@@ -186,7 +186,7 @@ def driven(
     input, and say where the state starts.
 
     Raises:
-        ValueError: unknown names, an input beside its integral, or what `input_from_text` refuses.
+        ValueError: unknown names, an input and its integral, or what `input_from_text` refuses.
     """
     given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
     ways = {state: rate for state, rate in scene.integrals.items() if rate in units}

@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
 from ocp import Problem, Solution, load, solve
-from ocp.problems.catalogue import READY
-from ocp.problems.ready import Ready
-from ocp.solvers.methods import Fatrop, Ipopt, Sqp
+from ocp.problems import READY, Ready
+from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.strategies import Friction
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError

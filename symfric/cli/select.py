@@ -306,7 +306,7 @@ def fitted(
 
 
 def _paper(scene: str, json: str | None, others: bool) -> None:
-    """Print the paper's tables beside ours.
+    """Print the paper's tables and ours.
 
     Raises:
         ValueError: a scene that is not in the paper, options that change it.

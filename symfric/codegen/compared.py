@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import Generated
-from symfric.codegen.guards import Status
+from symfric.codegen.guards import STEP_SIZE, Status, parameter_range, range_of
 from symfric.codegen.rounding import modes, rounded
 from symfric.codegen.runner import GuardModel, signals
 from symfric.emitter.c99 import Real
 from symfric.foundation.graph import SELECT, Graph, graph, rebuild
+from symfric.foundation.parameters import Variable
 from symfric.model.kinds import CONSTRAINTS
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class Run:
 
     @property
     def block(self) -> Block:
-        """What was generated."""
+        """The block that was generated."""
         return self.generated.block
 
     @cached_property
@@ -78,7 +79,7 @@ class Run:
 
     @cached_property
     def tied(self) -> NDArray[np.bool_]:
-        """Where a mode differs in float because its decision ties, shape (steps, columns).
+        """Mask of modes that differ in float because their decision ties, shape (steps, columns).
 
         That is where the mode of the C is one that CasADi's own operations come to when each is
         rounded to float, to nearest or by chance up or down. Nothing else in that step is excused.
@@ -96,7 +97,7 @@ class Run:
         return found
 
     def _rounded(self, rows: NDArray[np.int64]) -> Array | None:
-        """What the operations of CasADi in float make of some of the steps, see `rounded`."""
+        """Results of CasADi's operations in float for some of the steps, see `rounded`."""
         states, parameters, inputs = self._arguments
         own = np.broadcast_to(parameters, (len(inputs), parameters.shape[-1]))
         return rounded(self.block, states[rows], own[rows], inputs[rows])
@@ -122,7 +123,7 @@ class Run:
 
     @property
     def rounding(self) -> float | None:
-        """How far rounding to float in the worst step may move the worst signal, see `rounded`.
+        """Largest change of the worst signal by rounding to float in the worst step, see `rounded`.
 
         None where it is not known.
         """
@@ -144,9 +145,11 @@ class Run:
     def _arguments(self) -> tuple[Array, Array, Array]:
         """States before every step, parameters and inputs, as the step takes them."""
         block, model = self.block, GuardModel(self.block, self.real)
-        start, inputs = model.start, model.typed(self.inputs)
+        start, inputs = model.start, self.real.rounded(self.inputs)
         states = np.vstack([start, self.rows[:-1, : len(block.states)]])
-        parameters = model.default if self.parameters is None else model.typed(self.parameters)
+        parameters = (
+            model.default if self.parameters is None else self.real.rounded(self.parameters)
+        )
         if self.generated.guards:
             inputs, _ = model.inputs(inputs)
             states = np.where([[model.lost(x)] for x in states], start, states)
@@ -254,3 +257,78 @@ def magnitudes(
     found = of(*(ca.DM(np.ascontiguousarray(column[::every].T)) for column in given)).full()
     largest = np.where(np.isfinite(found), found, 0.0).max(axis=1, initial=0.0)
     return np.maximum(largest, [v.nominal for v in block.states] + [0.0] * len(block.outputs))
+
+
+STRETCH = 100
+"""Steps of one kind of motion, or of load, in a row."""
+
+LOADS = (1.0, 10.0, 0.1, 1.5, 0.0, 1.0, 1e-3, 6.0, 0.5, 0.0, 100.0, 1.0)
+"""Of a load, in units of its nominal value, in a random order: it jumps, and is gone."""
+
+BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, -1e9, 1e-310, -1.0)
+"""In the place of an input, in units of its nominal value."""
+
+
+def excitation(block: Block, steps: int) -> Array:
+    """Valid inputs of every step, shape (steps, inputs), the same at each call.
+
+    An input with a lower bound of 0 or more, such as a load, wavers about levels between which it
+    jumps by factors up to 1e5, zero among them; the others see in turn, in units of their nominal
+    value, slow sines, bursts up to 2, tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt
+    reversals. All stay within their bounds.
+    """
+    random = np.random.default_rng(0)
+    columns = [_signal(variable, steps, random) for variable in block.inputs]
+    return np.column_stack([np.zeros((steps, 0)), *columns])
+
+
+def _signal(variable: Variable, steps: int, random: np.random.Generator) -> Array:
+    k, stretches = np.arange(steps), -(-steps // STRETCH)
+    if variable.lower >= 0.0:
+        levels = np.repeat(random.choice(LOADS, stretches), STRETCH)[:steps]
+        wavering = 1.0 + 0.5 * np.sin(0.003 * k + random.uniform(0.0, 6.0))
+        return _within(variable, variable.nominal * levels * wavering)
+    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
+    pieces = [
+        0.05 * np.sin(0.008 * k),
+        np.clip(random.standard_normal(steps), -2.0, 2.0),
+        tiny,
+        0.1 * np.sign(np.sin(0.03 * k)),
+        np.zeros(steps),
+    ]
+    turn = np.repeat(random.integers(0, len(pieces), stretches), STRETCH)[:steps]
+    return _within(variable, variable.nominal * np.choose(turn, pieces))
+
+
+def _within(variable: Variable, values: Array) -> Array:
+    limits = range_of(variable)
+    return np.clip(values, limits.low, limits.high)
+
+
+def spoiled(block: Block, inputs: Array) -> Array:
+    """The same inputs with what is not finite or out of range in a twentieth of the places."""
+    random = np.random.default_rng(1)
+    nominal = np.array([v.nominal for v in block.inputs])
+    bad = random.choice(BAD, inputs.shape) * nominal
+    return np.where(random.uniform(size=inputs.shape) < 0.05, bad, inputs)
+
+
+def varied(block: Block, steps: int, longest: float) -> Array:
+    """Parameters of every step, shape (steps, parameters), that stay for `STRETCH` of them.
+
+    The step size passes through three decades up to `longest` times its default, the others through
+    +-20 %, or from 0 to a tenth where they are 0, within their bounds.
+    """
+    random = np.random.default_rng(2)
+    stretches = -(-steps // STRETCH)
+    columns = [np.zeros((stretches, 0))]
+    for variable in block.parameters:
+        start, limits = float(variable.start), parameter_range(variable)
+        if variable.name == STEP_SIZE:
+            values = start * longest * 10.0 ** random.uniform(-3.0, 0.0, stretches)
+        elif start == 0.0:
+            values = random.uniform(0.0, 0.1, stretches)
+        else:
+            values = start * random.uniform(0.8, 1.2, stretches)
+        columns.append(np.clip(values, limits.low, limits.high))
+    return np.repeat(np.column_stack(columns), STRETCH, axis=0)[:steps]

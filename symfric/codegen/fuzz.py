@@ -40,7 +40,7 @@ COUNTS = ("valid", "repaired", "altered", "unflagged", "unfinished", "last_resor
 @final
 @dataclass(frozen=True)
 class Fuzzed:
-    """What was found of one block in one type.
+    """Result of the fuzz test of one block in one type.
 
     Attributes:
         valid: steps with a status of 0; their bits were compared.

@@ -12,12 +12,12 @@ from typing import Any, final
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import contact_block, law_block
 from symfric.codegen.blocks.variables import Fold
-from symfric.codegen.compiler import footprint
 from symfric.codegen.guards import MEANING, Range, Status, parameter_range, range_of
 from symfric.codegen.header import header
 from symfric.codegen.kit import kit_files
 from symfric.codegen.layout import members, prefix
 from symfric.codegen.routines import routines, source
+from symfric.codegen.runner import footprint
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
@@ -29,7 +29,7 @@ from symfric.laws import AnyLaw, Population
 @final
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """What `generate` wrote.
+    """Files that `generate` wrote.
 
     Attributes:
         block: what the C computes.

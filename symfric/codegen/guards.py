@@ -21,14 +21,11 @@ from math import isfinite
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.layout import Member, members, places, prefix
+from symfric.codegen.layout import TEMPLATES, Member, filled, members, places, prefix
 from symfric.emitter.c99 import Real
 from symfric.foundation.parameters import Variable
-
-Array = NDArray[np.float64]
 
 WIDE = 1e6
 """An input without bounds is clamped to this many times its nominal value."""
@@ -46,7 +43,7 @@ STEP_SIZE = "h"
 
 
 class Status(IntFlag):
-    """What a step found and mended; 0 if all was well."""
+    """Bits for what a step repaired; 0 if nothing."""
 
     CLAMPED = 1
     NOT_FINITE = 2
@@ -67,7 +64,7 @@ MEANING = {
 @final
 @dataclass(frozen=True)
 class Range:
-    """What a number may be, closed, and what takes its place where it is none."""
+    """Closed range of a number, and the value that replaces one that is not finite."""
 
     low: float
     high: float
@@ -131,7 +128,8 @@ def helpers(block: Block, real: Real, text: str) -> str:
     """The static functions that `text`, the guarded functions of a block, calls."""
     name = prefix(block, real)
     own = {"unfit": _unfit(block, real), "lost": _lost(block, real)}
-    general = HELPERS.format(
+    general = filled(
+        TEMPLATES / "guards.c",
         name=name,
         real=real.name,
         whole=f"uint{8 * real.size}_t",
@@ -139,56 +137,13 @@ def helpers(block: Block, real: Real, text: str) -> str:
         infinite="UINT32_C(0x7F800000)" if real.size == 4 else "UINT64_C(0x7FF0000000000000)",
     )
     general_parts = dict(
-        zip(("bits", "beyond", "outside", "mended"), general.split("\n\n"), strict=True)
+        zip(("bits", "beyond", "outside", "mended"), general.rstrip().split("\n\n"), strict=True)
     )
     needed: list[str] = []
     for what, body in reversed((general_parts | own).items()):
         if f"{name}_{what}(" in text + "".join(needed):
             needed.insert(0, body + "\n\n")
     return "".join(needed)
-
-
-HELPERS = """\
-/* Numbers are compared by their bits: as cheap, and NaN is found under -ffast-math, too. */
-static {whole} {name}_bits({real} x)
-{{
-    {whole} found;
-    memcpy(&found, &x, sizeof found);
-    return found;
-}}
-
-/* Whether |x| is above limit, infinite or NaN. */
-static bool {name}_beyond({real} x, {real} limit)
-{{
-    return ({name}_bits(x) & {magnitude}) > {name}_bits(limit);
-}}
-
-/* Whether x is outside low ... high, 0 <= low, or NaN; -0 is 0. */
-static bool {name}_outside({real} x, {real} low, {real} high)
-{{
-    const {whole} span = {name}_bits(high) - {name}_bits(low);
-    return {name}_bits(x) - {name}_bits(low) > span && x != low;
-}}
-
-/* x clamped to low ... high, or safe where it is not finite; says so by bits of the status. */
-static {real} {name}_mended(
-    {real} x, {real} low, {real} high, {real} safe,
-    unsigned int clamped, unsigned int not_finite, unsigned int *status)
-{{
-    if (({name}_bits(x) & {magnitude}) >= {infinite}) {{
-        *status |= not_finite;
-        return safe;
-    }}
-    if (x < low) {{
-        *status |= clamped;
-        return low;
-    }}
-    if (x > high) {{
-        *status |= clamped;
-        return high;
-    }}
-    return x;
-}}"""
 
 
 def _outside(name: str, real: Real, place: str, low: float, high: float) -> str:
@@ -252,7 +207,7 @@ def found_states(block: Block, real: Real, status: str) -> list[str]:
 def finite_outputs(block: Block, real: Real, status: str) -> list[str]:
     """Statements that put 0 in the place of outputs that are not finite."""
     name, said = prefix(block, real), _said(block, real, Status.OUTPUT, status)
-    most = real.literal(float(np.finfo(np.float32 if real.size == 4 else np.float64).max))
+    most = real.literal(float(np.finfo(real.kind).max))
     if block.is_function:
         (shown,) = block.outputs
         bad = f"if ({name}_beyond({shown}, {most})) {{"

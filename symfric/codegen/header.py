@@ -128,7 +128,7 @@ def _list(texts: Sequence[str]) -> Iterator[str]:
 
 
 def _sample_time(block: Block) -> str:
-    """What the step size is, and where it is said."""
+    """Text about the step size and where it is set."""
     h = block.sample_time
     if h is None:
         return ""
@@ -141,7 +141,7 @@ def _sample_time(block: Block) -> str:
 
 
 def _guards(block: Block) -> list[str]:
-    """What is done with what cannot be, and how it is said."""
+    """Sentences about the repair of invalid numbers, and its report."""
     safe = ", ".join(f"{v.name} = {range_of(v).safe:g}" for v in block.inputs)
     found = [f"Inputs outside their range are clamped to it; not finite ones are replaced: {safe}."]
     if block.states:
@@ -171,7 +171,7 @@ def _inputs(block: Block, guards: bool) -> Iterator[str]:
 
 
 def meaning(doc: str, unit: str, *more: str) -> str:
-    """What a number is, its unit, and what else there is to say."""
+    """Meaning of a number, its unit, and further texts."""
     return ", ".join(text for text in (f"{doc} [{unit}]".strip(), *more) if text)
 
 

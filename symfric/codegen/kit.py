@@ -153,23 +153,16 @@ def vector_header(found: Vectors, guards: bool) -> str:
         "",
         *about,
     ]
-    return f"""{block_comment(texts)}
-#ifndef {name.upper()}_VECTORS_H
-#define {name.upper()}_VECTORS_H
-
-#include <math.h>
-
-#define {name.upper()}_VECTORS {count}
-
-typedef struct {{
-{"".join(f"    {line}{chr(10)}" for line in lines)}}} {name}_vector_t;
-
-{tolerances}
-static const {name}_vector_t {name}_vectors[{name.upper()}_VECTORS] = {{
-{rows}}};
-
-#endif
-"""
+    return filled(
+        TEMPLATES / "vectors.h",
+        about=block_comment(texts),
+        name=name,
+        macro=name.upper(),
+        count=count,
+        members="".join(f"    {line}\n" for line in lines),
+        tolerances=tolerances,
+        rows=rows,
+    )
 
 
 def results(block: Block) -> dict[str, int]:

@@ -18,8 +18,6 @@ from string import Template
 from textwrap import wrap
 from typing import final
 
-import numpy as np
-
 from symfric.codegen.blocks.block import GROUPS, Block
 from symfric.emitter.arrays import Arrays
 from symfric.emitter.c99 import Real
@@ -52,7 +50,7 @@ class Member:
 
     @property
     def count(self) -> int:
-        """How many numbers it holds."""
+        """Number of its values."""
         return max(self.size, 1)
 
     @property
@@ -64,7 +62,7 @@ class Member:
 
 
 def prefix(block: Block, real: Real) -> str:
-    """What all names of a block in one type begin with; also the name of its files."""
+    """Prefix of all names of a block in one type, and of its files."""
     return f"{block.name}_{real.suffix}"
 
 
@@ -100,7 +98,7 @@ def places(block: Block, group: str) -> tuple[str, ...]:
 
 
 def indexed(block: Block, results: Sequence[str], guards: bool) -> Arrays:
-    """What loops may index: the arrays of the structs in the order of `GROUPS`.
+    """Arrays that loops may index: those of the structs in the order of `GROUPS`.
 
     Args:
         results: the structs that the results of the function are written to.
@@ -172,8 +170,7 @@ def folded(line: str, margin: str) -> str:
 
 def number(value: float, real: Real) -> str:
     """`value` rounded to the type as C: a literal, or a macro of math.h for what is not finite."""
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = float(np.float32(value)) if real.size == 4 else value
+    rounded = float(real.rounded(value))
     if math.isnan(rounded):
         return "NAN"
     if math.isinf(rounded):

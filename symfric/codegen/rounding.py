@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
+from symfric.emitter.c99 import FUNCTIONS
 from symfric.foundation.graph import SELECT, Graph, graph
 
 Array = NDArray[Any]
@@ -16,6 +17,13 @@ Array = NDArray[Any]
 def _twice(x: Array) -> Array:
     return x + x
 
+
+LACKS = {"erf", "remainder"}
+"""Functions of C99 that NumPy lacks, or means otherwise."""
+NUMPY = {"pow": "power"} | {
+    f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")
+}
+"""Functions that NumPy names otherwise than C99."""
 
 OPERATIONS: dict[int, Callable[..., Any]] = {
     ca.OP_ADD: np.add,
@@ -34,34 +42,13 @@ OPERATIONS: dict[int, Callable[..., Any]] = {
     ca.OP_NOT: np.logical_not,
     ca.OP_AND: np.logical_and,
     ca.OP_OR: np.logical_or,
-    ca.OP_FABS: np.abs,
     ca.OP_FMIN: np.fmin,
     ca.OP_FMAX: np.fmax,
-    ca.OP_SQRT: np.sqrt,
-    ca.OP_FLOOR: np.floor,
-    ca.OP_CEIL: np.ceil,
-    ca.OP_COPYSIGN: np.copysign,
-    ca.OP_EXP: np.exp,
-    ca.OP_EXPM1: np.expm1,
-    ca.OP_LOG: np.log,
-    ca.OP_LOG1P: np.log1p,
-    ca.OP_POW: np.power,
-    ca.OP_CONSTPOW: np.power,
-    ca.OP_SIN: np.sin,
-    ca.OP_COS: np.cos,
-    ca.OP_TAN: np.tan,
-    ca.OP_ASIN: np.arcsin,
-    ca.OP_ACOS: np.arccos,
-    ca.OP_ATAN: np.arctan,
-    ca.OP_ATAN2: np.arctan2,
-    ca.OP_SINH: np.sinh,
-    ca.OP_COSH: np.cosh,
-    ca.OP_TANH: np.tanh,
-    ca.OP_ASINH: np.arcsinh,
-    ca.OP_ACOSH: np.arccosh,
-    ca.OP_ATANH: np.arctanh,
-    ca.OP_HYPOT: np.hypot,
-    ca.OP_FMOD: np.fmod,
+    **{
+        op: getattr(np, NUMPY.get(name, name))
+        for op, name in FUNCTIONS.items()
+        if name not in LACKS
+    },
 }
 """Those of C99 that NumPy has, by CasADi's numbers."""
 
@@ -129,7 +116,7 @@ PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
 
 
 def functions(block: Block) -> list[ca.Function]:
-    """What makes the columns of a row: the step and the further initialisations."""
+    """Functions that give the columns of a row: the step and the further initialisations."""
     return [block.step, *(block.reset(name) for name in block.resets)]
 
 
@@ -164,7 +151,7 @@ def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDAr
 
 
 def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array | None:
-    """What CasADi's operations make of some steps in float, shape (SAMPLES, steps, columns).
+    """Results of CasADi's operations in float, shape (SAMPLES, steps, columns).
 
     Args:
         states, parameters, inputs: before and in every step, shape (steps, ...).

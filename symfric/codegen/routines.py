@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 
@@ -47,8 +47,8 @@ class Routine:
     arguments: tuple[str, ...]
     doc: str
     statements: tuple[str, ...]
-    calls: Counter[str]
-    operations: int
+    calls: Counter[str] = field(default_factory=Counter[str])
+    operations: int = 0
 
     @property
     def head(self) -> str:
@@ -97,24 +97,8 @@ def _starts(block: Block, real: Real) -> tuple[Routine, Routine]:
     init = "Initial state, such as that of the model; call it before the first step."
     reset = "The initial state of the model."
     return (
-        Routine(
-            name=f"{name}_init",
-            result="void",
-            arguments=(own, given),
-            doc=init,
-            statements=("*state = *start;",),
-            calls=Counter(),
-            operations=0,
-        ),
-        Routine(
-            name=f"{name}_reset",
-            result="void",
-            arguments=(own,),
-            doc=reset,
-            statements=(f"*state = {name}_start;",),
-            calls=Counter(),
-            operations=0,
-        ),
+        Routine(f"{name}_init", "void", (own, given), init, ("*state = *start;",)),
+        Routine(f"{name}_reset", "void", (own,), reset, (f"*state = {name}_start;",)),
     )
 
 
@@ -164,15 +148,7 @@ def _routine(
         body = _guarded(block, real, used, code.lines, steps, "&status")
         statements = ("unsigned int status = 0u;", *voids, *body, "return status;")
         result = "unsigned int"
-    return Routine(
-        name=name,
-        result=result,
-        arguments=tuple(arguments),
-        doc=doc,
-        statements=statements,
-        calls=code.calls,
-        operations=code.operations,
-    )
+    return Routine(name, result, tuple(arguments), doc, statements, code.calls, code.operations)
 
 
 def _loads(block: Block, real: Real, used: Sequence[tuple[int, int]]) -> list[str]:

@@ -1,13 +1,16 @@
-"""Running a block on the same inputs twice: as generated C, and in CasADi's virtual machine.
+"""Compiling generated C, and running a block on the same inputs as C and in CasADi's VM.
 
 Both give one row a step: the states after it, the outputs, the states that each reset would make of
 the inputs, and with guards the status.
 """
 
-from collections.abc import Callable, Sequence
+import shutil
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, final
 
 import casadi as ca
@@ -18,9 +21,121 @@ from symfric.codegen.blocks.block import GROUPS, Block
 from symfric.codegen.guards import STEP_SIZE, Range, Status, parameter_range, range_of, state_limit
 from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, prefix
 from symfric.emitter.c99 import Real
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.graph import graph
+from symfric.foundation.numeric import bound
 from symfric.foundation.programs import PATIENCE, ProgramError, finished
+
+WARNINGS = tuple(
+    f"-W{name}"
+    for name in ("all", "extra", "pedantic", "conversion", "double-promotion", "missing-prototypes")
+)
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+"""Without contraction to fused multiply-add the C has the bits of CasADi."""
+
+
+def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
+    """Compile `source` to an object file; returns the warnings.
+
+    Raises:
+        CompileError: the compiler refuses it.
+    """
+    return compiler.warnings(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
+
+
+def link_program(compiler: Compiler, parts: Sequence[Path], include: Path, target: Path) -> None:
+    """Compile and link C and object files.
+
+    Raises:
+        CompileError: the compiler refuses them.
+    """
+    compiler.run(*FLAGS, f"-I{include}", *map(str, parts), "-o", str(target), "-lm")
+
+
+def needed_symbols(target: Path) -> frozenset[str] | None:
+    """Names that an object file takes from elsewhere; None where no `nm` says it."""
+    nm = shutil.which("nm")
+    if nm is None:
+        return None
+    try:
+        listed = finished((nm, "-u", str(target))).output.decode(errors="replace")
+    except ProgramError:
+        return None
+    names = [line.split()[-1] for line in listed.splitlines() if line.split()]
+    if sys.platform == "darwin":
+        names = [name.removeprefix("_") for name in names]
+    return frozenset(names)
+
+
+@final
+@dataclass(frozen=True)
+class Footprint:
+    """The object file of one source.
+
+    Attributes:
+        text: bytes of code and of constants; None where there is no `size`.
+        data: bytes of variables, which there are none of.
+        stack: function -> bytes of its own frame; functions of libm come on top. Empty where the
+            compiler does not tell.
+    """
+
+    text: int | None
+    data: int | None
+    stack: dict[str, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything by name."""
+        return {"text": self.text, "data": self.data, "stack": dict(self.stack)}
+
+
+def footprint(
+    block: Block, real: Real, folder: Path, compiler: Compiler, flags: Sequence[str] = ()
+) -> Footprint:
+    """Compile the source of a block in `folder` and measure the object file.
+
+    Args:
+        flags: beside -std=c99 -O2 -ffp-contract=off, such as -mcpu=cortex-m4 of a cross-compiler.
+
+    Raises:
+        CompileError: the compiler refuses it.
+    """
+    stem = prefix(block, real)
+    with TemporaryDirectory(prefix="symfric-") as place:
+        target = Path(place) / f"{stem}.o"
+        command = [*FLAGS, *flags, "-c", str(folder / f"{stem}.c"), "-o", str(target)]
+        try:
+            compiler.run("-fstack-usage", *command)
+        except CompileError:  # clang before 11, and others, do not know the option
+            compiler.run(*command)
+        said = target.with_suffix(".su")
+        stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
+        text, data = _sizes(compiler, target)
+    return Footprint(text, data, stack)
+
+
+def _stack(text: str) -> dict[str, int]:
+    """The frames in a file of -fstack-usage: "file:line:column:function", bytes, kind."""
+    rows = [line.split("\t") for line in text.splitlines() if line.count("\t") >= 2]
+    return {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
+
+
+def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
+    """Bytes of text and of data with bss, by the `size` beside the compiler."""
+    program = Path(compiler.command[0])
+    beside = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
+    size = shutil.which(str(program.with_name(beside))) or shutil.which(beside)
+    if size is None:
+        return None, None
+    try:
+        done = finished((size, str(target)))
+    except ProgramError:
+        return None, None
+    if done.status:
+        return None, None
+    text, data, bss, *_ = done.output.decode().splitlines()[1].split()
+    return int(text), int(data) + int(bss)
+
 
 Array = NDArray[np.float64]
 
@@ -95,11 +210,10 @@ def run_c(
     Raises:
         CompileError: the program does not run here, or ends too early.
     """
-    kind = np.float32 if real.size == 4 else np.float64
     given = inputs if parameters is None else np.column_stack([parameters, inputs])
     command = [str(executable), str(len(inputs)), *(["own"] if parameters is not None else [])]
     with np.errstate(over="ignore", under="ignore"):
-        numbers = given.astype(kind).tobytes()
+        numbers = given.astype(real.kind).tobytes()
     try:
         limit = PATIENCE + PER_STEP * len(inputs)
         done = finished(command, numbers, limit=limit, name="the program that was compiled")
@@ -108,7 +222,7 @@ def run_c(
     columns = len(signals(block, guards=guards))
     if done.status != 0 or len(done.output) != len(inputs) * columns * real.size:
         raise CompileError(f"the program ended too early, with status {done.status}")
-    return np.frombuffer(done.output, kind).reshape(len(inputs), columns).astype(float)
+    return np.frombuffer(done.output, real.kind).reshape(len(inputs), columns).astype(float)
 
 
 def run_vm(
@@ -129,7 +243,7 @@ def run_vm(
         parameters: of every step, shape (steps, parameters); the defaults without them.
     """
     model = GuardModel(block, real)
-    inputs, said = model.typed(inputs), np.zeros(len(inputs), np.int64)
+    inputs, said = real.rounded(inputs), np.zeros(len(inputs), np.int64)
     if guards:
         inputs, said = model.inputs(inputs)
     p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
@@ -146,7 +260,7 @@ def run_vm(
         if states is not None and k:
             x[:] = states[k - 1]
         if parameters is not None:
-            p[:] = model.typed(parameters[k])
+            p[:] = real.rounded(parameters[k])
             if guards:
                 p[:], bits = model.parameters(p)
                 said[k] |= bits
@@ -164,25 +278,6 @@ def run_vm(
     return rows
 
 
-def bound(
-    function: ca.Function, arguments: Sequence[Array], results: Sequence[Array]
-) -> Callable[[], None]:
-    """A call without copies: CasADi reads and writes the arrays themselves."""
-    buffer: Any
-    buffer, evaluate = function.buffer()
-    for i, array in enumerate(arguments):
-        if array.size:
-            buffer.set_arg(i, array.data)
-    for i, array in enumerate(results):
-        if array.size:
-            buffer.set_res(i, array.data)
-
-    def call(alive: object = (function, buffer)) -> None:
-        evaluate()
-
-    return call
-
-
 def signals(block: Block, *, guards: bool = True) -> list[str]:
     """Names of the columns."""
     states = [v.name for v in block.states]
@@ -193,26 +288,20 @@ def signals(block: Block, *, guards: bool = True) -> list[str]:
 @final
 @dataclass(frozen=True, eq=False)
 class GuardModel:
-    """What the guards of a block do, on rows of numbers of one type."""
+    """The guards of a block in NumPy, on rows of numbers of one type."""
 
     block: Block
     real: Real
 
-    def typed(self, values: Sequence[Any] | Array) -> Array:
-        """Numbers rounded to the type, as doubles."""
-        kind = np.float32 if self.real.size == 4 else np.float64
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            return np.asarray(values, dtype=float).astype(kind).astype(float)
-
     @cached_property
     def start(self) -> Array:
         """Start values of the states."""
-        return self.typed([v.start for v in self.block.states])
+        return self.real.rounded([v.start for v in self.block.states])
 
     @cached_property
     def default(self) -> Array:
         """Parameters as the block has them by default, in its type."""
-        return self.typed([v.start for v in self.block.parameters])
+        return self.real.rounded([v.start for v in self.block.parameters])
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
         """Inputs (steps, inputs) as a guarded step sees them, and the status of every step."""
@@ -223,7 +312,7 @@ class GuardModel:
         return found, status
 
     def lost(self, states: Array) -> bool:
-        """Whether the states (states,) restart before a step."""
+        """Return True if the states (states,) restart before a step."""
         return not bool((np.abs(states) <= self._limits).all())
 
     def parameters(self, values: Array) -> tuple[Array, int]:
@@ -246,16 +335,18 @@ class GuardModel:
 
     @cached_property
     def _limits(self) -> Array:
-        return self.typed([state_limit(v) for v in self.block.states])
+        return self.real.rounded([state_limit(v) for v in self.block.states])
 
     @cached_property
     def _ranges(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         ranges = [parameter_range(v) for v in self.block.parameters]
-        low, high = (self.typed([getattr(r, side) for r in ranges]) for side in ("low", "high"))
+        low, high = (
+            self.real.rounded([getattr(r, side) for r in ranges]) for side in ("low", "high")
+        )
         return low, high, np.array([v.name == STEP_SIZE for v in self.block.parameters], bool)
 
     def _mended(self, column: Array, within: Range) -> tuple[Array, NDArray[np.int64]]:
-        low, high, safe = self.typed([within.low, within.high, within.safe])
+        low, high, safe = self.real.rounded([within.low, within.high, within.safe])
         finite = np.isfinite(column)
         found = np.where(finite, np.clip(column, low, high), safe)
         kinds = np.where(finite, int(Status.CLAMPED), int(Status.NOT_FINITE))

@@ -149,24 +149,18 @@ def _signal(variable: Variable, random: np.random.Generator) -> Array:
 
 def _run(block: Block, real: Real) -> Steps:
     """The steps of a run, as far as it is finite."""
-    inputs, count = rounded(excitation(block), real), len(block.states)
+    inputs, count = real.rounded(excitation(block)), len(block.states)
     after = run_vm(block, real, inputs, guards=False)
     start = np.array([[float(v.start) for v in block.states]])
-    states = rounded(np.vstack([start, after[:-1, :count]]), real)
+    states = real.rounded(np.vstack([start, after[:-1, :count]]))
     broken = ~(np.isfinite(after).all(axis=1) & np.isfinite(states).all(axis=1))
     end = int(np.argmax(broken)) if broken.any() else len(inputs)
     none = np.full(end, -1, np.int64)
     return Steps(states[:end], inputs[:end], none, np.zeros(end))
 
 
-def rounded(values: object, real: Real) -> Array:
-    """Numbers rounded to a floating point type."""
-    with np.errstate(over="ignore", under="ignore"):
-        return np.asarray(values, float).astype(f"f{real.size}").astype(float)
-
-
 def _defaults(block: Block, real: Real) -> Array:
-    return rounded([float(v.start) for v in block.parameters], real)
+    return real.rounded([float(v.start) for v in block.parameters])
 
 
 def _parameters(block: Block, real: Real, steps: Steps) -> Array:
@@ -183,7 +177,7 @@ def _is_sound(spread: Array, tolerance: Array) -> NDArray[np.bool_]:
 
 
 def _spread(block: Block, real: Real, steps: Steps, results: Array) -> Array:
-    """What rounding the numbers that go in changes in the results, shape (rows, results)."""
+    """Changes of the results by rounding of the inputs, shape (rows, results)."""
     random, found = np.random.default_rng(1), np.zeros_like(results)
     unit = float(np.finfo(f"f{real.size}").eps)
     first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
@@ -230,7 +224,7 @@ SIDES = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX})
 
 
 def _outcomes(block: Block, real: Real, steps: Steps) -> Array:
-    """How the comparisons in a step come out, shape (rows, comparisons)."""
+    """Outcomes of the comparisons in a step, shape (rows, comparisons)."""
     source = graph(block.step)
     asked = [(i, n) for i, n in enumerate(source.nodes) if n.op in COMPARISONS | SIDES]
     if not (asked and len(steps)):
@@ -252,7 +246,7 @@ def _changing(
     block: Block, real: Real, steps: Steps, before: Array, i: int, tolerance: Array
 ) -> Steps:
     """The rows in which changing parameter `i` changes most, relative to the tolerance."""
-    value = float(rounded(changed_value(block.parameters[i]), real))
+    value = float(real.rounded(changed_value(block.parameters[i])))
     changed = np.full(len(steps), i, np.int64)
     new = Steps(steps.states, steps.inputs, changed, np.full(len(steps), value))
     after, _ = made(block, real, new, guards=False)

@@ -12,14 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.compared import TOLERANCE, Run, terms, ulp
-from symfric.codegen.compiler import compile_object, link_program, needed_symbols
-from symfric.codegen.excitation import excitation, spoiled, varied
+from symfric.codegen.compared import TOLERANCE, Run, excitation, spoiled, terms, ulp, varied
 from symfric.codegen.generated import Generated
 from symfric.codegen.guards import HUGE, Status
 from symfric.codegen.layout import prefix
 from symfric.codegen.routines import routines
-from symfric.codegen.runner import program, run_c, run_vm, signals
+from symfric.codegen.runner import (
+    compile_object,
+    link_program,
+    needed_symbols,
+    program,
+    run_c,
+    run_vm,
+    signals,
+)
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation.checks import kind
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler, missing_compiler
@@ -35,7 +41,7 @@ FEWER = 4000
 @final
 @dataclass(frozen=True)
 class Check:
-    """What was found about one floating point type.
+    """Result of the verification of one floating point type.
 
     Attributes:
         real: "double" or "float".
@@ -84,7 +90,7 @@ class Check:
 
     @property
     def why(self) -> str:
-        """What is wrong, in words; "" where nothing is."""
+        """Reason of the failure; "" if there is none."""
         if self.ulp:
             return f"{self.worst} differs from CasADi by {self.ulp} ulp"
         if not self.error <= TOLERANCE:
@@ -120,7 +126,7 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """Whether everything was checked and as it should be."""
+        """Return True if everything was checked and is as it should be."""
         return self.status == VERIFIED
 
     def to_dict(self) -> dict[str, Any]:
@@ -207,7 +213,7 @@ def verify(
 
 
 def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
-    """What became of a block that runs away, and what to try."""
+    """Describe a block that runs away, and suggest a remedy."""
     if h is None:
         return f"it runs away within {steps} steps, in CasADi as in C; check signs and parameters"
     said = f"after {steps} steps of {h:g} s it runs away, in CasADi as in C: that step is too long"

@@ -182,7 +182,7 @@ def folded(block: Block) -> Block:
 
 
 def without_end(discretisation: str) -> str:
-    """What is said of a step of the law, without its force at the end, which is no output here."""
+    """Text about the step of the law without the force at its end, which is no output here."""
     return "\n".join(line for line in discretisation.splitlines() if "F_end" not in line)
 
 

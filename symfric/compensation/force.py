@@ -184,7 +184,7 @@ def _without_viscous(law: Law, force: ca.SX) -> ca.SX:
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:
-    """Whether both are the same function, by its values for random symbols."""
+    """Return True if both are the same function, by values for random symbols."""
     symbols = ca.symvar(ca.vertcat(a, b))
     look = ca.Function("both", [ca.vertcat(*symbols)], [a, b])
     points = np.random.default_rng(0).uniform(0.1, 2.0, (4, len(symbols)))
@@ -199,7 +199,7 @@ def _peaks(names: set[str]) -> dict[str, str]:
 
 
 def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
-    """Whether the dry force is a sum over the levels, each times a function of the velocity."""
+    """Return True if the dry force is a sum of levels, each times a function of the velocity."""
     if not levels:
         return False
     symbols = ca.vertcat(*(v.symbol for v in levels))

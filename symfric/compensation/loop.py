@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
-from symfric.codegen.compiler import FLAGS
 from symfric.codegen.layout import TEMPLATES, called, filled, prefix
-from symfric.codegen.runner import bound
+from symfric.codegen.runner import FLAGS
 from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
 from symfric.foundation.files import write_text
+from symfric.foundation.numeric import bound
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant
@@ -55,7 +55,7 @@ class Members:
             CompileError: the compiler refuses the C, or what it made does not load here.
         """
         self.block, count = block, len(values)
-        kind: Any = np.float32 if real == "float" else np.float64
+        kind = REALS[real].kind
         self.state = np.tile(np.array([v.start for v in block.states], kind), (count, 1))
         self.param = np.tile(np.array([v.start for v in block.parameters], kind), (count, 1))
         self.input = np.zeros((count, len(block.inputs)), kind)
@@ -131,7 +131,7 @@ WHERE = "close_loop"
 @final
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What all runs of a comparison share; see `close_loop`."""
+    """Settings that all runs of a comparison share; see `close_loop`."""
 
     controller: Cascade
     delay: int

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What a position loop is to follow, sample by sample, each of shape (n,).
+    """Reference of a position loop, sample by sample, each of shape (n,).
 
     Attributes:
         x, v, a: position [m], velocity [m/s], acceleration [m/s^2].
@@ -168,7 +168,7 @@ class Loop:
 
     @property
     def hunting(self) -> float:
-        """How far the position goes to and fro [m] in the second half of the last rest.
+        """Peak-to-peak motion [m] in the second half of the last rest.
 
         NaN where the reference does not rest at the end, or the loop ended early.
         """
@@ -225,12 +225,12 @@ class Comparison:
         return self.loops[name]
 
     def reduction(self, name: str) -> float:
-        """How many times smaller the RMS error of a case is than without compensation."""
+        """Factor by which the RMS error of a case is smaller than without compensation."""
         own = self[name].rms
         return self[WITHOUT].rms / own if own else np.inf
 
     def remarks(self) -> tuple[str, ...]:
-        """What a case does that nobody wants, one sentence each."""
+        """Undesirable behaviour of the cases, one sentence each."""
         found: list[str] = []
         before = self[WITHOUT]
         for loop in self.loops.values():

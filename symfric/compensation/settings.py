@@ -1,4 +1,4 @@
-"""What a friction compensator does: settings, their checks, and the formula they make."""
+"""Settings of a friction compensator, their checks, and the formula they make."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -15,7 +15,7 @@ VELOCITIES = ("blend", "reference", "measured")
 @final
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """What a friction compensator does; what is None or empty is not in its C at all.
+    """Settings of a friction compensator; features that are None or empty are not in its C.
 
     Every number is a parameter of the C that can be changed while it runs.
 
@@ -111,7 +111,7 @@ def settings_from_text(texts: Sequence[str]) -> Compensation:
 def chosen_settings(
     where: str, settings: Compensation | None, chosen: Mapping[str, Any]
 ) -> Compensation:
-    """What is asked for, checked."""
+    """Combine settings and keywords, and check them."""
     known = [item.name for item in fields(Compensation)]
     checks.check_names(where, chosen, known)
     if settings is None:
@@ -183,7 +183,7 @@ def _check_table(where: str, s: Compensation) -> None:
 
 
 def formula(s: Compensation) -> str:
-    """What the block computes, line by line."""
+    """Formula of the block, line by line."""
     wanted = "v_ref" + " + t_ahead a_ref" * (s.delay is not None)
     wanted += " + k_error e" * (s.error_gain is not None)
     moves = {

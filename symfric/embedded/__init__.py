@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from symfric.embedded.measure import Measured as Measured
     from symfric.embedded.measure import measure as measure
     from symfric.embedded.measure import wrong_on_target as wrong_on_target
-    from symfric.embedded.subjects import BY as BY
+    from symfric.embedded.target import BY as BY
     from symfric.embedded.target import CORES as CORES
     from symfric.embedded.target import Absent as Absent
     from symfric.embedded.target import Core as Core

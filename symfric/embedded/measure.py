@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.compiler import link_program
 from symfric.codegen.generated import Generated
 from symfric.codegen.layout import filled, prefix
-from symfric.codegen.runner import program, run_c, run_vm
-from symfric.embedded.subjects import BY, by_casadi, own
+from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.embedded.target import (
+    BY,
     CORES,
     SOURCES,
     Absent,
@@ -25,7 +24,9 @@ from symfric.embedded.target import (
     Target,
     Tools,
     built,
+    by_casadi,
     find_tools,
+    own,
     said,
 )
 from symfric.emitter.c99 import REALS
@@ -80,7 +81,7 @@ class Measured:
 
     @property
     def ok(self) -> bool:
-        """Whether it was measured and all numbers are finite."""
+        """Return True if it was measured and all numbers are finite."""
         return self.status == MEASURED and self.finite
 
     def to_dict(self) -> dict[str, Any]:
@@ -209,7 +210,7 @@ def wrong_on_target(
     flags: Sequence[str] = ("-O2",),
     tools: Tools | Absent | None = None,
 ) -> int:
-    """How many results of the kit's own unit test are wrong on a core under QEMU.
+    """Number of wrong results of the kit's own unit test on a core under QEMU.
 
     Args:
         generated: what `generate` returned, with the floating point type `real`.

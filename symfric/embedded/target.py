@@ -13,14 +13,124 @@ from pathlib import Path
 from re import fullmatch
 from typing import final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.layout import filled
-from symfric.embedded.subjects import Subject, literals
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.header import header
+from symfric.codegen.layout import called, filled, prefix
+from symfric.codegen.routines import source
+from symfric.emitter.c99 import REALS
 from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import ProgramError, finished
+
+BY = ("symfric", "casadi", "casadi, functions of float")
+"""Who writes the C: we; CasADi, whose code of float calls tanh, exp, fmax of double; CasADi with a
+header before it that maps them to those of float."""
+
+_MATH = (
+    *("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos"),
+    *("cosh", "erf", "exp", "expm1", "fabs", "floor", "fmax", "fmin", "fmod", "hypot", "log"),
+    *("log1p", "pow", "sin", "sinh", "sqrt", "tan", "tanh"),
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """Code with one step of a block in it.
+
+    Attributes:
+        source: the file to compile.
+        parts: of the main program, the places of `sources/measured.c`.
+    """
+
+    source: Path
+    parts: Mapping[str, str]
+
+
+def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
+    """Our C, written into `folder`, and its call."""
+    name, kind = prefix(block, REALS[real]), REALS[real]
+    write_text(folder / f"{name}.h", header(block, kind, guards))
+    write_text(folder / f"{name}.c", source(block, kind, guards))
+    pointers = {
+        "state": "&state",
+        "param": f"&{name}_default",
+        "in": f"(const {name}_in_t *)U[k]",
+        "out": f"({name}_out_t *)(Y[k] + {len(block.states)})",
+    }
+    inputs = [f"U[k][{i}]" for i in range(len(block.inputs))]
+    step = called(block, kind, guards, pointers, inputs)
+    declarations, start, keep = ["unsigned int status;"], "status = 0u;", "(void)k;"
+    if block.states:
+        declarations.append(f"{name}_state_t state;")
+        start += f" {name}_init(&state, &{name}_start);"
+        keep = "memcpy(Y[k], &state, sizeof state);"
+    sizes = [f"sizeof({name}_state_t)"] * bool(block.states)
+    sizes += [f"sizeof({name}_param_t)"] * bool(block.parameters)
+    return Subject(
+        folder / f"{name}.c",
+        {
+            "include": f'#include "{name}.h"',
+            "declarations": "\n".join(f"static {line}" for line in declarations),
+            "start": start,
+            "step": f"{'Y[k][0] = ' if block.is_function else 'status |= ' * guards}{step};",
+            "keep": keep,
+            "data": " + ".join(sizes) or "0u",
+        },
+    )
+
+
+def by_casadi(block: Block, real: str, folder: Path, *, functions_of_float: bool) -> Subject:
+    """CasADi's C of the same step, written into `folder`."""
+    options = {
+        "casadi_real": real,
+        "casadi_int": "int",
+        "static_aux": True,
+        "include_math": not functions_of_float,
+    }
+    generator = ca.CodeGenerator("casadi_step", options)
+    generator.add(block.step)
+    text = generator.dump()
+    if functions_of_float:
+        renamed = "".join(f"#define {name} {name}f\n" for name in _MATH)
+        text = f"#include <math.h>\n{renamed}\n{text}"
+    write_text(folder / "casadi_step.c", text)
+    return Subject(folder / "casadi_step.c", _casadi_parts(block, real))
+
+
+def _casadi_parts(block: Block, real: str) -> dict[str, str]:
+    f, n = block.step, len(block.states)
+    p, x = (
+        literals(np.array([v.start for v in group] or [0.0], dtype=float), real)
+        for group in (block.parameters, block.states)
+    )
+    static = [
+        f"const {real} X0[] = {{{x}}}, P[] = {{{p}}};",
+        f"{real} X[{n + 1}], XN[{n + 1}], W[{f.sz_w() + 1}];",
+        f"int IW[{f.sz_iw() + 1}];",
+        f"const {real} *ARG[{f.sz_arg()}];",
+        f"{real} *RES[{f.sz_res()}];",
+    ]
+    prototype = f"int step(const {real} **arg, {real} **res, int *iw, {real} *w, int mem);\n"
+    return {
+        "include": "",
+        "declarations": prototype + "\n".join(f"static {line}" for line in static),
+        "start": "memcpy(X, X0, sizeof X0);",
+        "step": f"ARG[0] = X; ARG[1] = P; ARG[2] = U[k]; RES[0] = XN; RES[1] = Y[k] + {n}; "
+        f"step(ARG, RES, IW, W, 0); memcpy(X, XN, {n} * sizeof X[0]);",
+        "keep": f"memcpy(Y[k], X, {n} * sizeof X[0]);",
+        "data": "sizeof X + sizeof XN + sizeof W + sizeof IW + sizeof ARG + sizeof RES + sizeof P",
+    }
+
+
+def literals(values: np.ndarray, real: str) -> str:
+    """Numbers as constants of C."""
+    form = "{:.9e}f" if real == "float" else "{:.17e}"
+    return ", ".join(form.format(float(value)) for value in values)
 
 
 @final
@@ -101,7 +211,7 @@ class Absent:
 
     @property
     def advice(self) -> str:
-        """What is absent and how to get it, in a sentence."""
+        """Sentence with the absent tools and how to install them."""
         packages = " ".join(PACKAGES[name] for name in self.names)
         return (
             f"{', '.join(self.names)} not found; on Debian and Ubuntu: "
@@ -121,7 +231,7 @@ def find_tools() -> Tools | Absent:
 
 
 def _has_library(gcc: str) -> bool:
-    """Whether the compiler finds the mathematical library: asked, it says a path, not a name."""
+    """Return True if the compiler finds libm: it then prints a path and not only the name."""
     try:
         said = finished((gcc, "-print-file-name=libm.a"), limit=LIBRARY_PATIENCE).output.strip()
     except ProgramError:
@@ -150,7 +260,7 @@ PATIENCE = 120.0
 @final
 @dataclass(frozen=True, eq=False)
 class Said:
-    """What a program said.
+    """Output of a program.
 
     Attributes:
         instructions: of every step, shape (steps,); each to a third of one, their mean exactly.
@@ -186,15 +296,15 @@ class Target:
         names = ("block", *(f"more_{k}" for k in range(1, len(sources))), "startup", "target")
         objects = [str(folder / f"{name}.o") for name in names]
         files = (*sources, SOURCES / "startup.c", folder / "target.c")
-        for source, item in zip(files, objects, strict=True):
-            gcc.run(*options, f"-I{folder}", "-c", str(source), "-o", item)
+        for file, item in zip(files, objects, strict=True):
+            gcc.run(*options, f"-I{folder}", "-c", str(file), "-o", item)
         image = folder / "image.elf"
         linking = ("-nostartfiles", f"-T{SOURCES / 'memory.ld'}", "-Wl,--gc-sections")
         gcc.run(*options, *linking, "--specs=nosys.specs", *objects, "-lm", "-o", str(image))
         return image
 
     def heard(self, image: Path) -> dict[str, NDArray[np.uint32]]:
-        """What an image says under QEMU: words by the name before them.
+        """Run an image under QEMU; its words by the name before them.
 
         Raises:
             CompileError: it does not start, comes to no end, or ends in a fault.
@@ -236,8 +346,8 @@ def built(subject: Subject, real: str, inputs: Array, columns: int, target: Targ
 
 
 def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
-    """What a measured program said."""
-    kind = np.float32 if real == "float" else np.float64
+    """Output of a measured program."""
+    kind = REALS[real].kind
     ticks = words["ticks"] - words["idle"].mean()
     return Said(
         instructions=ticks * (1e9 / CLOCK / 2**SHIFT),

@@ -126,7 +126,7 @@ class _Rolled:
         return name
 
     def _uses(self) -> Counter[tuple[int, int]]:
-        """How many straight parts use a row of an argument; a loop counts as two."""
+        """Number of straight parts that use a row of an argument; a loop counts as two."""
         uses = Counter(entry for part in self.parts for entry in part.inputs)
         for loop in self.plan.loops:
             for i in (*loop.body.outer, *loop.body.truths):
@@ -141,7 +141,7 @@ class _Rolled:
                 yield from ((group, row + i) for i in range(loop.size))
 
     def _loaded_first(self, loads: Places) -> dict[tuple[int, int], str]:
-        """What more than one part needs, or a loop from outside, or a loop overwrites."""
+        """Places that several parts need, or a loop from outside, or that a loop overwrites."""
         written = {array.text for array in self.arrays.written}
         lost = [array for array in self.arrays.read if array.text in written]
         uses = self._uses()

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.emitter.logic import OPPOSITE
 from symfric.foundation.graph import SELECT, Graph, Node
@@ -31,6 +32,16 @@ class Real:
     letter: str
     size: int
 
+    @property
+    def kind(self) -> Any:
+        """The same type in NumPy."""
+        return np.float32 if self.size == 4 else np.float64
+
+    def rounded(self, values: object) -> NDArray[np.float64]:
+        """Numbers rounded to this type, as doubles."""
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            return np.asarray(values, float).astype(self.kind).astype(float)
+
     def literal(self, value: float) -> str:
         """The shortest literal that reads back as `value` rounded to this type.
 
@@ -38,7 +49,7 @@ class Real:
             ValueError: NaN, or a number that overflows or vanishes in this type.
         """
         with np.errstate(over="ignore", under="ignore"):
-            rounded = np.float32(value) if self.size == 4 else np.float64(value)
+            rounded = self.kind(value)
         if math.isnan(value) or (math.isinf(rounded) and not math.isinf(value)):
             raise ValueError(
                 f"codegen: expected constants within the range of {self.name}, got {value!r}"
@@ -62,7 +73,7 @@ REALS = {real.name: real for real in (DOUBLE, FLOAT)}
 
 @dataclass(frozen=True)
 class Form:
-    """How an operation is written: `pattern` with operands that bind as tightly as `needs`.
+    """C text of an operation: `pattern` with operands that bind as tightly as `needs`.
 
     Attributes:
         logical: the result is a bool.
@@ -136,7 +147,7 @@ FUNCTIONS = CHEAP | TRANSCENDENTAL
 
 
 def form(op: int, arity: int, real: Real) -> Form:
-    """How the operation `op` with `arity` operands is written."""
+    """C text of the operation `op` with `arity` operands."""
     if op in FORMS:
         return FORMS[op]
     operands = ", ".join(["{}"] * arity)

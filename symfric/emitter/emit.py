@@ -111,7 +111,7 @@ def _stores(
     loads: Mapping[tuple[int, int], str],
     truths: Collection[int],
 ) -> Stores:
-    """How results are written, see `emit`."""
+    """Rules for writing results, see `emit`."""
     inputs = {node.entry: i for i, node in enumerate(source.nodes) if node.op == ca.OP_INPUT}
     patterns = {Store(k, j): text for k, row in enumerate(targets) for j, text in enumerate(row)}
     shared = [names[i][j] for i, j in inputs if (i, j) not in loads]
@@ -133,7 +133,7 @@ def _stores(
 
 
 def _place(pattern: str) -> str:
-    """Where a result is written to."""
+    """Place that a result is written to."""
     return pattern.partition(" ")[0]
 
 
@@ -176,7 +176,7 @@ class _Body:
         return lines
 
     def _loaded(self, number: int, statement: Statement) -> list[int]:
-        """What has to be loaded before a statement of a region."""
+        """Nodes that have to be loaded before a statement of a region."""
         places, written = self.plan.placed.place, self._written(statement)
         taken = self.plan.takes[statement]
         wanted = [i for i in taken if i in self.loads and places[i] == number]
@@ -251,7 +251,7 @@ def _indented(lines: Sequence[str]) -> list[str]:
 
 
 def _is_one_block(lines: Sequence[str]) -> bool:
-    """Whether the lines are a single `if` with all that belongs to it."""
+    """Return True if the lines are a single `if` with all that belongs to it."""
     inner = (line.startswith((INDENT, "} else")) for line in lines[1:-1])
     return lines[-1] == "}" and all(inner)
 

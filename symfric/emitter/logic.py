@@ -66,7 +66,7 @@ def simplified(
 
 
 def logical(nodes: Sequence[Node], conditions: Collection[int] = ()) -> list[bool]:
-    """Whether each node is a bool."""
+    """For each node, True if it is a bool."""
     found: list[bool] = []
     for node in nodes:
         found.append(is_logical(node, found, conditions))
@@ -74,7 +74,7 @@ def logical(nodes: Sequence[Node], conditions: Collection[int] = ()) -> list[boo
 
 
 def is_logical(node: Node, before: Sequence[bool], conditions: Collection[int]) -> bool:
-    """Whether a node is a bool, by what is known of those before it."""
+    """Return True if a node is a bool, by what is known of those before it."""
     if node.op == ca.OP_INPUT:
         return node.entry[0] in conditions
     if node.op == SELECT:
@@ -91,7 +91,7 @@ class _Algebra:
     known: dict[Node, int] = field(default_factory=dict[Node, int])
     logical: list[bool] = field(default_factory=list[bool])
     number: list[bool] = field(default_factory=list[bool])
-    """Whether it is never NaN unless an input or an operation made it so: constants and bools."""
+    """True for constants and bools, which are NaN only if an input or an operation made them so."""
 
     def of(self, node: Node, args: Sequence[int]) -> int:
         """The number of a node that means `node` with these arguments."""
@@ -145,7 +145,7 @@ class _Algebra:
         return node.value if node.op == ca.OP_CONST else None
 
     def truth(self, i: int) -> int:
-        """Whether a number is not 0, as a bool or a constant."""
+        """Node that is true if a number is not 0: a bool or a constant."""
         return i if self.logical[i] else self.compared(ca.OP_NE, i, self.constant(0.0))
 
     def negated(self, i: int) -> int:
@@ -241,7 +241,7 @@ class _Algebra:
         return True if self.logical[i] else self.value(i)
 
     def _sees_zero(self, op: int, node: Node) -> bool:
-        """Whether the node compares with 0 as its operand does."""
+        """Return True if the node compares with 0 as its operand does."""
         return node.op == ca.OP_SIGN or (node.op in TRUTHFUL and op in OPPOSITE)
 
     def extreme(self, op: int, a: int, b: int) -> int:
@@ -317,7 +317,7 @@ def settled(source: Graph) -> Graph:
 
 
 def _facts(source: Graph) -> list[frozenset[Fact]]:
-    """What holds wherever the value of a node matters."""
+    """Facts that hold wherever the value of a node matters."""
     found: list[frozenset[Fact] | None] = [None] * len(source.nodes)
     for row in source.results:
         for i in row:
@@ -356,7 +356,7 @@ def _implied(source: Graph, number: int, truth: bool) -> Iterator[Fact]:
 
 
 def _holds(source: Graph, number: int, facts: frozenset[Fact]) -> bool | None:
-    """Whether a condition holds; None where the facts do not tell."""
+    """Truth of a condition; None if the facts do not determine it."""
     for truth in (True, False):
         if (number, truth) in facts:
             return truth

@@ -50,7 +50,7 @@ class Array:
     text: str
 
     def holds(self, group: int, row: int) -> bool:
-        """Whether the row belongs to it."""
+        """Return True if the row belongs to it."""
         return group == self.group and self.first <= row < self.first + self.size
 
 
@@ -80,7 +80,7 @@ Strand = Store | Sum
 @final
 @dataclass(frozen=True)
 class Body:
-    """What a loop does for each element, as a graph.
+    """Operations of a loop for each element, as a graph.
 
     Attributes:
         graph: arguments `OUTER`, `TRUTH`, `READ`, `TABLE`; results `STORED`, `ADDED`.
@@ -229,7 +229,7 @@ def woven(source: Graph, strands: Sequence[Strand], read: Sequence[Array]) -> Bo
 
 
 def is_truth(source: Graph, i: int) -> bool:
-    """Whether a node is a condition and not a number."""
+    """Return True if a node is a condition and not a number."""
     node = source.nodes[i]
     if node.op == SELECT:
         return all(is_truth(source, k) for k in node.args[1:])

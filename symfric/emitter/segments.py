@@ -39,7 +39,7 @@ class Loop:
 
     @property
     def sums(self) -> list[Sum]:
-        """What it adds up."""
+        """Sums that it adds up."""
         return [strand for strand in self.strands if isinstance(strand, Sum)]
 
     @property
@@ -56,7 +56,7 @@ class Loop:
 @final
 @dataclass(frozen=True)
 class Plan:
-    """Where everything is computed.
+    """Place of every computation.
 
     Attributes:
         loops: in the order of their execution.
@@ -137,7 +137,7 @@ def _idle(plan: Plan) -> set[Strand]:
 
 
 def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
-    """Where too much is computed in several places, what does so most."""
+    """The loop that repeats most computations, if too many are repeated."""
     nodes = plan.source.nodes
     executed = _cost([nodes[i] for i in plan.part])
     executed += sum(loop.size * (loop.cost + len(loop.sums)) for loop in plan.loops)
@@ -205,7 +205,7 @@ def _texts(body: Body, read: Sequence[Array]) -> dict[str, list[int]]:
 def _overwriting(
     loops: Sequence[Loop], read: Sequence[Array], written: Sequence[Array]
 ) -> set[Strand]:
-    """What would overwrite rows before they have been read."""
+    """Loops that would overwrite rows before they have been read."""
     found = set[Strand]()
     for i, loop in enumerate(loops):
         for store in loop.stores:

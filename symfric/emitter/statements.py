@@ -121,7 +121,7 @@ Statement = Local | Branch | Side | Store
 @final
 @dataclass(frozen=True)
 class Stores:
-    """How results are written.
+    """Rules for writing results.
 
     Attributes:
         late: all of them when all else is done.
@@ -214,7 +214,7 @@ class _Planner:
                     self.items[0].append(store)
 
     def _is_there(self, select: int, value: int) -> bool:
-        """Whether a side of a select need not be written: it has its place, or never left it."""
+        """Return True if a side of a select is in its place already and need not be written."""
         if self.goals.get(value) == select:
             return True
         goal: int | Store | None = select
@@ -223,7 +223,7 @@ class _Planner:
         return goal is not None and self.stores.same.get(goal) == value
 
     def _connect(self) -> None:
-        """What every statement takes."""
+        """Connect every statement with the nodes that it takes."""
         found = self.placed
         homes: dict[int, tuple[Statement, int]] = {}
         for number, statements in enumerate(self.items):
@@ -331,7 +331,7 @@ def _written(found: Placed) -> Iterator[tuple[int, int]]:
 
 
 def _uses(found: Placed) -> Counter[int]:
-    """How often each node is written out."""
+    """Number of times that each node is written out."""
     uses: Counter[int] = Counter()
     for i, times in _written(found):
         uses[i] += times
@@ -339,7 +339,7 @@ def _uses(found: Placed) -> Counter[int]:
 
 
 def _locals(found: Placed, uses: Counter[int]) -> frozenset[int]:
-    """What is shared, or too long to be read inside a formula."""
+    """Nodes that are shared, or too long to be read inside a formula."""
     whole = {i for row in found.source.results for i in row}
     whole |= {side for i in found.labels for side in found.source.nodes[i].args[1:]}
     kept, weight = set[int](), [0] * len(found.source.nodes)

@@ -1,4 +1,4 @@
-"""Pictures of laws: the steady curve, and what the law does beside it."""
+"""Pictures of laws: the steady curve, and what else the law does."""
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -106,11 +106,11 @@ Array = NDArray[np.float64]
 LAYERS = 50.0
 """Half of the window around rest, in velocities over which the law is smooth, at most."""
 ABREAST = 3
-"""Behaviours beside each other."""
+"""Behaviours in a row."""
 
 
 def plot_laws(laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | None = None) -> Figure:
-    """One law, or several, in one picture: the steady curve, and what the law does beside it.
+    """One law, or several, in one picture: the steady curve, and what else the law does.
 
     Above stands the force in steady sliding over the velocity, around rest on a window that fits
     the law, and over decades of the velocity. Below stands what that curve cannot tell: hysteresis

@@ -12,12 +12,12 @@ import numpy as np
 
 from symfric.figures.data import Curve, FigureData
 from symfric.figures.regularisation import (
-    Bed,
+    Machine,
     Measure,
     Regularisation,
     Sample,
-    bed_of,
     distance,
+    machine_of,
     regularisation,
     sample,
 )
@@ -151,8 +151,8 @@ def recommended(
     check_law(f"{where}: law", law)
     wanted = checks.number(f"{where}: error", error, above=0.0, upper=1.0)
     rtol = checks.number(f"{where}: rtol", rtol, lower=1e-12, upper=1e-3)
-    bed = bed_of(where, scene, t_end, of, u)
-    search = _Search(bed, regularisation(where, law, parameter), wanted, rtol)
+    machine = machine_of(where, scene, t_end, of, u, law)
+    search = _Search(machine, regularisation(where, law, parameter), wanted, rtol)
     if exact is None:
         search.settle()
     else:
@@ -165,8 +165,8 @@ def recommended(
 class _Search:
     """The runs along the curve, driest last."""
 
-    def __init__(self, bed: Bed, knob: Regularisation, wanted: float, rtol: float) -> None:
-        self.bed, self.knob, self.wanted, self.rtol = bed, knob, wanted, rtol
+    def __init__(self, machine: Machine, knob: Regularisation, wanted: float, rtol: float) -> None:
+        self.machine, self.knob, self.wanted, self.rtol = machine, knob, wanted, rtol
         self.fine = max(FINEST, min(0.1 * rtol, 1e-3 * wanted))
         self.runs: list[Sample] = []
         self.reference: Sample | None = None
@@ -174,7 +174,8 @@ class _Search:
 
     def run(self, s: float, rtol: float) -> Sample:
         """The machine with the widths at the factor `s`."""
-        return sample(self.bed, self.knob.at(s), rtol, s, self.knob.values(s), max_steps=MOST_STEPS)
+        law, values = self.knob.at(s), self.knob.values(s)
+        return sample(self.machine, law, rtol, s, values, max_steps=MOST_STEPS)
 
     def drier(self) -> None:
         """One more run, its widths a quarter of those before."""
@@ -203,7 +204,7 @@ class _Search:
 
     def compare(self, exact: Law) -> None:
         """Go on until two runs keep the wanted error off the motion with the law `exact`."""
-        own = replace(self.bed, free=False)
+        own = replace(self.machine, free=False)
         self.reference = sample(own, exact, self.fine)
         self.about, self.uncertain = type(exact).__name__, self.fine
         while len(self.runs) < 2 or max(map(self.off, self.runs[-2:])) > self.wanted:
@@ -309,7 +310,7 @@ class _Search:
         unit = parameters(self.knob.law)[name].unit
         return FigureData(
             "recommended",
-            f"{self.bed.name}, {self.bed.t_end:g} s: error against dry friction",
+            f"{self.machine.name}, {self.machine.t_end:g} s: error against dry friction",
             {name: unit, "error": "1", "steps": "1", "time": "s"},
             ((name, "error"), (name, "steps"), (name, "time")),
             (curve,),
@@ -329,7 +330,7 @@ class _Search:
         best = f"{errors.min():.2g}" if errors.size else "unknown"
         law = type(self.knob.law).__name__
         message = (
-            f"recommended: {law} does not keep an error of {self.wanted:g} in {self.bed.name}: "
+            f"recommended: {law} does not keep an error of {self.wanted:g} in {self.machine.name}: "
             f"tried to {self.shown(last.s)}, the smallest error is {best}; {why}"
         )
         raise SolveError(message, Status.SOLVER_FAILED, curve) from cause

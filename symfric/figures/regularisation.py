@@ -23,6 +23,7 @@ Far from the limit there is no order at all: where rest is longer than motion, c
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, isfinite
 from time import process_time
 from typing import final
@@ -47,7 +48,6 @@ from symfric.scenes import Scene
 Array = NDArray[np.float64]
 Measure = Sequence[str] | Callable[[Trajectory], Array]
 """Signals by name, or a function that takes numbers from a trajectory, such as periods."""
-Builder = Scene | type[Scene] | Callable[[Law], Model]
 SAMPLES = 2001
 """Times at which motions are compared."""
 NEGLIGIBLE = 1e-9
@@ -58,23 +58,29 @@ STILL = 1e-9
 """A signal that moves by less than this times its nominal size is measured by the latter."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Regularisation:
     """The parameters that make `law` smooth, scaled together by a factor s; dry friction at s = 0.
 
     Attributes:
-        names: what is scaled: widths, velocities and paths by s, stiffnesses and inverse
-            velocities by 1/s, the damping of bristles by 1/sqrt(s), the same part of critical.
+        powers: parameter -> power of s: widths, velocities and paths are scaled by s, stiffnesses
+            and inverse velocities by 1/s, the damping of bristles by 1/sqrt(s), the same part of
+            critical.
     """
 
     law: Law
-    names: tuple[str, ...]
+    powers: Mapping[str, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(self.powers)
 
     def values(self, s: float) -> dict[str, float]:
         """Their values at the factor `s`."""
         known = parameters(self.law)
-        return scaled(self.law, {n: _power(known[n]) for n in self.names}, s)
+        scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
+        return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
 
     def at(self, s: float) -> Law:
         """The law at the factor `s`."""
@@ -84,7 +90,7 @@ class Regularisation:
         """The factor at which the first of the parameters has this value."""
         first = parameters(self.law)[self.names[0]]
         now = float(first.value)
-        return (value / now) ** (1 / _power(first))
+        return (value / now) ** (1 / self.powers[first.name])
 
 
 def regularisation(
@@ -138,13 +144,7 @@ def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
             raise checks.refused(f"{where}: law: {name}", "a number > 0 to start from", value)
     if not names:
         raise ValueError(f"{where}: parameter: expected the names of one or more, got none")
-    return Regularisation(law, names)
-
-
-def scaled(law: Law, powers: Mapping[str, float], s: float) -> dict[str, float]:
-    """The values of parameters (name -> power of s) of `law` at the factor `s`."""
-    known = parameters(law)
-    return {n: float(f"{float(known[n].value) * s**p:.{DIGITS}g}") for n, p in powers.items()}
+    return Regularisation(law, {name: _power(known[name]) for name in names})
 
 
 def _power(p: Parameter) -> float:
@@ -156,28 +156,41 @@ def _power(p: Parameter) -> float:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Bed:
+class Machine:
     """A machine that takes any law, and the signals by which laws are compared.
 
     Attributes:
         name: of the machine.
-        model: law -> equations.
-        t_end: how long [s].
+        make: law -> scene or model.
+        t_end: how long a motion is [s].
         of: which signals, or which numbers; None for the positions.
-        free: whether the widths are parameters of one model and not numbers in each.
         u: inputs of the model.
-        backend: engine of the runs, see `simulate`.
         times: at which motions are compared [s]; None for equally spaced ones.
+        places: fields of the scene that hold the law; None for all that hold its kind.
+        free: whether the widths are parameters of one model and not numbers in each.
+        backend: engine of the runs, see `simulate`.
     """
 
     name: str
-    model: Callable[[Law], Model]
+    make: Callable[[Law], object]
     t_end: float
     of: Measure | None = None
-    free: bool = False
     u: Mapping[str, Input] | None = None
-    backend: str = "auto"
     times: Array | None = None
+    places: tuple[str, ...] | None = ("law",)
+    free: bool = False
+    backend: str = "auto"
+
+    def model(self, law: Law) -> Model:
+        """The model with `law`.
+
+        Raises:
+            ValueError: the machine refuses it, or gives neither scene nor model.
+        """
+        made = self.make(law)
+        if isinstance(made, Scene):
+            return made.model()
+        return checks.kind(f"{self.name}({type(law).__name__})", made, Model, "a scene or a Model")
 
 
 @final
@@ -205,39 +218,47 @@ class Sample:
     size: Array
 
 
-def bed_of(
+def machine_of(
     where: str,
     scene: object,
     t_end: float | None,
-    of: Measure | None = None,
-    u: Mapping[str, Input] | None = None,
-) -> Bed:
-    """A scene, a class of scenes or a function law -> model as a bed.
+    of: Measure | None,
+    u: Mapping[str, Input] | None,
+    probe: Law,
+    backend: str = "auto",
+) -> Machine:
+    """A scene, a class of scenes, or a function law -> scene or model, as a machine.
 
-    A scene is driven as it is when nobody says how, unless `u` says so.
+    A scene is driven as it is when nobody says how, unless `u` says so. A function is called with
+    `probe` once.
 
     Raises:
-        ValueError: none of these, or no end where nothing says one.
+        ValueError: none of these, no end where nothing says one.
     """
     if of is not None and not callable(of):
         of = checks.names(f"{where}: of", of)
-    kind = scene if isinstance(scene, type) else type(scene)
-    if not callable(scene) and not isinstance(scene, Scene):
-        raise checks.refused(
-            f"{where}: scene", "a scene such as FourMass, or a function law -> Model", scene
-        )
-    end, u = driven(where, kind, t_end, u)
+    places: tuple[str, ...] | None = ("law",)
+    make: Callable[[Law], object]
     if isinstance(scene, Scene):
-        return Bed(kind.__name__, lambda law: replace(scene, law=law).model(), end, of, u=u)
-    if issubclass(kind, Scene):
-        return Bed(kind.__name__, lambda law: kind(law).model(), end, of, u=u)
-    build = scene
+        make, kind, name = partial(_in_scene, scene), type(scene), type(scene).__name__
+    elif isinstance(scene, type) and issubclass(scene, Scene):
+        make, kind, name = scene, scene, scene.__name__
+    elif callable(scene):
+        make, places = scene, None
+        first = make(probe)
+        if not isinstance(first, Scene | Model):
+            called = f"{where}: scene({type(probe).__name__})"
+            raise checks.refused(called, "a scene or a Model", first)
+        kind, name = type(first), first.name if isinstance(first, Model) else type(first).__name__
+    else:
+        what = "a scene such as Rabinowicz, or a function law -> Model"
+        raise checks.refused(f"{where}: scene", what, scene)
+    end, given = driven(where, kind, t_end, u)
+    return Machine(name, make, end, of, given, places=places, backend=backend)
 
-    def model(law: Law) -> Model:
-        made: object = build(law)
-        return checks.kind(f"{where}: scene({type(law).__name__})", made, Model, "a Model")
 
-    return Bed(getattr(build, "__name__", kind.__name__), model, end, of, u=u)
+def _in_scene(scene: Scene, law: Law) -> Scene:
+    return replace(scene, law=law)
 
 
 def driven(
@@ -258,46 +279,48 @@ def driven(
 
 
 def sample(
-    bed: Bed,
+    machine: Machine,
     law: Law,
     rtol: float,
     s: float = 0.0,
     values: dict[str, float] | None = None,
     repeats: int = 1,
     max_steps: int = 10_000_000,
+    model: Model | None = None,
 ) -> Sample:
-    """Run the machine of `bed` with `law`, timed as the fastest of `repeats` calls.
+    """Run `machine` with `law`, whose model it makes; timed as the fastest of `repeats` calls.
 
     Raises:
         SolveError: the run failed.
         KeyboardInterrupt: somebody stopped it.
     """
-    model = bed.model(law)
+    made = machine.model(law) if model is None else model
 
     def timed() -> tuple[float, Trajectory]:
         begin = process_time()
-        p = values if bed.free else None
+        p = values if machine.free else None
         run = simulate(
-            model, bed.t_end, rtol=rtol, samples=SAMPLES, t_eval=bed.times, p=p, u=bed.u,
-            max_steps=max_steps, backend=bed.backend,
+            made, machine.t_end, rtol=rtol, samples=SAMPLES, t_eval=machine.times, p=p,
+            u=machine.u, max_steps=max_steps, backend=machine.backend,
         )  # fmt: skip
         return process_time() - begin, run
 
     spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])
     if run.status is Status.INTERRUPTED:
         raise KeyboardInterrupt  # a part of a motion is no sample
-    motion, size = looked_at(bed, model, run, law)
+    motion, size = looked_at(machine, made, run, law)
     steps, lost = run.statistics.steps, run.statistics.rejections
     return Sample(s, values or {}, rtol, steps, steps + lost, spent, motion, size)
 
 
-def looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
+def looked_at(machine: Machine, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
     """Signals on which errors are measured, shape (signals, times), and their sizes."""
-    if callable(bed.of):
-        rows = checks.array(f"{bed.name}: of", bed.of(run), ndim=None, nan=True).reshape(-1, 1)
+    if callable(machine.of):
+        found = checks.array(f"{machine.name}: of", machine.of(run), ndim=None, nan=True)
+        rows = found.reshape(-1, 1)
         size = np.abs(rows)[:, 0]
         return rows, np.where(size > 0, size, 1.0)
-    names = bed.of or positions(model, law)
+    names = machine.of or positions(model, law)
     rows = np.array([run[name] for name in names])
     nominal = {v.name: v.nominal for v in model.x}
     least = STILL * np.array([nominal.get(name, 1.0) for name in names])

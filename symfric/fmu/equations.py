@@ -1,4 +1,4 @@
-"""What a unit computes, written in C: the step of the integrator, signals, start values, events.
+"""Equations of a unit in C: the step of the integrator, signals, start values, events.
 
 All of it comes from the functions that `simulate` runs, through the emitter: the same bits, without
 CasADi at run time.
@@ -71,7 +71,7 @@ class Equations:
 
     @property
     def formula(self) -> str:
-        """What the steps are, in words."""
+        """Name of the method and of its kind of steps."""
         if self.exchange:
             return "rates of the states"
         if self.step is None:
@@ -135,7 +135,7 @@ def _check_rates(model: Model, system: System) -> None:
 
 
 def _places(integrator: Integrator) -> list[int]:
-    """Where the algebraic variables of the model stand among the unknowns."""
+    """Positions of the algebraic variables of the model among the unknowns."""
     names = list(integrator.system.names)
     return [names.index(v.name) for v in integrator.model.z]
 

@@ -225,7 +225,7 @@ def _model(
 
 
 def _switches_on(value: object) -> bool:
-    """Whether a parameter is a number other than zero."""
+    """Return True if a parameter is a number other than zero."""
     number = checks.as_number(value)
     return number is not None and number != 0.0
 

@@ -27,7 +27,7 @@ CATEGORIES = ("logStatusDiscard", "logStatusError")
 @final
 @dataclass(frozen=True, eq=False)
 class Described:
-    """What stands in modelDescription.xml beside the variables.
+    """Content of modelDescription.xml besides the variables.
 
     Attributes:
         name: of the model.
@@ -59,12 +59,12 @@ class Described:
 
     @property
     def tag(self) -> str:
-        """What the standard calls its kind."""
+        """Name of its kind in the standard."""
         return "ModelExchange" if self.exchange else "CoSimulation"
 
     @property
     def variable_steps(self) -> bool | None:
-        """Whether communication steps may be of any length; None where there are none."""
+        """True if communication steps may have any length; None if there are none."""
         return None if self.exchange else True
 
 
@@ -147,7 +147,7 @@ def _numbers(entry: Entry) -> dict[str, object]:
 
 
 def _unknowns(entries: Iterable[Entry]) -> list[Entry]:
-    """What is calculated at the start: outputs and states that are not set, and rates."""
+    """Unknowns at the start: outputs and states that are not set, and rates."""
     calculated = (e for e in entries if e.initial in ("approx", "calculated"))
     return [e for e in calculated if e.causality == "output" or e.kind == "rate"]
 
@@ -259,7 +259,7 @@ ENDINGS = {"windows": ".dll", "darwin": ".dylib"}
 
 
 def platform_name(fmi: int) -> str:
-    """What the standard calls this platform."""
+    """Name of this platform in the standard."""
     machine = platform.machine().lower()
     system = SYSTEMS.get(platform.system(), platform.system().lower())
     name = f"{MACHINES.get(machine, machine)}-{system}"

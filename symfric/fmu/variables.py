@@ -208,7 +208,7 @@ def _pattern(expression: ca.SX, symbols: ca.SX) -> NDArray[np.bool_]:
 
 
 def _reach(of_unknown: NDArray[np.bool_], of_known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What each unknown may depend on: all that equations contain which share unknowns with it."""
+    """Symbols that each unknown may depend on: all in equations that share unknowns with it."""
     group = of_unknown.T.astype(int) @ of_unknown.astype(int) > 0
     group |= np.eye(group.shape[0], dtype=bool)
     while ((wider := group.astype(int) @ group.astype(int) > 0) != group).any():

@@ -6,7 +6,7 @@ a law written with these keeps the type it was given.
 
 import ctypes
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import erf as erf_of_float
 from numbers import Real
 from typing import Any, cast
@@ -142,13 +142,26 @@ def evaluate_all(
 ) -> list[NDArray[np.float64]]:
     """All outputs of `function`, which must be dense, as matrices; see `evaluate`."""
     results = [np.zeros(function.size_out(i)[::-1]) for i in range(function.n_out())]
+    bound(function, arguments, results)()
+    return [result.T for result in results]
+
+
+def bound(
+    function: ca.Function,
+    arguments: Sequence[NDArray[np.float64]],
+    results: Sequence[NDArray[np.float64]],
+) -> Callable[[], None]:
+    """A call of `function` without copies: CasADi reads and writes the contiguous arrays."""
     buffer, call = cast(tuple[Any, Any], function.buffer())
     for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
         for i, array in enumerate(arrays):
             if array.size:
                 place(i, flat_view(array))
-    call()
-    return [result.T for result in results]
+
+    def run(_alive: object = (function, buffer)) -> None:
+        call()
+
+    return run
 
 
 def address(array: NDArray[np.float64]) -> int:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 100, 25
 """Columns and lines of a screen."""
-WORDS = 48
-"""Letters of the last column of a table of text."""
 DOTS_PER_INCH = 80
 """Of pictures in notebooks."""
 BOX = "font-family:sans-serif;font-size:13px;line-height:1.35;max-width:64em"

@@ -44,10 +44,9 @@ from symfric.integrator.arguments import (
 from symfric.integrator.equations.initial import consistent, first_guess, first_step
 from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.equations.system import System
-from symfric.integrator.running.dense import Dense, Outputs, hermite
 from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import built
-from symfric.integrator.running.record import Run
+from symfric.integrator.running.record import Dense, Outputs, Run, hermite
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.stored import trajectory_of
 from symfric.model import Model

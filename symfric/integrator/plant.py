@@ -12,7 +12,7 @@ from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
-from symfric.integrator.many.plants import pays, side_by_side, with_events
+from symfric.integrator.many.members import pays, side_by_side
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
@@ -30,6 +30,7 @@ from symfric.integrator.running.plants import (
     Plants,
     compiled,
     in_vm,
+    with_events,
 )
 from symfric.integrator.running.run import MOST_ORDERS
 from symfric.integrator.step.layout import Given, State

@@ -305,10 +305,10 @@ def simulate(
     if integrator.has_pivots:
         at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
         integrator = integrator.suited([at_start], t_end - t_start)
-    run, count = _solve(
+    run, own, count = _solve(
         integrator, inputs, y0, values, allowed, backend, progress, build_time, looks
     )
-    for said in doubts(run.integrator or integrator, inputs, run, values):
+    for said in doubts(own, inputs, run, values):
         run.message += f" {said}"
         warnings.warn(type(said)(f"simulate '{model.name}': {said}"), stacklevel=2)
     trajectory = trajectory_of(integrator, inputs, run, values, count, backend)
@@ -317,7 +317,6 @@ def simulate(
     if which is not None and run.steps:
         basis = Basis(which, y0, tuple(run.jumps), allowed.event)
         known = trajectory.t, run.outputs.reached
-        own = run.integrator or integrator
         make = partial(basis.path, own, run.dense, inputs, values, backend, known)
         found = Differentiated(make, which, tuple(trajectory.units), trajectory.t)
         trajectory = replace(
@@ -348,10 +347,10 @@ def _solve(
     progress: Callable[[float], None] | None,
     build_time: float,
     times: Array,
-) -> tuple[Run, Callable[[], Statistics]]:
-    """Run the chosen engine; what came of it and what it took."""
+) -> tuple[Run, Integrator, Callable[[], Statistics]]:
+    """Run the chosen engine; what came of it, the integrator it ended with, what it took."""
     compiled_before, begin = integrator.compile_time, perf_counter()
-    run = integrate(integrator, inputs, y0, p, allowed, backend, progress, times)
+    run, own = integrate(integrator, inputs, y0, p, allowed, backend, progress, times)
     compile_time = integrator.compile_time - compiled_before
     run_time = perf_counter() - begin - compile_time
 
@@ -372,4 +371,4 @@ def _solve(
             run_time=run_time,
         )
 
-    return run, count
+    return run, own, count

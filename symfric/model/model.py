@@ -15,13 +15,12 @@ import casadi as ca
 from symfric.foundation import checks, packed
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.shown import Showing, Shown
+from symfric.foundation.shown import Showing, Shown, Table, among, counted, figure_of
 from symfric.foundation.symbols import stacked
 from symfric.model.forces import closed, opened, reopened, with_forces
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Monitor, Output
 from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
-from symfric.model.shown import shown
 from symfric.model.start import System, accelerations
 
 Variables = tuple[Variable, ...]
@@ -262,3 +261,50 @@ def check_model(where: str, model: object) -> None:
         }
         hint = next((advice for way, advice in ways.items() if hasattr(model, way)), "")
     raise checks.refused(where, "a model, such as rabinowicz(LuGre())", model, hint)
+
+
+WORDS = {
+    "x": ("state", "states"),
+    "z": ("algebraic variable", "algebraic variables"),
+    "u": ("input", "inputs"),
+    "p": ("parameter", "parameters"),
+}
+
+
+def shown(model: System) -> Shown:
+    """Names, units and start values of everything, and where there is friction by which law."""
+    counts = [counted(len(getattr(model, g)), *words) for g, words in WORDS.items()]
+    counts += [counted(len(model.outputs), "output")]
+    return Shown(
+        f"model '{model.name}': {', '.join(c for c in counts if not c.startswith('no '))}",
+        table=Table(("name", "what", "unit", "start", ""), tuple(_rows(model)), numbers=(3,)),
+        after=tuple(_after(model)),
+    )
+
+
+def _rows(model: System) -> list[tuple[str, ...]]:
+    rows = [_row(v, one) for g, (one, _) in WORDS.items() for v in getattr(model, g)]
+    return rows + [(name, "output", o.unit, "", o.doc) for name, o in model.outputs.items()]
+
+
+def _row(v: Variable, what: str) -> tuple[str, ...]:
+    return v.name, what, v.unit, figure_of(v.start), v.doc
+
+
+def _after(model: System) -> list[str]:
+    found = list[str]()
+    if model.contacts:
+        found.append(f"friction: {friction(model)}")
+    if model.events:
+        found.append(f"events: {among(e.name for e in model.events)}")
+    if "further" in model.__dict__:
+        found.append(f"further results: {among(model.__dict__['further'])}")
+    return found
+
+
+def friction(model: System) -> str:
+    """Where there is friction by which law: "belt by LuGre"; all contacts of a law together."""
+    laws: dict[str, list[str]] = {}
+    for contact in model.contacts:
+        laws.setdefault(type(contact.law).__name__, []).append(contact.name)
+    return "; ".join(f"{among(places, 4)} by {law}" for law, places in laws.items())

@@ -86,7 +86,7 @@ def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
 
 
 def _free(eq: Equations) -> bool:
-    """Whether all bodies hang freely on the ground."""
+    """Return True if all bodies hang freely on the ground."""
     links = eq.kin.topology.links
     return bool(links) and all(isinstance(x.joint, Floating) and x.base == GROUND for x in links)
 
@@ -172,7 +172,7 @@ class Rest:
 
     @property
     def is_loop(self) -> bool:
-        """Whether its members move together along the tangent of constraints."""
+        """Return True if its members move together along the tangent of constraints."""
         return not self.along[0].is_one()
 
     def needed(self, forces: Sequence[ca.SX]) -> ca.SX:

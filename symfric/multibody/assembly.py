@@ -106,7 +106,7 @@ def assemble(
 @final
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """What a mechanism is, whatever its friction forces are."""
+    """Parts of a mechanism that do not depend on its friction forces."""
 
     name: str
     eq: Equations
@@ -204,7 +204,7 @@ def _frictional(contacts: Sequence[Slip]) -> tuple[Contact, ...]:
 
 
 def _pressed(slip: Slip) -> bool:
-    """Whether its normal force is written in the symbols of the model."""
+    """Return True if its normal force is written in the symbols of the model."""
     return slip.N is not slip.normal or depends_on_load(slip.contact.friction.law)
 
 

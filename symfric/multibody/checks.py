@@ -1,4 +1,4 @@
-"""What can be wrong with a mechanism: names, numbers, connections, start values, redundancy."""
+"""Checks of a mechanism: names, numbers, connections, start values, redundancy."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields

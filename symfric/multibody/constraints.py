@@ -30,7 +30,7 @@ Loads = Sequence[Load | Axial]
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What a constraint does to a mechanism.
+    """Equations of a constraint, and the loads of its multipliers.
 
     Attributes:
         phi: SX (m, 1).
@@ -66,7 +66,7 @@ class Constraint(Keywords, ABC):
         return ()
 
     def problems(self) -> Iterator[str]:
-        """What is wrong with its numbers."""
+        """Problems of its numbers."""
         return iter(())
 
     @abstractmethod
@@ -102,7 +102,7 @@ def linear(
 
 
 def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
-    """Whether the pose gives the displacement, an angle, between -pi and pi only."""
+    """Return True if the pose gives the displacement, an angle, between -pi and pi only."""
     return joint.name not in kin.topology.link_of and not joint.linear(direction)
 
 

@@ -154,7 +154,7 @@ def balance(
 
 
 def _floats(kin: Kinematics, link: Link) -> bool:
-    """Whether the coordinates of a link are those of its centre of mass in the world."""
+    """Return True if the coordinates of a link are those of its centre of mass in the world."""
     centred = (link.at_body.p - kin.topology.bodies[link.body].c).is_zero()
     return isinstance(link.joint, Floating) and link.base == GROUND and not link.reverse and centred
 

@@ -80,12 +80,12 @@ class Force(ABC):
 
     @property
     def conservative(self) -> bool:
-        """Whether its power is nothing but the change of its potential energy."""
+        """Return True if its power is nothing but the change of its potential energy."""
         return False
 
     @abstractmethod
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """What it puts on the bodies."""
+        """Loads on the bodies."""
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
         """Potential energy [J]; zero where it has none."""

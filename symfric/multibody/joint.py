@@ -101,7 +101,7 @@ class JointFriction:
         take_si("friction", self, "radius", "length", "width", "preload", "normal", "eps")
 
     def problems(self, rubs: Sequence[str]) -> Iterator[str]:
-        """What is wrong for a joint in which friction acts in the directions `rubs`."""
+        """Problems for a joint in which friction acts in the directions `rubs`."""
         if not rubs:
             yield "expected a joint in which something rubs, such as a hinge, a guide or a ball"
         offered = () if "ball" in rubs else OFFERED
@@ -268,7 +268,7 @@ class Joint(Keywords, ABC):
     constrains: ClassVar[int] = 0
     """Number of constraints; the spanning tree keeps the joints with most."""
     closes: ClassVar[bool] = False
-    """Whether it can only close loops, having no coordinates of its own."""
+    """True if it can only close loops, having no coordinates of its own."""
     rubs: ClassVar[tuple[str, ...]] = ()
     """Directions in which friction acts; "ball" is that of a ball in its socket."""
     directions: ClassVar[Mapping[str, int]] = {}
@@ -302,7 +302,7 @@ class Joint(Keywords, ABC):
         """Expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
 
     def problems(self) -> Iterator[str]:
-        """What is wrong with its own numbers."""
+        """Problems of its own numbers."""
         return iter(())
 
     def way(self, direction: str) -> str:
@@ -313,7 +313,7 @@ class Joint(Keywords, ABC):
         return only
 
     def linear(self, direction: str) -> bool:
-        """Whether motion in this direction is a translation [m], not a rotation [rad]."""
+        """Return True if motion in this direction is a translation [m], not a rotation [rad]."""
         return self.coordinates[self.directions[direction]][1] == "m"
 
     def coordinate(self, k: int) -> str:
@@ -336,7 +336,7 @@ class Joint(Keywords, ABC):
         return ca.atan2(R[1, 0], R[0, 0])
 
     def normal_force(self, friction: JointFriction, F: ca.SX, T: ca.SX) -> ca.SX:
-        """What presses its bearing [N] under the reaction F, T on the child.
+        """Normal force [N] of its bearing under the reaction F, T on the child.
 
         In the axes of the child's frame, of a joint that only closes loops in the parent's.
         """

@@ -38,7 +38,7 @@ class Closing(Joint):
     closes = True
 
     def linear(self, direction: str) -> bool:
-        """Whether motion in this direction is a translation."""
+        """Return True if motion in this direction is a translation."""
         return direction == "slide"
 
     def pose(self, q: ca.SX) -> Pair:

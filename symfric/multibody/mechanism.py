@@ -80,7 +80,7 @@ class Mechanism(Showing):
             self.forces.append(Gravity("gravity", gravity))
 
     def shown(self) -> Shown:
-        """What was added so far."""
+        """Parts that were added so far."""
         return shown_of(
             self.name, self.bodies, self.joints, self.forces, self.constraints, self.inputs
         )

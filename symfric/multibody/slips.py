@@ -51,14 +51,14 @@ class Slip:
 
 
 def depends_on_load(law: Law) -> bool:
-    """Whether friction force or states of `law` depend on the normal force."""
+    """Return True if friction force or states of `law` depend on the normal force."""
     N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     v = ca.SX.sym("v")
     return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
 
 
 def keeps_deflection(law: Law) -> bool:
-    """Whether bristles deflect with the load.
+    """Return True if bristles deflect with the load.
 
     At the deflection of a larger load their damping (`LuGre`) or their rate (`Dahl`) grows without
     bound as the load falls. `LoadNormalised` takes laws of v and N only.

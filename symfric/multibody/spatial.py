@@ -30,7 +30,7 @@ def vector(values: Vector) -> ca.SX:
 
 
 def is_vector(values: Any) -> bool:
-    """Whether `values` are three finite numbers or scalar symbols."""
+    """Return True if `values` are three finite numbers or scalar symbols."""
     if isinstance(values, ca.DM):
         return values.numel() == 3 and values.is_regular()
     if isinstance(values, ca.SX):
@@ -39,13 +39,13 @@ def is_vector(values: Any) -> bool:
 
 
 def is_finite(values: ca.SX) -> bool:
-    """Whether the numbers among the entries of `values` are finite."""
+    """Return True if the numbers among the entries of `values` are finite."""
     entries = (ca.SX(entry) for entry in ca.vertsplit(ca.densify(values)))
     return all(not entry.is_constant() or abs(float(entry)) < ca.inf for entry in entries)
 
 
 def is_scalar(value: Any) -> bool:
-    """Whether `value` is a finite number or one symbol."""
+    """Return True if `value` is a finite number or one symbol."""
     if is_number(value):
         return isfinite(value)
     if isinstance(value, ca.DM):
@@ -209,7 +209,7 @@ class Body:
         return vector(self.com)
 
     def problems(self, p: ca.SX, values: ca.DM) -> Iterator[str]:
-        """What is wrong with the numbers, symbols `p` replaced by `values`."""
+        """Problems of the numbers, symbols `p` replaced by `values`."""
         wrong = list(self._no_numbers())
         if wrong:
             yield from wrong
@@ -228,7 +228,7 @@ class Body:
         yield from (f"{text}{hint}" for text in unphysical(numbers[1:].reshape(3, 3)))
 
     def _no_numbers(self) -> Iterator[str]:
-        """What is no number or not as many as it should."""
+        """Values that are no numbers, or of a wrong count."""
         given: Any = self.inertia
         if not is_scalar(self.mass):
             yield f"mass: expected a number [kg], got {shown(self.mass)}"

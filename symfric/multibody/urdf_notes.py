@@ -1,4 +1,4 @@
-"""What is noted while a URDF file is read: mistakes, doubts, what is left out; and its numbers."""
+"""Notes on a URDF file: mistakes, doubts, parts that are left out; and parsing of its numbers."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable

@@ -113,7 +113,7 @@ def around(
 
 
 LEFT, RIGHT, TOP, BOTTOM = 68.0, 14.0, 24.0, 40.0
-"""Room beside the frame for labels [px]."""
+"""Margins of the frame for labels [px]."""
 LETTER = 6.6
 """Width of a letter of the legend [px], about."""
 

@@ -128,32 +128,8 @@ def _page(figure: Figure, show: Callable[[int], None], count: int, fps: float) -
         figure.savefig(buffer, dpi=100, format="png")
         pictures.append(b64encode(buffer.getvalue()).decode())
     sources = ",\n".join(f'"data:image/png;base64,{text}"' for text in pictures)
-    return PAGE.substitute(pictures=sources, last=count - 1, wait=round(1000 / fps))
-
-
-PAGE = Template("""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>Mechanism in motion</title>
-<style>
-body { font-family: sans-serif; text-align: center; }
-img { max-width: 100%; }
-input { width: 24em; vertical-align: middle; }
-</style></head><body>
-<img id="picture" alt="mechanism"><br>
-<button id="play">pause</button> <input id="at" type="range" min="0" max="$last" value="0">
-<script>
-const pictures = [
-$pictures
-];
-const picture = document.getElementById("picture");
-const at = document.getElementById("at"), play = document.getElementById("play");
-let running = true;
-function show(k) { picture.src = pictures[k]; at.value = k; }
-at.oninput = () => { running = false; play.textContent = "play"; show(+at.value); };
-play.onclick = () => { running = !running; play.textContent = running ? "pause" : "play"; };
-setInterval(() => { if (running) show((+at.value + 1) % pictures.length); }, $wait);
-show(0);
-</script></body></html>
-""")
+    player = Template(Path(__file__).with_name("player.html").read_text("utf-8"))
+    return player.substitute(pictures=sources, last=count - 1, wait=round(1000 / fps))
 
 
 def picture(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 PLACES = ("end", "least", "greatest")
 MOST = 5_000_000
-"""Numbers that are read without being asked for; of a file every page, for its last column."""
+"""Numbers that are read without a request; of a file every page, for its last column."""
 
 
 @final

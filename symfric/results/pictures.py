@@ -40,7 +40,7 @@ def plot_trajectories(
 ) -> Figure:
     """Signals of one or several simulations over time, those of a kind in a panel.
 
-    Times of hours, days and years are told in these.
+    Times of hours, days and years are given in these.
 
     Args:
         trajectories: legend entry -> trajectory.
@@ -226,7 +226,7 @@ small picture."""
 BANDS = ((5.0, 95.0, 0.15, "90 %"), (25.0, 75.0, 0.3, "50 %"))
 """Percentiles, opacity and legend of each band."""
 SERIES, JOINED = 6, 200
-"""Values of a second parameter that are told apart, and members of a series joined by a line."""
+"""Values of a second parameter that are distinguished, and members of a series joined by a line."""
 DECADES = 100.0
 """Greatest over least value from which on an axis is logarithmic."""
 Varied = tuple[str, str, Array]

@@ -264,7 +264,7 @@ class Signals(Showing):
         They jump where an event moves with the name; at its time they are those behind it.
 
         Raises:
-            ValueError: none were asked for, or an event has none: its expression only touches
+            ValueError: none were requested, or an event has none: its expression only touches
                 zero, it comes with a jump of an input, or with an event whose order matters.
         """
         if self.differentiate is None:
@@ -294,7 +294,7 @@ class Signals(Showing):
             Name as given to `simulate` -> derivative.
 
         Raises:
-            ValueError: no sensitivities were asked for, an unknown signal, another length.
+            ValueError: no sensitivities were requested, an unknown signal, another length.
         """
         if self.pull_back is None:
             raise self._without_derivatives

@@ -19,8 +19,8 @@ class Statistics:
         smallest_step: smallest accepted step [s].
         build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
             reused), compiling it, and running it.
-        error: measured error relative to each state's magnitude, the largest; NaN if not asked for.
-        sensitivity_errors: measured error of derivatives by each name that was asked for, relative
+        error: measured error relative to each state's magnitude, the largest; NaN if not requested.
+        sensitivity_errors: measured error of derivatives by each requested name, relative
             to the largest value of each state's derivative, the largest; NaN where there is none.
     """
 

@@ -16,7 +16,7 @@ from symfric.foundation.files import write_table, write_text
 from symfric.foundation.shown import Showing, Shown, Table, among, counted
 from symfric.foundation.symbols import stacked
 from symfric.model.kinds import WORK
-from symfric.model.shown import friction
+from symfric.model.model import friction
 from symfric.results.quadrature import integrals
 from symfric.results.signals import Signals
 from symfric.results.stored import module
@@ -155,7 +155,7 @@ class Trajectory(Signals):
         express: an expression of the model at any times, shape (rows, n).
         model: the model that was simulated.
         happened: (time [s], name) of every event.
-        differentiate: derivatives of all signals at any times, where they were asked for.
+        differentiate: derivatives of all signals at any times, where they were requested.
         delays: derivatives of the times of `happened`, likewise.
         pull_back: gradient of a weighted sum of signals at `t`, likewise.
         keep: what a file and a pickle hold of it.

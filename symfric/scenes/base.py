@@ -27,7 +27,7 @@ from symfric.foundation.variable import check_si
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables
-from symfric.model.holding import APPLIED
+from symfric.model.forces import APPLIED
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.scenes.presets import Preset
 
@@ -129,7 +129,7 @@ def _slips(block: Block) -> tuple[tuple[str, float], ...]:
 @final
 @dataclass(frozen=True, eq=False)
 class GivenInput:
-    """What drives a scene when nobody says: the function of time, and how people write it."""
+    """Default input of a scene: the function of time, and its text."""
 
     text: str
     function: Callable[[ca.SX], ca.SX]
@@ -160,7 +160,7 @@ class Scene(Parametric, ABC):
 
     @classmethod
     def places(cls) -> dict[str, str]:
-        """Where laws other than `law` may rub: the keyword, and what it is, see `other_law`."""
+        """Places of laws other than `law`: the keyword, and its meaning, see `other_law`."""
         return {item.name: item.metadata["place"] for item in fields(cls) if _is_place(item)}
 
     @classmethod

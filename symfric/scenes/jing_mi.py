@@ -17,7 +17,7 @@ def numbers(
     gonthier: tuple[float, float], sigma_0: float, sigma_1: float, z_ba: float, z_max: float,
     tau_dw: float,
 ) -> Numbers:  # fmt: skip
-    """Who of the eleven laws takes which row of a table.
+    """Numbers of the eleven laws by the rows of a table.
 
     The tables have no column for it. The tolerance v_t is the width of the laws of one velocity
     (smooth Coulomb, Threlfall, Bengisu-Akay, Karnopp, Awrejcewicz), v_s and v_d are the two of the

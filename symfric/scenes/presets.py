@@ -14,7 +14,7 @@ L = TypeVar("L", bound=Law)
 @final
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """What a source says of the friction at one place.
+    """Friction coefficients of one place from a source.
 
     Attributes:
         common: numbers that mean the same in every law, such as mu_s.

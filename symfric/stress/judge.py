@@ -137,7 +137,7 @@ def _refused(group: str, sentence: str, steps: int = 0) -> Verdict:
 
 
 def _failed(ready: Problem, error: SolveError) -> Verdict:
-    """A solve that says it failed; whether another method goes through is told beside it."""
+    """A solve that says it failed; the group says whether another method goes through."""
     if error.status is Status.MAX_STEPS:
         return _stopped(ready, error)
     steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0

@@ -165,7 +165,7 @@ class Answer:
     Attributes:
         asked: the case.
         rtol: at which SciPy solved it.
-        doubt: difference [tolerances] from another solve, at the times asked for.
+        doubt: difference [tolerances] from another solve, at the requested times.
     """
 
     asked: Question

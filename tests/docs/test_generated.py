@@ -6,12 +6,19 @@ import pytest
 
 from docs.machine import items, lists, measure
 from docs.machine.generated import stale, write
-from docs.machine.lists import place
-from docs.machine.lists import reference_pages as api_pages
-from docs.machine.names import catalogue, known, linked
+from docs.machine.lists import place, reference_pages
+from docs.machine.names import FRONTS, catalogue, known, linked
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
 from symfric.cli.app import COMMANDS, prose_and_examples
 from symfric.scenes import ALL_SCENES
+
+
+def test_every_package_has_a_page_or_stands_on_that_of_its_parent() -> None:
+    pages = reference_pages()
+    for front in FRONTS:
+        found = place(front)
+        assert found is not None
+        assert found[2].removeprefix("/reference/") in pages
 
 
 def test_every_law_has_a_page_with_formula_picture_and_parameters() -> None:
@@ -42,7 +49,7 @@ def test_every_command_stands_with_its_options() -> None:
 
 
 def test_every_public_name_stands_once() -> None:
-    pages = "".join(api_pages().values())
+    pages = "".join(reference_pages().values())
     for names in catalogue().values():
         for public in names:
             entries = [f"{kind}:: {public.full}\n" for kind in ("autoclass", "autofunction")]

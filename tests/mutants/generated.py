@@ -3,6 +3,7 @@
 from mutants.mutant import Mutant
 
 GUARDS = "symfric/codegen/guards.py"
+GUARDS_C = "symfric/codegen/templates/guards.c"
 SHEET, HEADER = "symfric/codegen/header.py", "symfric/codegen/header.py"
 VECTORS, LOADER = "symfric/codegen/vectors.py", "symfric/codegen/templates/ctypes_loader.txt"
 SELF, SIMULINK = "symfric/codegen/kit.py", "symfric/codegen/kit.py"
@@ -10,7 +11,7 @@ MANIFEST = "symfric/codegen/generated.py"
 COMPARED = "symfric/codegen/compared.py"
 MAGNITUDE = "symfric/codegen/compared.py"
 VERIFY, FUZZ = "symfric/codegen/verification.py", "symfric/codegen/fuzz.py"
-EXCITATION = "symfric/codegen/excitation.py"
+EXCITATION = "symfric/codegen/compared.py"
 GUARDED = "symfric/codegen/runner.py"
 T_SOURCE = "tests/symfric/codegen/test_source.py"
 T_GUARDS = "tests/symfric/codegen/test_guards.py"
@@ -35,15 +36,15 @@ def compared(test: str) -> tuple[str, ...]:
 
 GENERATED = (
     Mutant(
-        "guards: minus zero is no load", GUARDS, "> span && x != low;", "> span;", T_EVERY,
+        "guards: minus zero is no load", GUARDS_C, "> span && x != low;", "> span;", T_EVERY,
     ),
     Mutant(
-        "guards: the end of a range is outside", GUARDS,
-        "& {magnitude}) > {name}_bits(limit);", "& {magnitude}) >= {name}_bits(limit);", T_EVERY,
+        "guards: the end of a range is outside", GUARDS_C,
+        "& @magnitude) > @{name}_bits(limit);", "& @magnitude) >= @{name}_bits(limit);", T_EVERY,
     ),
     Mutant(
-        "guards: infinity is clamped", GUARDS,
-        "& {magnitude}) >= {infinite}) {{", "& {magnitude}) > {infinite}) {{", T_FLAGGED,
+        "guards: infinity is clamped", GUARDS_C,
+        "& @magnitude) >= @infinite) {", "& @magnitude) > @infinite) {", T_FLAGGED,
     ),
     Mutant(
         "guards: a range of unequal ends is as wide as its wider one", GUARDS,
@@ -119,7 +120,7 @@ GENERATED = (
     ),
     Mutant(
         "kit: rows are numbers that the type does not have", VECTORS,
-        "states = rounded(np.vstack([start, after[:-1, :count]]), real)",
+        "states = real.rounded(np.vstack([start, after[:-1, :count]]))",
         "states = np.vstack([start, after[:-1, :count]])", (T_VECTORS,),
     ),
     Mutant(

@@ -11,7 +11,7 @@ T_STORED = ("tests/symfric/integrator/test_stored.py",)
 T_SHOWN = ("tests/symfric/foundation/test_shown.py",)
 DOUBTS = "symfric/integrator/running/doubts.py"
 T_DOUBTS = ("tests/symfric/integrator/running/test_doubts.py",)
-HOLDING = "symfric/model/holding.py"
+HOLDING = "symfric/model/forces.py"
 T_HOLDING = ("tests/symfric/model/test_holding.py",)
 T_ACCELERATIONS = ("tests/symfric/model/test_accelerations.py",)
 

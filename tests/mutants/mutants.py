@@ -180,7 +180,7 @@ TRANSCRIPTION = (
         T_SOLVE,
     ),
     Mutant(
-        "what is asked for on the way is asked for at the start", "ocp/transcription/grid.py",
+        "what is asked for on the way is asked for at the start", "ocp/transcription/schemes.py",
         "bound[own.nodes[:, node]] = of(states, span.nodes[fraction])",
         "bound[own.nodes[:, node]] = of(states, span.nodes[0.0])", T_SOLVE,
     ),
@@ -330,7 +330,7 @@ CACHES = (
         ("tests/symfric/integrator/running/test_bits.py",),
     ),
     Mutant(
-        "outputs at a jump are those before it", "symfric/integrator/running/dense.py",
+        "outputs at a jump are those before it", "symfric/integrator/running/record.py",
         'side="right" if last else "left"', 'side="right"', T_OUTPUTS,
     ),
     Mutant(

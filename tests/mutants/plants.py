@@ -5,7 +5,7 @@ from mutants.mutant import Mutant
 FOLLOWING = "symfric/integrator/equations/following.py"
 CONSTANTS = "symfric/integrator/equations/expressions.py"
 PLANT, LOOPS = "symfric/integrator/plant.py", "symfric/integrator/running/plants.c"
-EVENTFUL = "symfric/integrator/many/plants.py"
+EVENTFUL = "symfric/integrator/running/plants.py"
 LANES = "symfric/integrator/many/plants.c"
 T_FOLLOWING = ("tests/symfric/integrator/equations/test_following.py",)
 T_CONSTANTS = ("tests/symfric/integrator/equations/test_constants.py",)

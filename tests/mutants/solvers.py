@@ -2,10 +2,10 @@
 
 from mutants.mutant import Mutant
 
-WATCH, PREPARED = "ocp/solvers/watch.py", "ocp/solvers/prepared.py"
-OUTCOME, ANSWERS = "ocp/solvers/outcome.py", WATCH
-CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/program.py"
-MOTION = STORED = "ocp/result/motion.py"
+WATCH, PREPARED = "ocp/solving/watch.py", "ocp/solving/prepared.py"
+OUTCOME, ANSWERS = "ocp/transcription/program.py", WATCH
+CONVEXIFY, STAGES = "ocp/solving/methods.py", "ocp/transcription/program.py"
+MOTION = STORED = "ocp/solving/motion.py"
 STARTS, ONE = "ocp/solving/starts.py", "ocp/solving/one_solve.py"
 
 T_FALLBACK = ("tests/ocp/friction/test_fallback.py",)
@@ -79,7 +79,7 @@ SOLVERS = (
         T_ONE,
     ),
     Mutant(
-        "a start with multipliers is taken for a cold one", "ocp/solvers/methods.py",
+        "a start with multipliers is taken for a cold one", "ocp/solving/methods.py",
         "(WARM if warm else {})", "{}", T_ONE,
     ),
     Mutant(
@@ -121,7 +121,7 @@ RESULTS = (
         "a phase starts at zero", MOTION, "begin += points[k].T", "begin += 0.0", T_SOLVED,
     ),
     Mutant(
-        "a stored problem forgets its phases", "ocp/formulation/serialise.py",
+        "a stored problem forgets its phases", "ocp/formulation/problem.py",
         "        problem.spans,\n", "        problem.spans[:1],\n",
         T_STORED,
     ),
@@ -135,7 +135,7 @@ RESULTS = (
         (*T_STORED, *T_POINTS),
     ),
     Mutant(
-        "a band of modes covers those of other contacts", "ocp/result/picture.py",
+        "a band of modes covers those of other contacts", "ocp/solving/picture.py",
         "(k + 1) / count,", "1.0,", T_PICTURES,
     ),
     Mutant(
@@ -159,11 +159,11 @@ RESULTS = (
         T_POINTS,
     ),
     Mutant(
-        "perturbations grow with their waves", "ocp/solving/random_starts.py",
+        "perturbations grow with their waves", "ocp/solving/one_solve.py",
         "* size / np.sqrt(WAVES)", "* size", T_POINTS,
     ),
     Mutant(
-        "times of places start anew in each phase", ONE,
+        "times of places start anew in each phase", "ocp/transcription/transcription.py",
         "{begin + place.fraction", "{place.fraction", T_ONE,
     ),
     Mutant(

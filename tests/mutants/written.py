@@ -28,7 +28,6 @@ T_MEASURED = ("tests/symfric/integrator/test_measured.py",)
 RECORD = "symfric/integrator/running/record.py"
 DIAGNOSIS = "symfric/integrator/running/diagnosis.py"
 T_DIAGNOSIS = ("tests/symfric/integrator/running/test_diagnosis.py",)
-ENSEMBLE = "symfric/integrator/ensemble.py"
 GIVEN = "symfric/integrator/many/given.py"
 
 WRITTEN = (

@@ -8,10 +8,9 @@ from phases import unit_move
 
 from ocp import Phase, Problem, Shooting, integral, solve
 from ocp.original_law import project_control
-from ocp.solvers.methods import Ipopt
+from ocp.solving.methods import Ipopt
 from ocp.solving.starts import start_of
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Scheme
+from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import LuGre, Status, drive
 

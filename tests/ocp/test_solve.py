@@ -20,7 +20,7 @@ from ocp import (
     solve,
     worst,
 )
-from ocp.problems.friction import out_and_back
+from ocp.problems import out_and_back
 from symfric import GMS, BrownMcPhee, ExactCoulomb, SolveError, Status, drive
 from symfric.laws import Law
 

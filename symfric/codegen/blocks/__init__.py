@@ -1,1 +1,1 @@
-"""What becomes a block: laws, models, populations, mechanisms."""
+"""Blocks from laws, models, populations and mechanisms."""

@@ -163,7 +163,7 @@ class Block:
 
     @property
     def is_function(self) -> bool:
-        """Whether it is one C function of scalars: no states and a single output."""
+        """Return True if it is one C function of scalars: no states and a single output."""
         return not self.states and len(self.outputs) == 1
 
     @cached_property

@@ -14,11 +14,11 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.held_step import (
     LEAST_LOAD,
     NO_LOAD,
-    Held,
     advanced,
     force_of_rate,
-    needs_words,
-    with_words,
+    forces_at,
+    needs_unloaded_case,
+    with_unloaded_case,
 )
 from symfric.codegen.blocks.texts import equations, of_law, texts
 from symfric.codegen.blocks.variables import Fold, above_zero, arranged, variable, without_idle
@@ -140,7 +140,11 @@ def law_block(
         constants={p.name: float(p.value) for p in folded} | dict(block.constants),
         about={p.name: f"{p.doc} [{turned(p.unit) if turning else p.unit}]" for p in folded},
     )
-    _check_at_rest(block, where)
+    if not _at_rest(block):
+        raise ValueError(
+            f"{where}: expected a finite force at rest, got one that is not; "
+            "keep a smoothing width of 0 constant (leave it out of free)"
+        )
     block = above_zero(block, [p.name for p in block.parameters if not _at_rest(block, p.name)])
     return arranged(in_turning(block) if turning else block)
 
@@ -193,16 +197,16 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
     rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
     step = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
     force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
-    at = {"F": (step.mean, step.mean_rate)}
-    if ca.depends_on(force, ca.vertcat(z, r)):
-        at["F_end"] = (step.end, step.end_rate)
-    held = Held(step.end, force, z, r, at)
+    internal = ca.vertcat(z, r)
+    at = {"F": ca.vertcat(step.mean, step.mean_rate)}
+    if ca.depends_on(force, internal):
+        at["F_end"] = ca.vertcat(step.end, step.end_rate)
     sizes = (size,) if h is None else ()
-    following, forces, use = step.end, held.outputs, (SIGN, MEAN_VELOCITY)
-    told = with_words(held, N)
-    own = [_of_numbers(*given, inputs, z, runtime + sizes) for given in ((following, forces), told)]
-    if needs_words(numeric, *own):
-        following, forces = told
+    following, forces, use = step.end, forces_at(force, internal, at), (SIGN, MEAN_VELOCITY)
+    cases = with_unloaded_case(following, force, internal, at, N)
+    both = (following, forces), cases
+    if needs_unloaded_case(numeric, *(_of_numbers(*x, inputs, z, runtime + sizes) for x in both)):
+        following, forces = cases
         use = (*use, NO_LOAD.format(least=LEAST_LOAD * N.nominal))
     said = {"F": "mean over the step", "F_end": "at the end of the step"}
     outputs = {n: Output(e, "N", f"{FORCE}, {said[n]}") for n, e in forces.items()}
@@ -234,17 +238,8 @@ def _of_numbers(
     return ca.Function("step", [v, N, z, ca.vertcat(ca.SX(0, 1), *others)], rows)
 
 
-def _check_at_rest(block: Block, where: str) -> None:
-    """A division by zero at rest must show here and not on the machine."""
-    if not _at_rest(block):
-        raise ValueError(
-            f"{where}: expected a finite force at rest, got one that is not; "
-            "keep a smoothing width of 0 constant (leave it out of free)"
-        )
-
-
 def _at_rest(block: Block, zero: str = "") -> bool:
-    """Whether force and states are finite at rest, with the parameter `zero` at 0."""
+    """Return True if force and states are finite at rest, with the parameter `zero` at 0."""
     states = [v.start for v in block.states]
     p = [0.0 if v.name == zero else v.start for v in block.parameters]
     rest = [0.0 if v.name == "v" else v.nominal for v in block.inputs]
@@ -252,7 +247,7 @@ def _at_rest(block: Block, zero: str = "") -> bool:
 
 
 def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
-    """What docstrings say of the law and of those that it holds, for the data sheet.
+    """Texts of the data sheet from the docstrings of the law and of those that it holds.
 
     Of parameters without effect, `idle`, nothing is said, nor of N = 0, where the block, other than
     the law, is right.

@@ -24,7 +24,7 @@ from symfric.model import Model, Output, Variables, check_model
 
 
 class Machine(Protocol):
-    """What writes a model with parameters of its own as symbols: a scene."""
+    """A scene: it writes a model with parameters of its own as symbols."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
         """The model with those in `free` as symbols."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import SLIDING, step_variable
-from symfric.codegen.blocks.joints import Rubbing, rubbing, with_gravity, with_payload
+from symfric.codegen.blocks.joints import ContactStep, contact_step, with_gravity, with_payload
 from symfric.codegen.blocks.variables import in_arrays, numbered
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
@@ -47,24 +47,6 @@ SOURCES = (
     "Luh, Walker, Paul, J. Dyn. Sys. Meas. Control 102, 1980: recursion of Newton and Euler.",
     "Haug, Mech. Based Des. Struct. Mach., 2018: bearings pressed by reactions.",
 )
-
-
-@final
-@dataclass(frozen=True)
-class Options:
-    """What is variable in the inverse dynamics; see `inverse_dynamics_block`."""
-
-    payload: str | None = None
-    payload_inertia: bool = False
-    tunable_gravity: bool = False
-
-    def __post_init__(self) -> None:
-        if self.payload is not None:
-            checks.text(f"{WHERE}: payload", self.payload, "the name of a frame, such as 'tool0'")
-        checks.flag(f"{WHERE}: payload_inertia", self.payload_inertia)
-        checks.flag(f"{WHERE}: tunable_gravity", self.tunable_gravity)
-        if self.payload_inertia and self.payload is None:
-            raise ValueError(f"{WHERE}: payload_inertia: expected with a payload only")
 
 
 def inverse_dynamics_block(
@@ -118,11 +100,11 @@ def inverse_dynamics_block(
     """
     checks.flag(f"{WHERE}: separate", separate)
     checks.flag(f"{WHERE}: fold", fold)
-    machine = _machine(mechanism, p, Options(payload, payload_inertia, tunable_gravity))
+    machine = _machine(mechanism, p, payload, payload_inertia, tunable_gravity)
     eq, size = machine.eq, step_variable(WHERE, h)
     duration = size.symbol if h is None else ca.SX(float(size.start))
     parts = [
-        rubbing(contact, machine.along(contact), normal, duration, fold=fold)
+        contact_step(contact, machine.along(contact), normal, duration, fold=fold)
         for contact, normal in zip(eq.contacts, eq.normals, strict=True)
     ]
     labels = [machine.label(part.along) for part in parts]
@@ -172,7 +154,7 @@ def gravity_block(
 
     Arguments as of `inverse_dynamics_block`; the default name ends in _gravity.
     """
-    machine = _machine(mechanism, p, Options(payload, False, tunable_gravity))
+    machine = _machine(mechanism, p, payload, False, tunable_gravity)
     eq = machine.eq
     zero = [ca.SX.zeros(eq.n), ca.SX.zeros(eq.n), ca.SX.zeros(eq.F.numel())]
     holding = machine.leading(ca.substitute([eq.balance], [eq.qd, eq.a, eq.F], zero)[0])
@@ -237,8 +219,8 @@ class _Machine:
             for k, v in enumerate(self.joints, start=1)
         }
 
-    def texts(self, what: str, parts: Sequence[Rubbing]) -> dict[str, Any]:
-        """What the data sheet says."""
+    def texts(self, what: str, parts: Sequence[ContactStep]) -> dict[str, Any]:
+        """Texts of the data sheet."""
         laws = {part.law.name: part.law for part in parts}
         order = ", ".join(f"{k} {v.name}" for k, v in enumerate(self.joints, start=1))
         where = (
@@ -269,16 +251,25 @@ def _force(unit: str) -> str:
     return "N m" if unit == "rad" else "N"
 
 
-def _machine(mechanism: Mechanism | str | Path, p: Variables, options: Options) -> _Machine:
+def _machine(
+    mechanism: Mechanism | str | Path, p: Variables, payload: str | None, inertia: bool, g: bool
+) -> _Machine:
+    """Equations of a mechanism with its payload, of which the inertia, and gravity g variable."""
+    checks.flag(f"{WHERE}: payload_inertia", inertia)
+    checks.flag(f"{WHERE}: tunable_gravity", g)
+    if inertia and payload is None:
+        raise ValueError(f"{WHERE}: payload_inertia: expected with a payload only")
+    if payload is not None:
+        checks.text(f"{WHERE}: payload", payload, "the name of a frame, such as 'tool0'")
     if not isinstance(mechanism, Mechanism):
         mechanism = read_urdf(mechanism)
     more: Variables = ()
-    if options.payload is not None:
-        mechanism, load = with_payload(mechanism, options.payload, inertia=options.payload_inertia)
+    if payload is not None:
+        mechanism, load = with_payload(mechanism, payload, inertia=inertia)
         more += load
-    if options.tunable_gravity:
-        mechanism, g = with_gravity(mechanism)
-        more += g
+    if g:
+        mechanism, gravity = with_gravity(mechanism)
+        more += gravity
     parameters = (*tuple(p), *more)
     made = mechanism.prepare(parameters)
     eq, u = made.eq, tuple(mechanism.inputs)

@@ -21,7 +21,7 @@ from symfric.multibody.spatial import Frame, skew, vector
 
 @final
 @dataclass(frozen=True, eq=False)
-class Rubbing:
+class ContactStep:
     """Friction of one contact over a step.
 
     Attributes:
@@ -42,7 +42,9 @@ class Rubbing:
     sliding: ca.SX
 
 
-def rubbing(contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing:
+def contact_step(
+    contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool
+) -> ContactStep:
     """The friction of a contact under the normal force `normal` [N], in a step of `h` [s].
 
     A constant normal force is a parameter N.
@@ -76,16 +78,8 @@ def rubbing(contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool
         [v.symbol, N.symbol, symbols_of(sizes)],
         [contact.slip, normal, h if sizes else ca.SX(0, 1)],
     )
-    parameters = tuple(v for v in block.parameters if v.name != "h")
-    return Rubbing(
-        along=along,
-        law=block,
-        force=force,
-        parameters=(*parameters, *level),
-        states=block.states,
-        following=following,
-        sliding=sliding,
-    )
+    parameters = (*(v for v in block.parameters if v.name != "h"), *level)
+    return ContactStep(along, block, force, parameters, block.states, following, sliding)
 
 
 def _level(friction: JointFriction) -> Variables:

@@ -131,7 +131,7 @@ FORCES = """\
 
 
 def of_law(kinds: tuple[str, ...], ends: bool) -> str:
-    """How the states of a law step, by the `kinds` of its `Step`.
+    """Text about the step of the states of a law, by the `kinds` of its `Step`.
 
     Args:
         ends: the block has the force at the end of the step, too.
@@ -141,7 +141,7 @@ def of_law(kinds: tuple[str, ...], ends: bool) -> str:
 
 
 def of_method(method: Method, algebraic: bool) -> str:
-    """How a method of the integrator makes a fixed step of x' = f(x, u), 0 = g(x, z, u).
+    """Text about a method's fixed step of x' = f(x, u), 0 = g(x, z, u).
 
     Args:
         algebraic: there are unknowns z.

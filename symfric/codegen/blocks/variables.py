@@ -171,7 +171,7 @@ class Family:
 
     @property
     def contiguous(self) -> bool:
-        """Whether the rows follow each other."""
+        """Return True if the rows follow each other."""
         return self.rows == tuple(range(self.rows[0], self.rows[0] + len(self.rows)))
 
 

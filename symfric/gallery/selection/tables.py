@@ -27,10 +27,11 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from symfric.choice.friction import Friction
-from symfric.choice.machine import OWN, Machine, machine_of
+from symfric.choice.machine import OWN
 from symfric.choice.measured import Task, measured
 from symfric.choice.ranking import Row
 from symfric.choice.text import WIDTH
+from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
@@ -212,7 +213,9 @@ def compare_with_paper(
     checks.choice("compare_with_paper: scene", scene, TABLES)
     chosen = checks.names("compare_with_paper: names", tuple(names), PRINTED)
     kind, preset, times, ranks = TABLES[scene]
-    machine = machine_of(scene, partial(kind.preset, preset), None, None, ("x",), BrownMcPhee())
+    machine = machine_of(
+        scene, partial(kind.preset, preset), None, ("x",), None, BrownMcPhee(), "vm"
+    )
     rows: list[PaperRow] = []
     for k, name in enumerate(chosen):
         rows.append(_row(machine, name, first=times == "table 4"))
@@ -232,7 +235,7 @@ def _row(machine: Machine, name: str, first: bool) -> PaperRow:
 
 
 def _measured(machine: Machine, name: str, law: Law, T: float, S: float) -> PaperRow:
-    model = machine.with_law(law)
+    model = machine.model(law)
     task = Task(
         machine, OWN, (), {"": Friction()}, None, EQUAL, 0.05, own=True, fixed=True, work=WORK,
     )  # fmt: skip

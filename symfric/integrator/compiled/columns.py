@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.compiler import CompileError
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.compiler import load
 
@@ -219,11 +219,7 @@ class Columns:
         blocks = [a.reshape(most, a.size // most) for a in arguments[self.chained :]]
         if self.chained:
             arguments[0][:] = np.ravel(cast(Array, first))
-        buffer, call = cast(tuple[Any, Any], batch.buffer())
-        for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
-            for i, array in enumerate(arrays):
-                if array.size:
-                    place(i, flat_view(array))
+        call = bound(batch, arguments, results)
         for begin in range(0, count, most):
             size = min(most, count - begin)
             for block, row in zip(blocks, rows, strict=True):

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from symfric.foundation.parameters import check_names
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.running.dense import Dense
-from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Dense, Jumps
 from symfric.model import Model
 
 Array = NDArray[np.float64]

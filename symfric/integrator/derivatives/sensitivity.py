@@ -20,7 +20,7 @@ from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import Jump, Path, Seeds
 from symfric.integrator.derivatives.saltation import at_start
 from symfric.integrator.derivatives.together import Links, links
-from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.record import Dense
 
 Array = NDArray[np.float64]
 

@@ -230,6 +230,9 @@ MOST_JUMPS = 64
 HALVINGS = 60
 """Halvings of an interval of the grid, down to rounding."""
 
+HUGE = 1e300
+"""What is larger counts as this: differences of values are to be finite."""
+
 QUICKEST = 1.0
 """Percent of the span that set the pace of a function: more than what a few jumps take."""
 
@@ -278,7 +281,7 @@ def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
 
     def values_at(times: Array) -> Array:
         (found,) = columns([times[:, None]])
-        return np.nan_to_num(found[:, 0])
+        return np.clip(np.nan_to_num(found[:, 0]), -HUGE, HUGE)
 
     values = values_at(grid)
     level = levels(values)

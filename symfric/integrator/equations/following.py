@@ -24,13 +24,13 @@ Source: Deuflhard, Newton Methods for Nonlinear Problems, 2004, sections 2.1 and
 from collections.abc import Sequence
 from dataclasses import dataclass
 from string import Template
-from typing import Any, cast, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.equations.blocks import Slopes, slopes
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.matrices import SymbolicLU, factorise
@@ -67,12 +67,8 @@ class Following:
     def __call__(self, y: Array, d: Array) -> Array | None:
         """`y` with its algebraic unknowns at run data `d`; None where it takes a search."""
         now, after, look = y.copy(), np.empty(y.size), np.empty(3)
-        buffer, call = cast(tuple[Any, Any], self.round.buffer())
         data = np.ascontiguousarray(d, dtype=float)
-        for place, arrays in ((buffer.set_arg, (now, data)), (buffer.set_res, (after, look))):
-            for i, array in enumerate(arrays):
-                if array.size:
-                    place(i, flat_view(array))
+        call = bound(self.round, (now, data), (after, look))
         for _ in range(ROUNDS):
             call()
             first, second, guard = look.tolist()

@@ -315,7 +315,7 @@ def solve_one_by_one(
         own = input_of(inputs, data[m if data.shape[0] > 1 else 0], ends[m])
         looks = times[times <= ends[m]] if times.size else ends[m : m + 1]
         try:
-            run = integrate(integrator, own, y0[m], p[m], tolerances, backend, None, looks)
+            run, _ = integrate(integrator, own, y0[m], p[m], tolerances, backend, None, looks)
         except ValueError as error:  # no consistent start
             failed[m], reached[m] = str(error), inputs.breaks[0]
             continue

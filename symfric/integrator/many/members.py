@@ -16,9 +16,11 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.running.dense import Outputs, pieces_of
 from symfric.integrator.running.engine import Stop, VmEngine
-from symfric.integrator.running.loop import Work
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.loop import Work, filled
+from symfric.integrator.running.plants import AGAIN, REFUSED, SEARCH, Advance, Plants, loaded
+from symfric.integrator.running.record import Outputs, pieces_of
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -27,6 +29,10 @@ ROWS, ATTEMPTS = 2048, 2000
 PAIRED = 2500
 """Steps of fewer instructions run in two groups of lanes at once; those of more keep the processor
 busy alone."""
+LEAST_PLANTS = 8
+"""Plants from which lanes pay."""
+MOST_INSTRUCTIONS = 10_000
+"""Steps of more instructions take compilers too long as vectors."""
 
 
 @final
@@ -258,3 +264,34 @@ def many_source(
         jump = generator.dump() + follow.c_source
     defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
     return f"{jump}{lanes_header(lanes)}\n{of_step}{of_values}{defined}{c_text('loop.h')}"
+
+
+def pays(integrator: Integrator, plants: Plants) -> bool:
+    """Whether plants go faster side by side."""
+    return plants.S.shape[0] >= LEAST_PLANTS and integrator.instructions <= MOST_INSTRUCTIONS
+
+
+def side_by_side(integrator: Integrator, plants: Plants) -> Advance:
+    """Plants in the lanes of vectors, from sample to sample.
+
+    A lane does what `symfric.integrator.running.plants` does, but for functions like exp, which are
+    within a few units of the last place of those there (`lanes.h`). The bits of a plant depend
+    neither on the number of lanes nor on the other plants.
+
+    Raises:
+        CompileError: there is no compiler, or it failed.
+    """
+    return loaded(integrator, plants, "lanes", plants_source)
+
+
+def plants_source(integrator: Integrator) -> str:
+    """C of the step on vectors, of what follows a jump, and of the loop around them."""
+    s = integrator.system
+    nothing = ca.Function("nothing", [ca.SX.sym("t"), s.y, s.d], [ca.SX(0, 1)])
+    every = many_source(integrator.step, nothing, integrator.follows, integrator.follow)
+    numbers = {
+        "HELD": integrator.inputs.data.numel(), "REFUSED": REFUSED, "SEARCHED": SEARCH,
+        "AGAIN": AGAIN,
+    }  # fmt: skip
+    defined = "".join(f"#define {name} ({value})\n" for name, value in numbers.items())
+    return every + filled("members.h") + defined + c_text("plants.c")

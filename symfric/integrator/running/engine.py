@@ -4,23 +4,22 @@ Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted
 """
 
 import ctypes
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, Protocol, cast, final
+from typing import Protocol, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
-from symfric.integrator.running.dense import pieces_of
 from symfric.integrator.running.events import Change, Eventful, Happened, Search
 from symfric.integrator.running.loop import Work, loop_source, width
+from symfric.integrator.running.record import pieces_of
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -74,13 +73,8 @@ class _Batch:
         self.size = size
         self.S, self.S_out = np.zeros(step.numel_in(0)), np.zeros((size, step.numel_in(0)))
         self.R, self.D = np.zeros((size, step.numel_in(1))), np.zeros((size, step.numel_out(1)))
-        self._buffer, call = cast(tuple[Any, Any], step.mapaccum("batch", size).buffer())
-        self.call: Callable[[], None] = call
-        self._buffer.set_arg(0, flat_view(self.S))
-        self._buffer.set_arg(1, flat_view(self.R))
-        self._buffer.set_res(0, flat_view(self.S_out))
-        if self.D.size:
-            self._buffer.set_res(1, flat_view(self.D))
+        attempts = step.mapaccum("batch", size)
+        self.call = bound(attempts, (self.S, self.R), (self.S_out, self.D))
 
 
 @final

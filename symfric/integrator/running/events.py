@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import partial
-from typing import Any, cast, final
+from typing import final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running.crossings import (
     ALIKE,
@@ -28,6 +28,7 @@ from symfric.integrator.running.crossings import (
     Memory,
     passed,
 )
+from symfric.integrator.running.record import Jumps
 from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]
@@ -51,53 +52,6 @@ class Happened(IntEnum):
     TERMINAL = 4
     STORM = 5
     FOLLOW = 6
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Jumps:
-    """Events that happened, a row each time.
-
-    Attributes:
-        step: number of accepted steps before it, shape (k,).
-        t: time [s], shape (k,).
-        size: of the step that they cut [s], in full; negative where nothing of it is left, 0 where
-            a jump led there and no motion, shape (k,).
-        before, after: unknowns just before and after it, shape (k, n).
-        which: the events that happened together, shape (k, events).
-    """
-
-    step: NDArray[np.intp]
-    t: Array
-    size: Array
-    before: Array
-    after: Array
-    which: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, rows: Array, n: int, steps: int = 0) -> "Jumps":
-        """From records (steps before, t, size, y before, y after, which), `steps` behind others."""
-        rows = rows.copy()
-        return cls(
-            rows[:, 0].astype(np.intp) + steps,
-            rows[:, 1],
-            rows[:, 2],
-            rows[:, 3 : 3 + n],
-            rows[:, 3 + n : 3 + 2 * n],
-            rows[:, 3 + 2 * n :] != 0.0,
-        )
-
-    @classmethod
-    def joined(cls, parts: "list[Jumps]") -> "Jumps":
-        """Those of several stretches of a run, of which there is one at least."""
-        return cls(
-            np.concatenate([p.step for p in parts]),
-            np.concatenate([p.t for p in parts]),
-            np.concatenate([p.size for p in parts]),
-            np.concatenate([p.before for p in parts]),
-            np.concatenate([p.after for p in parts]),
-            np.concatenate([p.which for p in parts]),
-        )
 
 
 @final
@@ -262,13 +216,9 @@ def _called(function: ca.Function) -> Callable[..., list[Array]]:
     """`function` of flat arrays, with a buffer of its own that its results lie in."""
     arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
     results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-    buffer, call = cast(tuple[Any, Any], function.buffer())
-    for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
-        for i, array in enumerate(arrays):
-            if array.size:
-                place(i, flat_view(array))
+    call = bound(function, arguments, results)
 
-    def called(*values: Array, _alive: object = buffer) -> list[Array]:
+    def called(*values: Array) -> list[Array]:
         for argument, value in zip(arguments, values, strict=True):
             argument[:] = value
         call()

@@ -32,8 +32,8 @@ from symfric.integrator.running.crossings import (
     STRAIGHT,
     Crossings,
 )
-from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.events import Eventful
+from symfric.integrator.running.record import Outputs
 from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 
 Array = NDArray[np.float64]

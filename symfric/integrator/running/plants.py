@@ -8,18 +8,21 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any, cast, final
+from typing import final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.numeric import flat_view
+from symfric.foundation.numeric import bound
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
 from symfric.integrator.running import loop
+from symfric.integrator.running.engine import Engine, Stop
+from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Outputs
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -142,10 +145,7 @@ def in_vm(integrator: Integrator, plants: Plants) -> Advance:
     """The loop in Python; needs no compiler."""
     step, follow, nx = integrator.step, integrator.follow, integrator.system.nx
     S, R, after = (np.zeros(k) for k in (step.numel_in(0), step.numel_in(1), step.numel_in(0)))
-    buffer, attempt = cast(tuple[Any, Any], step.buffer())
-    buffer.set_arg(0, flat_view(S))
-    buffer.set_arg(1, flat_view(R))
-    buffer.set_res(0, flat_view(after))
+    attempt = bound(step, (S, R), (after,))
     data, held = Given.d(nx), plants.u.shape[1]
 
     def runs(b: int) -> int:
@@ -175,7 +175,7 @@ def in_vm(integrator: Integrator, plants: Plants) -> Advance:
         plants.S[b, State.Y] = found
         return True
 
-    def advance(begin: int, _alive: object = buffer) -> int:
+    def advance(begin: int) -> int:
         if begin and not np.isfinite(plants.u).all():
             return REFUSED
         for b in range(plants.S.shape[0]):
@@ -193,6 +193,116 @@ def _large(S: Array, h_min: float) -> bool:
     """Whether the step is large enough to go on; NaN is not."""
     h = S[State.H]
     return bool(h >= h_min and h >= FLOOR * abs(S[State.T]))
+
+
+EVENTFUL_ATTEMPTS = 50_000
+"""Attempts of one call of an engine."""
+WHY = {Stop.END: END, Stop.STEP_TOO_SMALL: STEP_TOO_SMALL, Stop.TERMINAL: OVER, Stop.STORM: STORM}
+
+
+def with_events(
+    integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
+) -> Advance:
+    """The loop for models with events, one plant after the other by an engine of runs.
+
+    Python stands between the samples, and between what events ask for; the search for them is the
+    engine's (`symfric.integrator.running.events`).
+
+    Args:
+        integrator, plants: what goes on.
+        engine: that makes the steps.
+        tolerance: of event times [s].
+    """
+    return _Eventful(integrator, plants, engine, tolerance).advance
+
+
+@final
+class _Eventful:
+    """Buffers of the plant that is under way."""
+
+    def __init__(
+        self, integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
+    ) -> None:
+        self.integrator, self.plants, self.engine = integrator, plants, engine
+        system, rows = integrator.system, integrator.tableau.H.shape[0]
+        if integrator.crossings is None:
+            raise ValueError(f"plants of '{integrator.model.name}': expected a model with events")
+        self.work = loop.Work(system.n, integrator.step.numel_in(1), rows)
+        self.events = Eventful(integrator.crossings, tolerance)
+        self.work.want(Outputs.at(np.zeros(0), system.n), self.events)
+        self.work.over(np.zeros(2), np.zeros((0, 1)))
+        self.work.loop.h_min = plants.h_min
+        self.data = Given.d(system.nx)
+
+    def advance(self, begin: int) -> int:
+        """As `Advance`."""
+        plants = self.plants
+        if begin and not np.isfinite(plants.u).all():
+            return REFUSED
+        if begin:
+            plants.happened.clear()
+        for b in range(plants.S.shape[0]):
+            if plants.why[b] == OVER or not (begin or plants.why[b] == AGAIN):
+                continue
+            self.work.S[:], self.work.R[:] = plants.S[b], plants.R[b]
+            self.events.memory[:] = plants.memory[b]
+            first = bool(plants.ready[b])
+            follows = self._takes_over(b, first) if begin else True
+            plants.why[b] = self._runs(b) if follows else SEARCH
+            plants.S[b], plants.R[b] = self.work.S, self.work.R
+            plants.memory[b] = self.events.memory
+        return int(np.count_nonzero(plants.why > 0))
+
+    def _takes_over(self, b: int, first: bool) -> bool:
+        """New inputs and the time of the next sample; whether algebraic unknowns could follow."""
+        plants, S, R = self.plants, self.work.S, self.work.R
+        plants.count[b] += S[State.T] >= R[Given.T_END]
+        plants.made[b] = plants.ready[b] = 0
+        R[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
+        R[R.size - plants.u.shape[1] :] = plants.u[b]
+        if first:
+            self._before_start()
+            return True
+        self.events.entered()
+        return self._follow()
+
+    def _before_start(self) -> None:
+        """Events that have happened by the start have values as if just before it."""
+        events = self.integrator.model.events
+        if any(event.at_start for event in events):
+            S, d = self.work.S, self.work.R[self.data]
+            now = self.integrator.events(S[State.T], S[State.Y], d).full().ravel()
+            signs = [-e.direction if e.at_start else x for e, x in zip(events, now, strict=True)]
+            self.events.jumped(np.array(signs))
+
+    def _follow(self) -> bool:
+        """Whether algebraic unknowns could follow a jump."""
+        follow = self.integrator.follow
+        if follow is None:
+            return True
+        found = follow(self.work.S[State.Y], self.work.R[self.data])
+        if found is not None:
+            self.work.S[State.Y] = found
+        return found is not None
+
+    def _runs(self, b: int) -> int:
+        """Steps and events up to the sample; why they ended."""
+        plants, manifold = self.plants, self.integrator.system.manifold
+        events = self.integrator.model.events
+        while plants.made[b] < plants.attempts:
+            allowed = min(EVENTFUL_ATTEMPTS, plants.attempts - int(plants.made[b]))
+            _, made, stop = self.engine.march(self.work, allowed)
+            plants.made[b] += made
+            jumps = self.events.jumps(0)
+            for t, which in zip(jumps.t.tolist(), jumps.which, strict=True):
+                plants.happened += [(b, t, events[int(i)].name) for i in np.flatnonzero(which)]
+            if stop in WHY:
+                return WHY[stop]
+            if stop is Stop.FOLLOW:
+                moved = any(events[int(i)].reset for i in np.flatnonzero(jumps.which[-1]))
+                if (moved and manifold is not None and manifold.m) or not self._follow():
+                    return SEARCH
+        return ATTEMPTS
 
 
 def c_source(integrator: Integrator) -> str:
@@ -250,13 +360,7 @@ class Looks:
         function, nx = self.integrator.signals, self.integrator.system.nx
         p, data = self.plants, Given.d(nx)
         for S, R, out in zip(p.S, p.R, self.values, strict=True):
-            buffer, call = cast(tuple[Any, Any], function.buffer())
-            rows = (S[State.T : State.T + 1], S[State.Y], R[data])
-            for i, array in enumerate(rows):
-                if array.size:
-                    buffer.set_arg(i, flat_view(array))
-            buffer.set_res(0, flat_view(out))
-            call()
+            bound(function, (S[State.T : State.T + 1], S[State.Y], R[data]), (out,))()
 
     def _in_c(self) -> Callable[[], None]:
         library = load(look_source(self.integrator), "symfric_look")

@@ -20,13 +20,12 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pace
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.running.dense import Outputs
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.loop import Work
-from symfric.integrator.running.record import MOST_BYTES, Run
+from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -110,8 +109,10 @@ def integrate(
     backend: str,
     progress: Callable[[float], None] | None,
     times: Array = NOWHERE,
-) -> Run:
+) -> tuple[Run, Integrator]:
     """Integrate over all input intervals, with outputs at `times`; the run holds what was reached.
+
+    Returned with it is the integrator that it ended with: pivots that fail on the way are replaced.
 
     A motion that turns out to be tiny is integrated again on its own scale.
     """
@@ -121,21 +122,20 @@ def integrate(
         quickest = min([inputs.pace, *(pace(f, *inputs.span) for f in integrator.schedules)])
         tolerances = replace(tolerances, max_step=min(tolerances.max_step, PACES * quickest))
     scale, allowed = nominal, tolerances
-    run = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
+    run, last = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
     for _ in range(ROUNDS if tolerances.follow and not ample(run, nominal) else 0):
         own = finer(scale, run.largest[: nominal.size], nominal)
         if own is None or not run.status.ok:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
-        start = run.integrator or integrator
-        again = _integrated(start, inputs, y0, p, allowed, backend, None, times)
+        again, other = _integrated(last, inputs, y0, p, allowed, backend, None, times)
         if not again.status.ok and again.status is not Status.INTERRUPTED:
             run.message += (
                 f" Motions that are tiny were not resolved on their own scale: {again.message}"
             )
             break
-        run = again
-    return run
+        run, last = again, other
+    return run, last
 
 
 def _integrated(
@@ -148,7 +148,7 @@ def _integrated(
     progress: Callable[[float], None] | None,
     times: Array,
     most: float | None = None,
-) -> Run:
+) -> tuple[Run, Integrator]:
     """One run over all input intervals; it keeps steps of up to `most` bytes."""
     data = inputs.values[:, 0]
     y = integrator.start(y0, np.concatenate([p, data]) if data.size else p)
@@ -163,12 +163,12 @@ def _integrated(
         run.stop(Status.INTERRUPTED, reached)
         run.outputs.back_to(run.reached)
     march.finish()
-    run.integrator = march.integrator
     integrator.give_back(work)
     if not run.complete:
         same = replace(tolerances, max_steps=run.attempts, extends=False)
-        run.again = partial(_integrated, integrator, inputs, y0, p, same, backend, None)
-    return run
+        again = partial(_integrated, integrator, inputs, y0, p, same, backend, None)
+        run.again = lambda times, most: again(times, most)[0]
+    return run, march.integrator
 
 
 @final

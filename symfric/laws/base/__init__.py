@@ -1,1 +1,1 @@
-"""What a law is, and the only place where it is made smooth."""
+"""Base classes of laws, and the smooth functions that they are made of."""

@@ -14,11 +14,18 @@ Fall = Callable[[Scalar, Scalar, Scalar], Scalar]
 """(v, v_s, delta) -> the Stribeck weight exp(-|v / v_s|^delta)."""
 
 
-class TwoLevels(StaticLaw):
-    """A law without states that holds mu_s N at rest and tends to mu_d N in sliding."""
+@dataclass(frozen=True, eq=False)
+class Levels(Law):
+    """A law with a static level mu_s N that is not below its dynamic level mu_d N."""
 
-    mu_s: Scalar
-    mu_d: Scalar
+    ordered = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+
+
+class TwoLevels(Levels, StaticLaw):
+    """A law without states that holds mu_s N at rest and tends to mu_d N in sliding."""
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -78,7 +85,7 @@ class Sticking(Law):
     @property
     @abstractmethod
     def has_mode(self) -> bool:
-        """Whether rest is a mode and not a band of velocities."""
+        """Return True if rest is a mode and not a band of velocities."""
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -117,7 +124,7 @@ class Sticking(Law):
 
 
 def rests(mode: Scalar) -> Scalar:
-    """Whether `mode`, -1, 0 or 1 but for the overload that error control sees, says rest."""
+    """Return True if `mode`, -1, 0 or 1 but for the overload that error control sees, says rest."""
     return smooth.magnitude(mode, 0.0) < 0.5
 
 

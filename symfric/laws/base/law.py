@@ -1,4 +1,4 @@
-"""What a friction law is: parameters, a force, the rate of its internal states, and facts."""
+"""Base class of friction laws: parameters, a force, the rate of internal states, and facts."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -48,7 +48,7 @@ CONFIDENCE = {
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known about a law, as data.
+    """Facts about a law, as data.
 
     Attributes:
         phenomena: codes of `PHENOMENA`.
@@ -71,7 +71,7 @@ class Facts:
 
     @property
     def formula(self) -> str:
-        """How sure the formula is, in words."""
+        """Confidence in the formula, in words."""
         said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
         return f"{said}: {self.checked}" if self.checked else said
 
@@ -95,7 +95,7 @@ class State:
 
 @dataclass(frozen=True)
 class Input:
-    """What a law takes besides v and N, as a keyword-only argument of its methods.
+    """Input of a law besides v and N: a keyword-only argument of its methods.
 
     `nominal` is its typical magnitude, `steady` its value in pictures of steady sliding (v > 0).
     """
@@ -271,7 +271,7 @@ class Law(Parametric, ABC):
         return None
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Where each state comes to rest while v, N and the other states stay as they are.
+        """Value at which each state comes to rest while v, N and the other states stay constant.
 
         None for a law of which only the `steady_state` is known, where all rest together.
         """

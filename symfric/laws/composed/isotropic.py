@@ -147,7 +147,7 @@ class SpatialSlip(Isotropic):
 
 
 def is_isotropic(law: Law) -> bool:
-    """Whether a law has a form in several dimensions by isotropy alone."""
+    """Return True if a law has a form in several dimensions by isotropy alone."""
     return not anisotropy(law)
 
 
@@ -173,7 +173,7 @@ def anisotropy(law: Law) -> str:
 
 
 def _is_odd(law: Law) -> bool:
-    """Whether mirrored motion mirrors the force of a law and of all laws it holds."""
+    """Return True if mirrored motion mirrors the force of a law and of all laws it holds."""
     held = [getattr(law, item.name) for item in fields_of(law)]
     inner = [x for value in held for x in (value if isinstance(value, tuple) else (value,))]
     mirrored = law.facts.odd and not isinstance(law, Asymmetric)

@@ -52,7 +52,7 @@ class Population(Parametric, ABC):
 
     facts: ClassVar[Facts]
     redraws: ClassVar[bool]
-    """Whether contacts take a fresh random number at every step."""
+    """True if contacts take a fresh random number at every step."""
 
     count: int
     seed: int

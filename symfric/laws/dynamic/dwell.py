@@ -17,13 +17,14 @@ from symfric.foundation.numeric import (
 from symfric.foundation.parameters import option, param
 from symfric.foundation.vector import TINY
 from symfric.laws.base import fields, smooth
+from symfric.laws.base.families import Levels
 from symfric.laws.base.law import Facts, Law, State, one_sided
 from symfric.laws.dynamic.element import deflection, yielding
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Gonthier(Law):
+class Gonthier(Levels):
     """Gonthier friction with dwell time (two states).
 
         s        = exp(-(v/v_s)^2),   dir = 3/2 u - 1/2 u^3 for u = v/v_d in [-1, 1], else sign(v)
@@ -51,10 +52,8 @@ class Gonthier(Law):
         source="Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004",
         load="proportional in steady sliding",
     )
-    ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_d", "v_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
     mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
     v_s: Scalar = fields.V_S(1e-3)
     v_d: Scalar = fields.VELOCITY(1e-4, doc="velocity of full direction")
@@ -223,7 +222,7 @@ class Armstrong(Law):
         return exp(x), -expm1(x)
 
     def _balance(self, v: Scalar) -> Scalar:
-        """Where the dwell grows as fast as it is lost.
+        """Dwell time at which growth equals loss.
 
         The root of what is lost, `slip` gamma, is written with |v|: it has a slope at rest, too.
         """

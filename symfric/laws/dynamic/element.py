@@ -1,4 +1,4 @@
-"""What laws with states are built of: Stribeck levels, elements side by side, yielding."""
+"""Parts of laws with states: Stribeck levels, elements side by side, yielding."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -159,7 +159,7 @@ def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> 
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What a step h [s] with held velocity and load does to every element of a law.
+    """Step of h [s] of every element of a law, with held velocity and load.
 
         way = v h,   s = sign(v)
 

@@ -7,12 +7,13 @@ from typing import final
 from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
 from symfric.foundation.parameters import param
 from symfric.laws.base import fields, smooth
+from symfric.laws.base.families import Levels
 from symfric.laws.base.law import Facts, State
 from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
 
 
 @dataclass(frozen=True, eq=False)
-class Bristle(StribeckLevel):
+class Bristle(Levels, StribeckLevel):
     """A bristle of stiffness sigma_0 and damping sigma_1 that slides at a Stribeck level.
 
         g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
@@ -21,9 +22,6 @@ class Bristle(StribeckLevel):
     The laws differ in dz/dt and, some, in the damping.
     """
 
-    ordered = (("mu_d", "mu_s"),)
-
-    mu_s: Scalar = fields.MU_S(0.15)
     mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
     v_s: Scalar = fields.V_S(1e-3)
     delta: Scalar = fields.DELTA(2.0)
@@ -46,7 +44,7 @@ class Bristle(StribeckLevel):
         return column(self.level(v, N) / self.sigma_0 * smooth.sign(v, self.v_eps))
 
     def warnings(self) -> tuple[str, ...]:
-        """Whether the law may push: its passivity needs viscous friction."""
+        """Return True if the law may push: its passivity needs viscous friction."""
         needed = (self.mu_s - self.mu_d) / self.mu_d * self.sigma_1
         if not is_number(needed) or not is_number(self.sigma_2) or self.sigma_2 >= needed:
             return ()

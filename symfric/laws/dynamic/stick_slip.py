@@ -7,8 +7,8 @@ from typing import final
 from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Sticking, carried, stick_and_slip
-from symfric.laws.base.law import Facts, Law, State, Switch
+from symfric.laws.base.families import Levels, Sticking, carried, stick_and_slip
+from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import Held, deflection, yielding
 
 
@@ -85,7 +85,7 @@ ROOT_STEPS = 10
 
 @final
 @dataclass(frozen=True, eq=False)
-class StickSlip(Law):
+class StickSlip(Levels):
     """Stick-slip friction with stiction deformation (one state).
 
         beta  = 1 - step(|v|/v_s)                     1 in stick, 0 in slip
@@ -111,11 +111,8 @@ class StickSlip(Law):
         checked="the structure is that of the abstract, the formulas are made here",
         source="Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011",
     )
-    ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_s", "v_d"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.VELOCITY(1e-3, doc="velocity of full slip")
     v_d: Scalar = fields.VELOCITY(1.5e-3, doc="velocity of the dynamic level")
     D_max: Scalar = fields.LENGTH(1e-6, doc="largest stiction deformation")
@@ -158,7 +155,7 @@ class StickSlip(Law):
         return column((1 - slip) * stretch - slip * forgotten)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Where growth and loss are equal, none left beyond v_s, shape (1, 1).
+        """Deformation at which growth equals loss, zero beyond v_s, shape (1, 1).
 
         The root of slip r + (1 - slip) (r^n - 1), convex, by Newton's method from r = 1.
         """
@@ -171,7 +168,7 @@ class StickSlip(Law):
 
 @final
 @dataclass(frozen=True, eq=False)
-class HaessigFriedland(Law):
+class HaessigFriedland(Levels):
     """Reset-integrator friction (one state, with a mode in the event form).
 
         r     = sigma_0 z / (mu_d N)
@@ -199,9 +196,7 @@ class HaessigFriedland(Law):
         source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
         load="proportional in steady sliding",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
     mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
     sigma_0: Scalar = fields.STIFFNESS(1e5, doc="bristle stiffness in slip")
     sigma_1: Scalar = param(
@@ -280,7 +275,7 @@ CUBIC_STEPS = 40
 
 @final
 @dataclass(frozen=True, eq=False)
-class Bristle2D(Law):
+class Bristle2D(Levels):
     """Bristle friction that slides where a disc ends (one state, in a plane a vector).
 
         g     = N [mu_d + (mu_s - mu_d) exp(-|v|^2/v_s^2)]
@@ -305,9 +300,7 @@ class Bristle2D(Law):
         source="Kikuuwe et al., IEEE T-RO 22(6), 2006; Liang, Fillmore, Ma 2012",
         load="proportional in steady sliding",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
     mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
     v_s: Scalar = fields.V_S(1e-3)
     sigma_0: Scalar = fields.SIGMA_0(1e5)

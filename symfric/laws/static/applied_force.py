@@ -7,7 +7,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Sticking, carried, rests, stick_and_slip
+from symfric.laws.base.families import Levels, Sticking, carried, rests, stick_and_slip
 from symfric.laws.base.law import (
     APPLIED_FORCE,
     Facts,
@@ -140,7 +140,7 @@ class Karnopp(Sticking):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Awrejcewicz(StaticLaw):
+class Awrejcewicz(Levels, StaticLaw):
     """Awrejcewicz-Grzelczyk-Pyryev friction: four branches, continuous, in one expression.
 
         u = |v| / epsilon
@@ -164,10 +164,7 @@ class Awrejcewicz(StaticLaw):
         checked="its four branches join",
         source="Awrejcewicz, Grzelczyk, Pyryev 2008",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     epsilon: Scalar = param(
         1e-3, unit="m/s", role="width", width=1, doc="half width of the window", lower=1e-12
     )
@@ -276,7 +273,7 @@ class LeineSwitch(Sticking):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Wojewoda(StaticLaw):
+class Wojewoda(Levels, StaticLaw):
     """Hysteretic friction of Wojewoda et al.: other branches for speeding up and slowing down.
 
         F = N [mu_d + (mu_s - mu_d) h sign(v dv/dt)] sign(v)
@@ -297,10 +294,7 @@ class Wojewoda(StaticLaw):
         checked="of the paper only the abstract was read",
         source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     a_1: Scalar = param(100.0, unit="1/s", role="shape", doc="decay of the hysteresis", lower=0.0)
     a_2: Scalar = param(
         0.1, unit="m/s^2", role="shape", doc="acceleration of half the decay", lower=1e-12

@@ -5,13 +5,13 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar
 from symfric.laws.base import fields
-from symfric.laws.base.families import Curve, Fall
+from symfric.laws.base.families import Curve, Fall, Levels
 from symfric.laws.base.law import Facts
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Stribeck(Curve):
+class Stribeck(Levels, Curve):
     """Stribeck friction with exponent delta (Bo-Pavelescu), smooth at rest.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
@@ -32,10 +32,7 @@ class Stribeck(Curve):
         checked="jchristopherson/friction (delta = 2); the Lund thesis on laminator nips (delta)",
         source="Stribeck 1902; Bo and Pavelescu 1982 (exponent)",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.V_S(1e-3)
     delta: Scalar = fields.DELTA(2.0)
     v_eps: Scalar = fields.V_EPS(1e-4)
@@ -49,7 +46,7 @@ class Stribeck(Curve):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Tustin(Curve):
+class Tustin(Levels, Curve):
     """Tustin friction: Coulomb, viscous and an exponential fall.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] sign(v) + sigma_2 v
@@ -67,10 +64,7 @@ class Tustin(Curve):
         checked="MassWithStopAndFriction of the Modelica Standard Library; not the name",
         source="Tustin 1947, as cited in control literature",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.V_S(1e-3)
     v_eps: Scalar = fields.V_EPS(1e-4)
     sigma_2: Scalar = fields.SIGMA_2(0.0)
@@ -83,7 +77,7 @@ class Tustin(Curve):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Benson(Curve):
+class Benson(Levels, Curve):
     """Benson-Hallquist exponential friction of finite-element codes.
 
         F = N [mu_d + (mu_s - mu_d) exp(-d_c |v|)] sign(v)
@@ -100,10 +94,7 @@ class Benson(Curve):
         checked="documentation of LS-DYNA and of COMSOL",
         source="Benson and Hallquist 1990, as in LS-DYNA and COMSOL",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     d_c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
     v_eps: Scalar = fields.V_EPS(1e-4)
 
@@ -115,7 +106,7 @@ class Benson(Curve):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Berger(Curve):
+class Berger(Levels, Curve):
     """Berger friction, an interpretation: the exponential fall of his review, with a smooth sign.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] tanh(v / v_t)
@@ -133,10 +124,7 @@ class Berger(Curve):
         checked="an interpretation of a review that proposes no law",
         source="after Berger 2002",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.V_S(1e-3)
     v_t: Scalar = fields.V_T(1e-4)
 
@@ -148,7 +136,7 @@ class Berger(Curve):
 
 @final
 @dataclass(frozen=True, eq=False)
-class DuanSingh(Curve):
+class DuanSingh(Levels, Curve):
     """Duan-Singh friction: conditioned dry friction with a static to kinetic ratio.
 
         F = mu_d N [1 + (mu_s/mu_d - 1) exp(-c |v|)] tanh(sigma v)
@@ -166,10 +154,7 @@ class DuanSingh(Curve):
         checked="the expression is that of Andersson with p = 1",
         source="Duan and Singh 2006",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
     sigma: Scalar = fields.STEEPNESS(1e4, width=-1, doc="conditioning factor")
 
@@ -181,7 +166,7 @@ class DuanSingh(Curve):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Andersson(Curve):
+class Andersson(Levels, Curve):
     """Andersson-Soderberg-Bjorklund friction.
 
         F = N [mu_d + (mu_s - mu_d) exp(-(|v|/v_s)^p)] tanh(k_t v) + sigma_2 v
@@ -199,10 +184,7 @@ class Andersson(Curve):
         checked="public MATLAB function Friction_A",
         source="Andersson, Soderberg, Bjorklund 2007, as in public code",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.V_S(1e-3)
     p: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
     k_t: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness at rest")

@@ -8,7 +8,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, exp, tanh
 from symfric.foundation.parameters import option
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import TwoLevels
+from symfric.laws.base.families import Levels, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 FORMS = ("smooth", "original")
@@ -118,7 +118,7 @@ class ModifiedThrelfall(Rise):
 
 @final
 @dataclass(frozen=True, eq=False)
-class BengisuAkay(StaticLaw):
+class BengisuAkay(Levels, StaticLaw):
     """Bengisu-Akay friction: a parabola up to the static level, then a fall.
 
         F = mu_s N u (2 - |u|)                                  u = v/v_0, for |u| <= 1
@@ -137,10 +137,7 @@ class BengisuAkay(StaticLaw):
         checked="parabola and fall join at the static level",
         source="Bengisu and Akay 1994",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_0: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
     xi: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall", lower=0.0)
     form: str = option("smooth", choices=FORMS, doc="fall behind the peak")
@@ -181,11 +178,8 @@ class VelocityBased(TwoLevels):
         checked="two pages of the documentation of MSC ADAMS",
         source="documentation of MSC ADAMS",
     )
-    ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_s", "v_d"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.VELOCITY(1e-3, width=1, doc="stiction transition velocity")
     v_d: Scalar = fields.VELOCITY(1.5e-3, width=1, doc="friction transition velocity")
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
@@ -267,10 +261,7 @@ class Hollars(TwoLevels):
         checked="simbody/simbody HuntCrossleyForce.h",
         source="Simbody, HuntCrossleyForce",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_t: Scalar = fields.V_T(1e-2)
     mu_v: Scalar = fields.MU_V(0.0)
     u_eps: Scalar = fields.U_EPS(0.2)
@@ -308,10 +299,7 @@ class Exudyn(TwoLevels):
         checked="jgerstmayr/EXUDYN, source of its regularised friction",
         source="Exudyn, public source",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_reg: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the ramp's end")
     v_exp: Scalar = fields.VELOCITY(1e-3, doc="velocity of the fall")
     mu_v: Scalar = fields.MU_V(0.0)
@@ -353,10 +341,7 @@ class Step5(TwoLevels):
         checked="simbody/simbody CompliantContactSubsystem.cpp, function stribeck",
         source="Simbody, CompliantContactSubsystem",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_t: Scalar = fields.V_T(1e-3)
     mu_v: Scalar = fields.MU_V(0.0)
 

@@ -82,10 +82,8 @@ class SelfTuning(TwoLevels):
         confidence="rebuilt",
         source="after doi 10.1177/14644193231169325 (equations reconstructed)",
     )
-    ordered = (("mu_d", "mu_s"),)
 
     mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
-    mu_d: Scalar = fields.MU_D(0.1)
     B: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor")
     E: Scalar = fields.CURVATURE(0.0)
 
@@ -150,7 +148,6 @@ class BrittleSelfTuning(TwoLevels):
     ordered = (("mu_d", "mu_s"), ("B_0", "B_max"))
 
     mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
-    mu_d: Scalar = fields.MU_D(0.1)
     B_0: Scalar = fields.STEEPNESS(100.0, width=-1, doc="stiffness factor without load")
     B_max: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor under heavy load")
     difference_ref: Scalar = fields.SHAPE(0.05, doc="reference of mu_s - mu_d", lower=1e-12)

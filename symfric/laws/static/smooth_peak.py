@@ -7,7 +7,7 @@ from typing import final
 from symfric.foundation.numeric import Scalar, equals, exp, tanh
 from symfric.foundation.parameters import param
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Curve, Fall, TwoLevels
+from symfric.laws.base.families import Curve, Fall, Levels, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -32,10 +32,7 @@ class BrownMcPhee(TwoLevels):
         checked="public MATLAB function Friction_B and the code of a railway simulator",
         source="Brown and McPhee, J. Comput. Nonlinear Dynam. 11(5), 2016",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_t: Scalar = fields.V_T(1e-3)
     mu_v: Scalar = fields.SIGMA_2(0.0)
     N_t: Scalar = param(1.0, unit="N", role="load", doc="transition normal force", lower=1e-12)
@@ -77,10 +74,7 @@ class SimscapeBreakaway(TwoLevels):
         checked="documentation of Simscape, four pages",
         source="documentation of Simscape",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_brk: Scalar = fields.VELOCITY(1e-3, width=1, doc="breakaway velocity")
     sigma_2: Scalar = fields.SIGMA_2(0.0)
 
@@ -120,11 +114,8 @@ class Specker(TwoLevels):
         checked="v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain",
         source="Specker, Buchholz, Dietmayer 2014",
     )
-    ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_t", "v_sp"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_sp: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
     v_t: Scalar = fields.V_T(1e-4)
     sigma_2: Scalar = fields.SIGMA_2(0.0)
@@ -190,7 +181,7 @@ class MakkarDixon(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Lorentzian(Curve):
+class Lorentzian(Levels, Curve):
     """Lorentzian friction of Hess and Soom.
 
         F = N [mu_d + (mu_s - mu_d) / (1 + (v/v_s)^2)] sign(v) + sigma_2 v
@@ -208,10 +199,7 @@ class Lorentzian(Curve):
         checked="g(v) of jchristopherson/friction README with alpha = 2; not the name",
         source="Hess and Soom 1990",
     )
-    ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1)
     v_s: Scalar = fields.V_S(1e-3)
     v_eps: Scalar = fields.V_EPS(1e-4)
     sigma_2: Scalar = fields.SIGMA_2(0.0)

@@ -80,7 +80,7 @@ class Question:
         signal: the force of a drive.
         y: start values, the machine's states before those of the laws.
         scale: typical sizes of the states.
-        times: when states are asked for, from the start to the end [s].
+        times: when states are requested, from the start to the end [s].
     """
 
     law: str
@@ -150,7 +150,7 @@ class Motion:
 
 
 def solve(asked: Question, rtol: float = 1e-10) -> Array:
-    """States at the times asked for, shape (nx, times).
+    """States at the requested times, shape (nx, times).
 
     Raises:
         ArithmeticError, ValueError: SciPy gave up, or a number left the range of the equations.

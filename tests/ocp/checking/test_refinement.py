@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import zoh_losses
 from ocp.checking.mesh_refinement import MeshErrors, refined
-from ocp.formulation.bounds import Free, Range
 from ocp.formulation.expressions import TIME, Cost, at_end, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase, Range
 from ocp.formulation.problem import Problem
-from ocp.problems.others import brachistochrone, bryson_denham
-from ocp.solvers.methods import Ipopt
+from ocp.problems import brachistochrone, bryson_denham
+from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import solve_on
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.foundation.parameters import Variable
 from symfric.laws import BrownMcPhee

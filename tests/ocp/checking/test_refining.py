@@ -9,11 +9,10 @@ import pytest
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verify
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import TIME, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.problems.others import (
+from ocp.problems import (
     OTHERS,
     alp_rider,
     brachistochrone,
@@ -21,10 +20,10 @@ from ocp.problems.others import (
     goddard,
     hang_glider,
 )
-from ocp.result.solution import Solution
-from ocp.solvers.methods import Ipopt
-from ocp.solvers.outcome import Progress
-from ocp.transcription.grid import make_meshes
+from ocp.solving.methods import Ipopt
+from ocp.solving.solution import Solution
+from ocp.transcription.program import Progress
+from ocp.transcription.schemes import make_meshes
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
 from symfric.model import Model

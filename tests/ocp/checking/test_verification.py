@@ -9,9 +9,8 @@ import pytest
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import Arc, arcs_of, resimulated
 from ocp.checking.verify import verified, verified_arcs, verify
-from ocp.formulation.bounds import FREE
 from ocp.formulation.expressions import Signals, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import FREE, Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import solve_once
 from symfric.foundation.parameters import Variable

@@ -3,11 +3,9 @@ from math import inf
 import pytest
 from motions import double_integrator, stage
 
-from ocp.formulation.bounds import FREE, Free
 from ocp.formulation.expressions import TIME, effort, integral
-from ocp.formulation.phase import Phase
-from ocp.formulation.problem import Problem
-from ocp.formulation.templates import rest_to_rest
+from ocp.formulation.phase import FREE, Free, Phase
+from ocp.formulation.problem import Problem, rest_to_rest
 
 MODEL = stage(free=["m", "mu_d"])
 

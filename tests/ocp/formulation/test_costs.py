@@ -2,9 +2,8 @@ import casadi as ca
 import pytest
 from motions import double_integrator, stage
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import TIME, Cost, Signals, at_end, effort, integral, track, worst
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
 
 MODEL = double_integrator()

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from ocp.formulation.bounds import FREE
 from ocp.formulation.expressions import integral
-from ocp.formulation.phase import Phase, Span
+from ocp.formulation.phase import FREE, Phase, Span
 from ocp.formulation.problem import Problem
 from symfric import BrownMcPhee, Model
 from symfric.multibody import JointSpringDamper

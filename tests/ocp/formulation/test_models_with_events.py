@@ -2,7 +2,7 @@
 
 import pytest
 
-from ocp.formulation.templates import rest_to_rest
+from ocp.formulation.problem import rest_to_rest
 from ocp.solve import solve
 from ocp.transcription.schemes import Shooting
 from symfric import ExactCoulomb, drive

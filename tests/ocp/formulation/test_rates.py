@@ -2,9 +2,8 @@ from math import inf
 
 import pytest
 
-from ocp.formulation.bounds import FREE
 from ocp.formulation.expressions import integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import FREE, Phase
 from ocp.formulation.problem import Problem
 from ocp.formulation.statement import with_parameters, with_rates
 from symfric import BrownMcPhee, LuGre, Model, drive, simulate

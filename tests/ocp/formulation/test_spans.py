@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from motions import double_integrator, stage
 
-from ocp.formulation.bounds import FREE, Free
 from ocp.formulation.expressions import TIME, Signals, at_end, effort, integral
-from ocp.formulation.phase import Phase, Row, Span
+from ocp.formulation.phase import FREE, Free, Phase, Row, Span
 from ocp.formulation.problem import Problem
 from symfric import BrownMcPhee, LuGre, drive
 from symfric.scenes import PendulumBox

@@ -3,8 +3,8 @@
 import casadi as ca
 import pytest
 
-from ocp.friction.arc_models import STOPPED, arc_model
-from ocp.problems.friction import load_through_spring
+from ocp.friction.transfer import STOPPED, arc_model
+from ocp.problems import load_through_spring
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.friction.homotopy import FINE
 from ocp.friction.mode_models import holding, mode_model
-from ocp.problems.friction import out_and_back
+from ocp.problems import out_and_back
 from ocp.solve import solve
 from symfric import BrownMcPhee, ExactCoulomb, SolveError, Status
 from symfric.laws import Law

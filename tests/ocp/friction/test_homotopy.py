@@ -22,8 +22,8 @@ from ocp.friction.smooth_models import (
     speeds_at,
     widths_at,
 )
-from ocp.problems.friction import out_and_back, parcel_on_tray
-from ocp.solvers.methods import Ipopt
+from ocp.problems import out_and_back, parcel_on_tray
+from ocp.solving.methods import Ipopt
 from ocp.transcription.schemes import Radau
 from symfric import BrownMcPhee, ExactCoulomb, LuGre, drive
 

@@ -2,11 +2,10 @@ import numpy as np
 import pytest
 
 from ocp.formulation.problem import Problem
-from ocp.problems.friction import cart_pendulum, load_through_spring
-from ocp.solving.random_starts import starts_around
+from ocp.problems import cart_pendulum, load_through_spring
+from ocp.solving.one_solve import starts_around
 from ocp.solving.starts import initial_points
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 

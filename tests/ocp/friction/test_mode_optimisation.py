@@ -9,9 +9,9 @@ from ocp.formulation.phase import Chain
 from ocp.formulation.problem import Problem
 from ocp.friction.mode_optimisation import optimise_modes
 from ocp.friction.smooth_models import smooth_model, widths
-from ocp.problems.friction import out_and_back
-from ocp.result.solution import Solution
+from ocp.problems import out_and_back
 from ocp.solving.one_solve import solve_once
+from ocp.solving.solution import Solution
 from symfric.integrator import Hold, simulate
 
 

@@ -7,7 +7,7 @@ from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
-from ocp.problems.friction import cart_pendulum, load_through_spring
+from ocp.problems import cart_pendulum, load_through_spring
 from ocp.solve import solve
 from symfric.foundation.parameters import Variable
 from symfric.laws import BrownMcPhee

@@ -5,13 +5,12 @@ import re
 import casadi as ca
 import pytest
 
-from ocp.formulation.bounds import FREE
 from ocp.formulation.expressions import at_end
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import FREE, Phase
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import in_arcs
 from ocp.friction.sequence import Run, Track, cut
-from ocp.problems.friction import out_and_back
+from ocp.problems import out_and_back
 from ocp.solve import solve
 from symfric import BrownMcPhee, Contact, Model, Variable
 

@@ -12,8 +12,8 @@ from ocp.friction.mode_optimisation import KICK, SHORTEST, better, parameters_of
 from ocp.friction.sequence import Leg, Run, Track, cut, neighbours, shown, with_rests
 from ocp.friction.smooth_models import smooth_model, widths
 from ocp.friction.transfer import Known, sizes_of
-from ocp.problems.friction import out_and_back
-from ocp.solvers.methods import Ipopt
+from ocp.problems import out_and_back
+from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import solve_once
 from ocp.transcription.schemes import Radau
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from receding import controller, linear_model, positioning, rubbing
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import at_end, effort, integral, track
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of
 from ocp.mpc.design import CycleStatus

@@ -8,7 +8,7 @@ from ocp.formulation.expressions import at_end, effort, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of
-from ocp.problems.friction import cart_pendulum
+from ocp.problems import cart_pendulum
 from symfric import LuGre, drive
 from symfric.model import Model
 

@@ -1,9 +1,7 @@
 import pytest
 
-from ocp.problems.friction import FRICTION
-from ocp.problems.ready import Ready
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.problems import FRICTION, Ready
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 
 

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle, StepPatch
 from phases import there_and_back, unit_move
 
-from ocp.result.solution import Mode, Solution, plot_solutions
 from ocp.solving.one_solve import solve_once
+from ocp.solving.solution import Mode, Solution, plot_solutions
 from symfric import Hold, Trajectory, simulate
 
 

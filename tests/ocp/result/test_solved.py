@@ -11,9 +11,9 @@ from phases import UNIT, fastest_move, there_and_back, unit_move
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.result.motion import Stretch
-from ocp.result.solution import Mode, Solution
+from ocp.solving.motion import Stretch
 from ocp.solving.one_solve import solve_once
+from ocp.solving.solution import Mode, Solution
 from ocp.transcription.schemes import Legendre, Radau
 from symfric import Hold, Model, Variable, simulate
 

@@ -7,12 +7,11 @@ import pytest
 from phases import there_and_back, unit_move
 
 from ocp import Phase, Problem, integral, solve, verify
-from ocp.result.motion import along
-from ocp.result.solution import SOLUTION, Solution, load
+from ocp.solving.motion import along
 from ocp.solving.one_solve import solve_once
+from ocp.solving.solution import SOLUTION, Solution, load
 from ocp.solving.starts import start_of
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre
+from ocp.transcription.schemes import Legendre, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.foundation import storable
 from symfric.laws import BrownMcPhee
@@ -141,14 +140,21 @@ def test_a_file_that_ends_too_early_is_refused(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_file_that_names_modules_of_an_older_version_loads(back: Solution, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("oldest", "named"), [(False, "ocp.formulation.serialise:"), (True, "ocp.text.posed:")]
+)
+def test_file_that_names_modules_of_an_older_version_loads(
+    back: Solution, tmp_path: Path, oldest: bool, named: str
+) -> None:
     back.save(tmp_path / "back.npz")
     with np.load(tmp_path / "back.npz") as held:
         arrays = dict(held)
     text = arrays["about"].tobytes().decode()
-    for old, new in storable.MOVED.items():
+    pairs = list(storable.MOVED.items())
+    for old, new in pairs[::-1] if oldest else pairs:
         text = text.replace(f'"{new}:', f'"{old}:')
-    assert "ocp.text.posed:" in text
+    assert named in text
+    assert "ocp.result.solution:" in text
     arrays["about"] = np.frombuffer(text.encode(), np.uint8)
     np.savez(tmp_path / "old.npz", **arrays)
     assert load(tmp_path / "old.npz").to_dict() == back.to_dict()

@@ -4,11 +4,9 @@ import pytest
 from phases import unit_move
 
 from ocp.formulation.expressions import at_end, integral
-from ocp.solvers.outcome import outside, worst_of
-from ocp.solvers.watch import Seen, not_finite, plainly, worst
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.program import Program
-from ocp.transcription.schemes import Radau
+from ocp.solving.watch import Seen, not_finite, plainly, worst
+from ocp.transcription.program import Program, outside, worst_of
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 
 

@@ -7,16 +7,14 @@ import pytest
 from discretised import dae, stage
 from phases import there_and_back, unit_move
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import at_end, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.solvers.methods import Fatrop, Ipopt
-from ocp.solvers.outcome import Progress
+from ocp.solving.methods import Fatrop, Ipopt
 from ocp.solving.one_solve import solve_once
 from ocp.solving.starts import start_of
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre, Radau
+from ocp.transcription.program import Progress
+from ocp.transcription.schemes import Legendre, Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import Status
 

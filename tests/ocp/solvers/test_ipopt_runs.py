@@ -11,10 +11,10 @@ from phases import fastest_move, unit_move
 from ocp.formulation.expressions import Signals, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.result.solution import Solution
-from ocp.solvers.methods import ANSWERS, Ipopt
-from ocp.solvers.outcome import Progress, in_stage
+from ocp.solving.methods import ANSWERS, Ipopt
 from ocp.solving.one_solve import solve_once
+from ocp.solving.solution import Solution
+from ocp.transcription.program import Progress, in_stage
 from symfric import Model, Status, Variable
 
 HARD = fastest_move()

@@ -4,15 +4,12 @@ import pytest
 from motions import stage
 from phases import fastest_move, unit_move
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import integral
-from ocp.solvers.convexify import Convexified
-from ocp.solvers.methods import Ipopt, Sqp
-from ocp.solvers.outcome import Progress
+from ocp.formulation.phase import Free
+from ocp.solving.methods import Convexified, Ipopt, Sqp
 from ocp.solving.one_solve import solve_once
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.program import Place, Program
-from ocp.transcription.schemes import Radau
+from ocp.transcription.program import Place, Program, Progress
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import Model, Status, Variable
 

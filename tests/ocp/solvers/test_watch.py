@@ -2,11 +2,9 @@ import numpy as np
 import pytest
 from phases import unit_move
 
-from ocp.solvers.outcome import SolverStatistics, outside, worst_of
-from ocp.solvers.watch import WINDOW, Halt, Seen, Watch, goes_round
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.program import Program
-from ocp.transcription.schemes import Radau
+from ocp.solving.watch import WINDOW, Halt, Seen, Watch, goes_round
+from ocp.transcription.program import Program, SolverStatistics, outside, worst_of
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 
 

@@ -5,15 +5,12 @@ import pytest
 from motions import double_integrator
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.formulation.bounds import FREE, Free
 from ocp.formulation.expressions import integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.solving.one_solve import solve_once
-from ocp.solving.random_starts import perturbed
+from ocp.solving.one_solve import perturbed, solve_once
 from ocp.solving.starts import Guess, initial_points, resample, start_of
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre, Radau, Scheme
+from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 

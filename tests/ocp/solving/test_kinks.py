@@ -5,7 +5,7 @@ from phases import fastest_move
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.solvers.methods import Ipopt
+from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import solve_once
 
 

@@ -2,12 +2,11 @@ import numpy as np
 import pytest
 from phases import fastest_move, there_and_back, unit_move
 
-from ocp.formulation.bounds import FREE, Free
-from ocp.solvers.methods import Ipopt
-from ocp.solving.one_solve import solve_on, solve_once, when
-from ocp.transcription.grid import make_meshes
+from ocp.formulation.phase import FREE, Free
+from ocp.solving.methods import Ipopt
+from ocp.solving.one_solve import solve_on, solve_once
 from ocp.transcription.program import Place
-from ocp.transcription.schemes import Legendre, Radau
+from ocp.transcription.schemes import Legendre, Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 
 
@@ -48,7 +47,7 @@ def test_times_of_places_go_on_over_the_phases() -> None:
     transcription = discretise(problem, Radau()).on(make_meshes(problem, 4))
     w = np.zeros(transcription.program.w.numel())
     said = [
-        when(transcription, w, Place("v", span, s))
+        transcription.when(w, Place("v", span, s))
         for span, s in ((0, 0.25), (1, 0.25), (3, 1.0), (2, np.nan))
     ]
     assert said == [

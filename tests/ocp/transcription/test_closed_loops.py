@@ -6,8 +6,7 @@ from discretised import angles, double_pendulum, four_bar
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre, Radau, Scheme
+from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints

@@ -3,8 +3,7 @@ import pytest
 from discretised import mechanism, one_phase
 
 from ocp.transcription.collocation import FUNCTIONS, Engine, PointEquations
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau
+from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 
 

@@ -6,9 +6,8 @@ import pytest
 from discretised import CASES
 
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Program
-from ocp.transcription.schemes import Legendre, Radau, Scheme
+from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 
 

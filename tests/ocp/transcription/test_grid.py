@@ -4,7 +4,7 @@ from discretised import EFFORT, mean_of_scenarios, stage
 
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import check_meshes, join, make_mesh, make_meshes, nodes_of, split
+from ocp.transcription.schemes import check_meshes, join, make_mesh, make_meshes, nodes_of, split
 
 ONE = Problem(Phase(stage(), 1.0, via={0.5: {"x": 0.5}, 0.3: {"x": 0.2}}), EFFORT)
 TWO = Problem(Phase(stage(), 1.0, end={"x": 1.0}) >> Phase(stage(), 1.0), EFFORT)

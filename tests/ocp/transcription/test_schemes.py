@@ -5,8 +5,7 @@ from numpy.polynomial import Polynomial
 from ocp.formulation.expressions import at_end
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
+from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import Model, Variable
 

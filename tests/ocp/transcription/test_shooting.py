@@ -8,8 +8,7 @@ from discretised import EFFORT, all_at_once, free_time, mean_of_scenarios, stage
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Shooting
+from ocp.transcription.schemes import Shooting, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints

@@ -4,13 +4,11 @@ import pytest
 from discretised import stage
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.formulation.bounds import FREE, Free
 from ocp.formulation.expressions import integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Program
-from ocp.transcription.schemes import Legendre, Radau, Scheme
+from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 
 EFFORT = integral(lambda s: s.a**2)

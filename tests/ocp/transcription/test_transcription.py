@@ -17,12 +17,10 @@ from discretised import (
 )
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import at_end, integral
-from ocp.formulation.phase import Phase, Row
+from ocp.formulation.phase import Free, Phase, Row
 from ocp.formulation.problem import Problem
-from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Legendre, Radau, Scheme
+from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ocp import solve
-from ocp.problems.friction import out_and_back
+from ocp.problems import out_and_back
 from symfric.bench.ocp import NEAR, attempt_of, bench_ocp, landed, starts_of
 from symfric.bench.ocp_contenders import Attempt, opti
 from symfric.bench.ocp_costs import size_rows

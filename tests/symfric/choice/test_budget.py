@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from symfric import Model, SolveError, Status, Variable, rabinowicz, simulate
+from symfric.choice import climb
 from symfric.choice.climb import (
     EVENTS,
     LEAST,
@@ -24,7 +25,7 @@ from symfric.choice.climb import (
 from symfric.choice.machine import Candidate, Reference
 from symfric.choice.measured import _holds  # pyright: ignore[reportPrivateUsage]
 from symfric.choice.softness import Ladder, Rung
-from symfric.figures.regularisation import Sample
+from symfric.figures.regularisation import Machine, Sample
 from symfric.laws import LuGre, Stribeck
 from symfric.model import Event
 
@@ -39,17 +40,13 @@ class Written:
     attempts: Any
     fails: Status = Status.MAX_STEPS
     asked: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
-    law: str = "written down"
+    law: Any = None
     power: float = 1.0
-
-    @property
-    def machine(self) -> "Written":
-        return self
 
     def model(self, s: float) -> float:
         return s
 
-    def run(self, s: float, law: str, rtol: float, most: int) -> Sample:
+    def run(self, s: float, rtol: float, most: int) -> Sample:
         self.asked.append((s, rtol))
         if (made := self.attempts(s, rtol)) > most:
             raise SolveError("too many", self.fails, PARTIAL)
@@ -84,11 +81,11 @@ def test_a_run_of_a_large_machine_may_take_a_few_attempts_all_the_same() -> None
     assert runs.left() and runs.left(0.6) and not runs.left(0.5)
 
 
-def test_the_search_for_events_counts() -> None:
+def test_the_search_for_events_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     x = Variable("x", "m")
     models = [Model("m", x=(x,), ode=-x.symbol, events=e) for e in ((), (Event("zero", x - 1),))]
-    machine: Any = Written(None, None)
-    machine.instructions = lambda model, rtol: (70, "Rodas5P")
+    machine = Machine("m", lambda _: models[0], 1.0)
+    monkeypatch.setattr(climb, "built", lambda *_: (SimpleNamespace(instructions=70), None))
     assert [counted(machine, model, 1e-6)[0] for model in models] == [70, 70 + EVENTS]
 
 

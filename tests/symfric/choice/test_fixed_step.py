@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric.choice.machine import Machine
 from symfric.choice.measured import Motion, largest
+from symfric.figures.regularisation import Machine
 from symfric.integrator import Input, Linear
 from symfric.laws import Viscous
 from symfric.scenes import Drive
@@ -44,7 +44,7 @@ def test_it_is_the_largest_round_step_that_stays_near(step: float, sampled: bool
     share = 1.02 * off(step) / size
     assert all(off(h) / size > share for h in (2e-3, 5e-3, 1e-2, 2e-2, 5e-2) if h > step)
     push: Input = Linear(FINE, np.sin(W * FINE)) if sampled else lambda t: ca.sin(W * t)  # pyright: ignore
-    machine = Machine("drive", Drive, ("law",), END, u={"force": push})
+    machine = Machine("drive", Drive, END, u={"force": push})
     motion = Motion(("x",), FINE, exact(FINE)[None, :], np.array([size]))
     model = Drive(Viscous(sigma_2=C), m=1.0, N=1.0).model()
     found, why = largest(machine, model, "backward_euler", motion, share)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ocp import Legendre, Problem, Radau, Shooting, Solution, load, solve
-from ocp.problems.catalogue import READY
+from ocp.problems import READY
 from symfric.cli import ocp as command
 from symfric.cli.app import main
 from symfric.cli.ocp import scheme_of

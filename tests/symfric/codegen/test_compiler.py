@@ -2,7 +2,7 @@
 
 import pytest
 
-from symfric.codegen.compiler import compile_object, needed_symbols
+from symfric.codegen.runner import compile_object, needed_symbols
 from symfric.foundation.compiler import CompileError
 
 

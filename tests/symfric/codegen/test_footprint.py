@@ -4,7 +4,7 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate, law_block
-from symfric.codegen.compiler import footprint
+from symfric.codegen.runner import footprint
 from symfric.emitter.c99 import FLOAT
 from symfric.foundation.compiler import find_compiler
 

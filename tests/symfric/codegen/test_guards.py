@@ -9,11 +9,10 @@ import pytest
 from symfric import BrownMcPhee, Law, LuGre, Output, Variable
 from symfric.codegen import Block, generate, law_block
 from symfric.codegen.blocks.variables import arranged
-from symfric.codegen.compiler import link_program
 from symfric.codegen.guards import Status, parameter_range, range_of, state_limit
 from symfric.codegen.header import header
 from symfric.codegen.routines import source
-from symfric.codegen.runner import GuardModel, program, run_c, run_vm, signals
+from symfric.codegen.runner import GuardModel, link_program, program, run_c, run_vm, signals
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.foundation.compiler import Compiler
 

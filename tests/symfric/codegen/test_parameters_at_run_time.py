@@ -8,8 +8,7 @@ from law_cases import CASES, NO_STEP
 
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import Block, generate, law_block, plant_block
-from symfric.codegen.compiler import link_program
-from symfric.codegen.runner import program, run_c, run_vm
+from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.codegen.vectors import changed_value, excitation
 from symfric.emitter.c99 import DOUBLE
 from symfric.foundation.compiler import Compiler

@@ -6,8 +6,7 @@ import pytest
 
 from symfric import Output, Variable
 from symfric.codegen import Block, generate, runner
-from symfric.codegen.compiler import link_program
-from symfric.codegen.runner import program, run_c, run_vm, signals
+from symfric.codegen.runner import link_program, program, run_c, run_vm, signals
 from symfric.emitter.c99 import DOUBLE
 from symfric.foundation.compiler import CompileError
 

@@ -7,9 +7,8 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate, law_block, plant_block
-from symfric.codegen.compiler import FLAGS, WARNINGS
 from symfric.codegen.kit import wrapper
-from symfric.codegen.runner import run_vm
+from symfric.codegen.runner import FLAGS, WARNINGS, run_vm
 from symfric.codegen.vectors import excitation
 from symfric.emitter.c99 import REALS
 from symfric.laws import GMS

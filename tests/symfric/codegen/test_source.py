@@ -9,9 +9,9 @@ from law_cases import NO_STEP, SYMMETRIC
 
 from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous
 from symfric.codegen import Block, generate, law_block
-from symfric.codegen.compiler import FLAGS, WARNINGS, compile_object
 from symfric.codegen.header import header, interval
 from symfric.codegen.routines import routines, source
+from symfric.codegen.runner import FLAGS, WARNINGS, compile_object
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS
 

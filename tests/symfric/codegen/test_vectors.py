@@ -7,7 +7,7 @@ import pytest
 from symfric import BrownMcPhee, LuGre, Output, Variable
 from symfric.codegen import Block, law_block
 from symfric.codegen.guards import Status
-from symfric.codegen.vectors import BASE, changed_value, excitation, made, rounded, vectors
+from symfric.codegen.vectors import BASE, changed_value, excitation, made, vectors
 from symfric.emitter.c99 import DOUBLE, FLOAT
 
 LUGRE = law_block(LuGre())
@@ -110,7 +110,7 @@ def test_rows_that_rounding_decides_are_left_out():
     """The input is exactly at the edge in some rows, and a last digit beside it in none."""
     b, edge = Variable("b", "1"), float(np.float32(0.1))
     outputs = {"y": Output(ca.if_else(ca.eq(b.symbol, edge), 1.0, 0.0), "1")}
-    assert (rounded(excitation(Block("jump", inputs=(b,), outputs=outputs)), FLOAT) == edge).any()
+    assert (FLOAT.rounded(excitation(Block("jump", inputs=(b,), outputs=outputs))) == edge).any()
     found = vectors(Block("jump", inputs=(b,), outputs=outputs), FLOAT, guards=False)
     assert found.tolerance[0] < 0.1
     assert (found.results == 0.0).all()

@@ -9,7 +9,7 @@ from law_cases import CASES, NO_STEP
 
 from symfric import BrownMcPhee, LuGre, Output, Stribeck, Variable, law_from_text
 from symfric.codegen import Block, generate, law_block, verify
-from symfric.codegen.excitation import excitation, spoiled, varied
+from symfric.codegen.compared import excitation, spoiled, varied
 from symfric.laws.base import smooth
 
 pytestmark = pytest.mark.heavy

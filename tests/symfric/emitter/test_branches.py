@@ -8,9 +8,8 @@ import pytest
 
 from symfric import LuGre, Output, Variable, VelocityBased
 from symfric.codegen import Block, generate, law_block
-from symfric.codegen.compiler import link_program
 from symfric.codegen.routines import routines
-from symfric.codegen.runner import program, run_c, run_vm
+from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.emitter.emit import Code, emit
 from symfric.foundation.compiler import Compiler

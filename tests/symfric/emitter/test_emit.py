@@ -9,8 +9,7 @@ import pytest
 
 from symfric import Output, Variable
 from symfric.codegen import Block, generate
-from symfric.codegen.compiler import link_program
-from symfric.codegen.runner import program, run_c, run_vm
+from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE, FLOAT, FORMS, FUNCTIONS, REALS
 from symfric.emitter.emit import emit
 from symfric.emitter.logic import LOWERED

@@ -8,8 +8,7 @@ import pytest
 
 from symfric import Output, Variable
 from symfric.codegen import Block, generate
-from symfric.codegen.compiler import compile_object, link_program
-from symfric.codegen.runner import program, run_c, run_vm
+from symfric.codegen.runner import compile_object, link_program, program, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.foundation.compiler import Compiler
 

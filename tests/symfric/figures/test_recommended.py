@@ -119,7 +119,7 @@ def test_what_the_integrator_adds_is_told_apart() -> None:
     ("law", "scene", "error", "options", "message"),
     [
         ("lugre", Rabinowicz, 0.1, {}, "law: expected a law such as LuGre()"),
-        (LAW, "rabinowicz", 0.1, {}, "scene: expected a scene such as FourMass"),
+        (LAW, "rabinowicz", 0.1, {}, "scene: expected a scene such as Rabinowicz"),
         (LAW, rabinowicz, 0.1, {}, "t_end: expected the end of the motion"),
         (LAW, Rabinowicz, 0.0, {}, "error: expected a number > 0"),
         (LAW, Rabinowicz, 2.0, {}, "error: expected a number > 0"),

@@ -1,5 +1,7 @@
 """What makes a law smooth, and where laws are compared."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ from symfric import (
     rabinowicz,
     symbolise,
 )
-from symfric.figures.regularisation import bed_of, distance, regularisation, sample
+from symfric.figures.regularisation import distance, machine_of, regularisation, sample
 from symfric.laws import Law
 from symfric.scenes import PendulumBox, Rabinowicz
 
@@ -83,43 +85,43 @@ def test_what_cannot_be_scaled_is_refused(law: Law, parameter: str | None, messa
     assert message in str(error.value)
 
 
-def test_a_bed_is_a_scene_its_class_or_a_function() -> None:
+def test_a_machine_is_a_scene_its_class_or_a_function() -> None:
     law = BrownMcPhee()
     for scene, t_end in ((Rabinowicz(law), None), (Rabinowicz, None), (rabinowicz, 20.0)):
-        bed = bed_of("here", scene, t_end)
-        assert bed.model(law).name == "rabinowicz"
-        assert bed.t_end == 20.0
-    assert bed_of("here", Rabinowicz(law, m=2.0), 3.0).t_end == 3.0
+        machine = machine_of("here", scene, t_end, None, None, law)
+        assert machine.model(law).name == "rabinowicz"
+        assert machine.t_end == 20.0
+    assert machine_of("here", Rabinowicz(law, m=2.0), 3.0, None, None, law).t_end == 3.0
 
 
 @pytest.mark.parametrize(
     ("scene", "t_end", "message"),
     [
         (rabinowicz, None, "t_end: expected the end of the motion [s], got none"),
-        ("rabinowicz", 1.0, "scene: expected a scene such as FourMass"),
+        ("rabinowicz", 1.0, "scene: expected a scene such as Rabinowicz"),
         (Rabinowicz, -1.0, "t_end: expected a number > 0"),
     ],
 )
-def test_what_is_no_bed_is_refused(scene: object, t_end: float | None, message: str) -> None:
+def test_what_is_no_machine_is_refused(scene: object, t_end: float | None, message: str) -> None:
     with pytest.raises(ValueError, match="here: ") as error:
-        bed_of("here", scene, t_end)
+        machine_of("here", scene, t_end, None, None, BrownMcPhee())
     assert message in str(error.value)
 
 
 def test_a_function_that_gives_no_model_is_refused() -> None:
     with pytest.raises(ValueError, match="Model"):
-        bed_of("here", lambda law: law, 1.0).model(BrownMcPhee())
+        machine_of("here", lambda law: law, 1.0, None, None, BrownMcPhee())
 
 
 def test_motions_are_compared_by_positions_relative_to_how_far_they_go() -> None:
     wide, narrow = (BrownMcPhee(v_t=v_t) for v_t in (1e-2, 1e-3))
-    bed = bed_of("here", PendulumBox, 1.0)
-    one, other = (sample(bed, law, 1e-6) for law in (wide, narrow))
+    machine = machine_of("here", PendulumBox, 1.0, None, None, wide)
+    one, other = (sample(machine, law, 1e-6) for law in (wide, narrow))
     assert one.motion.shape[0] == 2
     off = np.abs(one.motion - other.motion).max(axis=1)
     assert distance(one, other) == pytest.approx((off / np.ptp(other.motion, axis=1)).max())
     assert distance(other, other) == 0.0
-    named = bed_of("here", PendulumBox, 1.0, ("phi",))
+    named = machine_of("here", PendulumBox, 1.0, ("phi",), None, wide)
     assert sample(named, wide, 1e-6).motion.shape[0] == 1
-    last = bed_of("here", PendulumBox, 1.0, lambda run: run["phi"][-1:])
+    last = replace(machine, of=lambda run: run["phi"][-1:])
     assert sample(last, wide, 1e-6).motion.shape == (1, 1)

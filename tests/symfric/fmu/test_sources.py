@@ -9,7 +9,7 @@ import pytest
 from backends import needs_compiler
 
 from symfric import ExactCoulomb, LuGre
-from symfric.codegen.compiler import WARNINGS
+from symfric.codegen.runner import WARNINGS
 from symfric.fmu import export_fmu
 from symfric.fmu.export import KINDS
 from symfric.fmu.variables import direct

@@ -77,7 +77,7 @@ def reserves(model: Model, t_end: float) -> tuple[Array, Array]:
     s = integrator.system
     y = first_guess(s, model, model.initial_state())
     tolerances = Tolerances(1e-6, 1e-7 * s.nominal, 1e-10, 100_000)
-    run = integrate(integrator, inputs, y, np.zeros(0), tolerances, "vm", None)
+    run, _ = integrate(integrator, inputs, y, np.zeros(0), tolerances, "vm", None)
     dense = run.dense
     assert run.status is Status.SUCCESS
     d = inputs.values[:, 0]

@@ -12,10 +12,9 @@ from symfric.codegen import Block, generate
 from symfric.codegen.blocks.block import Elements
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.blocks.variables import arranged, families
-from symfric.codegen.compiler import link_program
 from symfric.codegen.layout import members
 from symfric.codegen.routines import routines, source
-from symfric.codegen.runner import program, run_c, run_vm
+from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS, Asymmetric, Law, LuGre, MaxwellSlip, Sum, Viscous
 from symfric.laws.dynamic.maxwell_slip import Element, Slider

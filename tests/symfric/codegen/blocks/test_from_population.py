@@ -7,7 +7,7 @@ import pytest
 
 from symfric import GenericAsperity, RandomBristles
 from symfric.codegen import contact_block, generate, verify
-from symfric.codegen.compiler import link_program
+from symfric.codegen.runner import link_program
 
 MAIN = """#include "generic_asperity_f64.h"
 #include <stdio.h>

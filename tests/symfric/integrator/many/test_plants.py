@@ -6,7 +6,7 @@ from backends import needs_compiler
 from numpy.typing import NDArray
 
 from symfric import LuGre, Model, Plant, SolveError, Variable, drive, stepper
-from symfric.integrator.many import plants
+from symfric.integrator.many.members import LEAST_PLANTS
 
 Array = NDArray[np.float64]
 pytestmark = needs_compiler
@@ -17,7 +17,7 @@ MEMBERS = 11
 
 def batch(model: Model, dt: float, members: int = MEMBERS) -> Plant:
     plant = stepper(model, dt, batch=members, backend="compiled")
-    assert ("lanes" in vars(plant._integrator)) or members < plants.LEAST
+    assert ("lanes" in vars(plant._integrator)) or members < LEAST_PLANTS
     return plant
 
 

@@ -8,7 +8,7 @@ from scipy.integrate import RK45
 
 from symfric import LuGre, rabinowicz, simulate
 from symfric.integrator.methods.tableaux import DOPRI5
-from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.record import Dense
 from symfric.integrator.step.attempt import build_dense_step, build_fixed
 
 H = 0.2

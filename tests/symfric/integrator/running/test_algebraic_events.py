@@ -10,8 +10,8 @@ from backends import each_backend, needs_compiler
 from symfric import Event, Model, Variable, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
-from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Jumps
 from symfric.integrator.running.run import Tolerances, integrate
 
 LEVELS = (-0.4, -0.35, -0.29, -0.22, -0.15, 0.05, 0.12, 0.21, 0.28, 0.35)
@@ -72,7 +72,7 @@ def test_engines_tell_the_same_of_unknowns_around_an_event() -> None:
     allowed = Tolerances(1e-6, np.full(2, 1e-7), 1e-10, 10_000)
     y0, p = np.array([0.1, 1.0, 0.3]), np.array([0.12])
     runs = [
-        integrate(Integrator(model, inputs, RODAS5P), inputs, y0, p, allowed, backend, None)
+        integrate(Integrator(model, inputs, RODAS5P), inputs, y0, p, allowed, backend, None)[0]
         for backend in ("vm", "compiled")
     ]
     one, other = (Jumps.joined(run.jumps) for run in runs)

@@ -12,9 +12,9 @@ from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, 
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.engine import CompiledEngine
-from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.loop import loop_source
+from symfric.integrator.running.record import Jumps
 from symfric.integrator.running.run import Tolerances, integrate
 
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
@@ -37,7 +37,9 @@ def test_each_jump_is_kept_with_the_values_on_both_sides(backend: str) -> None:
     inputs = input_data(model, None, 0.0, 1.5)
     integrator = Integrator(model, inputs, ADAPTIVE["rodas5p"])
     allowed = Tolerances(1e-6, np.full(2, 1e-7), 1e-10, 1000)
-    run = integrate(integrator, inputs, np.array([0.0, 2.0]), np.zeros(0), allowed, backend, None)
+    run, _ = integrate(
+        integrator, inputs, np.array([0.0, 2.0]), np.zeros(0), allowed, backend, None
+    )
     dense, jumps = run.dense, Jumps.joined(run.jumps)
     assert jumps.which.tolist() == [[True, True, False], [False, False, True]]
     assert jumps.t == pytest.approx([1, 1], abs=1e-9)

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from symfric import LuGre, rabinowicz, simulate
 from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.dense import Dense, hermite, join, pieces_of
 from symfric.integrator.running.loop import width
+from symfric.integrator.running.record import Dense, hermite, join, pieces_of
 from symfric.integrator.step.layout import Record
 
 Array = NDArray[np.float64]

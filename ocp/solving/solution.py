@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.bounds import Free
-from ocp.formulation.problem import Problem
-from ocp.formulation.serialise import Posed, posed
-from ocp.result.motion import Motion, Stored, Stretch, stored_spans, structure_of
-from ocp.solvers.outcome import Iterate, SolverStatistics
+from ocp.formulation.phase import Free
+from ocp.formulation.problem import Posed, Problem, posed
+from ocp.solving.motion import Motion, Stored, Stretch, stored_spans, structure_of
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
 from symfric.foundation import checks, packed
@@ -365,7 +364,7 @@ def plot_solutions(
     Raises:
         ValueError: no solution, an unknown signal, or an ending that Matplotlib does not write.
     """
-    from ocp.result.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
+    from ocp.solving.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
 
     if not solutions:
         raise checks.refused("plot", "at least one solution", solutions)

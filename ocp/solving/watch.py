@@ -14,8 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.solvers.outcome import Progress, Report, outside, worst_of
-from ocp.transcription.program import Place, Program
+from ocp.transcription.program import Place, Program, Progress, Report, outside, worst_of
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

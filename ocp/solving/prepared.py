@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any, final
 
@@ -10,8 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, outside, worst_of
-from ocp.solvers.watch import (
+from ocp.solving.watch import (
     OVERDETERMINED,
     At,
     Halt,
@@ -22,12 +21,24 @@ from ocp.solvers.watch import (
     plainly,
     sentence,
 )
-from ocp.transcription.program import Program
+from ocp.transcription.program import (
+    Iterate,
+    Outcome,
+    Program,
+    Report,
+    SolverStatistics,
+    in_stage,
+    outside,
+    worst_of,
+)
+from ocp.transcription.transcription import Transcription
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 Option = str | float | int
+LEAST = 1e-3
+"""A solver is given some time at least [s], and stops at once."""
 
 
 @final
@@ -237,6 +248,52 @@ class Prepared:
         f, g = program.gradient(w, values)[0], program.jacobian(w, values)[0].full().ravel()
         lam_w, lam_g = np.zeros(w.size), np.zeros(g.size)
         return Seen(w, float(f), g, lam_w, lam_g, worst_of(program, w, g))
+
+
+@final
+@dataclass(frozen=True)
+class Clock:
+    """Runs from when it is made.
+
+    Attributes:
+        allowed: wall time [s] for all, or None for any.
+    """
+
+    allowed: float | None = None
+    started: float = field(default_factory=perf_counter)
+
+    @property
+    def left(self) -> float | None:
+        """What is left [s]; None for any."""
+        if self.allowed is None:
+            return None
+        return max(LEAST, self.allowed - (perf_counter() - self.started))
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left."""
+        return self.left == LEAST
+
+    def within(self, prepared: Prepared) -> Prepared:
+        """`prepared` with what is left as its limit, if that is less than its own."""
+        left = self.left
+        if left is None or (prepared.max_time is not None and prepared.max_time <= left):
+            return prepared
+        return replace(prepared, max_time=left, told_time=self.allowed)
+
+    def run(
+        self,
+        transcription: Transcription,
+        prepared: Prepared,
+        start: Iterate,
+        progress: Report | None,
+        stage: str,
+        values: ArrayLike | None = None,
+    ) -> Outcome:
+        """One solve within what is left, whose progress is that of a `stage`."""
+        return self.within(prepared).run(
+            start, values, in_stage(progress, stage), at=transcription.when
+        )
 
 
 def _numbers(values: ArrayLike, program: Program) -> Array:

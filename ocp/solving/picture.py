@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ocp.formulation.phase import Span
-from ocp.result.motion import Motion, Stretch
+from ocp.solving.motion import Motion, Stretch
 from symfric.foundation.panels import panels, save
 from symfric.foundation.style import Line, colour, line
 from symfric.results.trajectory import Trajectory

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.solvers.outcome import Iterate
+from ocp.transcription.program import Iterate
 from ocp.transcription.schemes import Coefficients, Scheme
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import check_names

@@ -1,0 +1,378 @@
+"""Ready problems: a problem, its known optimum, and the source of that.
+
+Those with friction, where bodies stick and reverse on the way, minimise the integral of the squared
+input. `v_t` is the width of the law [m/s or rad/s]: at 1e-6 it is sharp, and the optimum is that of
+Coulomb's law with stiction. Those of others, in which nothing rubs, are stated with the data of
+their sources, so that optima can be compared digit by digit.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import pi
+from typing import Any, TypeVar, final
+
+import casadi as ca
+
+from ocp.formulation.expressions import TIME, at_end, integral
+from ocp.formulation.phase import Free, Phase
+from ocp.formulation.problem import Problem
+from symfric.foundation.parameters import Variable
+from symfric.laws import BrownMcPhee
+from symfric.model import Model, Output
+from symfric.model.contact import Contact
+from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, Revolute
+from symfric.scenes.blocks import drive
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
+
+    Attributes:
+        name: as on the command line.
+        title: one line about motion and goal.
+        make: the problem; keyword arguments are its numbers, such as v_t.
+        optimum: best known cost J, in the unit of the problem's cost; NaN where none is known.
+        uncertain: what the optimum is good for.
+        source: closed form, publication, or how it was found.
+        friction: whether it has contacts, so that modes are found.
+    """
+
+    name: str
+    title: str
+    make: Callable[..., Problem]
+    optimum: float
+    uncertain: float
+    source: str
+    friction: bool = False
+
+
+Make = TypeVar("Make", bound=Callable[..., Problem])
+
+
+def ready(to: list[Ready], *about: Any, friction: bool = False) -> Callable[[Make], Make]:
+    """Add the decorated function to a list: `about` is title, optimum, its error and source."""
+
+    def add(make: Make) -> Make:
+        title, *numbers = about
+        to.append(Ready(make.__name__, title, make, *numbers, friction=friction))
+        return make
+
+    return add
+
+
+FRICTION: list[Ready] = []
+frictional = partial(ready, FRICTION, friction=True)
+BEST = "best of many starts"
+V_T = 1e-6
+GRAVITY = 9.81
+FORCE = integral(lambda s: s.force**2)
+
+
+def guide(v_t: float) -> BrownMcPhee:
+    """Friction of the linear guides below: 4 N sliding, 6 N at rest, 0.5 N s/m, for N = 1 N."""
+    return BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=0.5, v_t=v_t, N_t=1e-3)
+
+
+@frictional(
+    "1 m out and back in 2 s on a guide with stiction",
+    64.59984,
+    1e-4,
+    "closed form 40 + 0.5 / (1 - 4 tanh 0.25)",
+)
+def out_and_back(v_t: float = V_T) -> Problem:
+    """1 kg goes 1 m out in 1 s, and back to rest in another."""
+    stage = drive(guide(v_t), m=1.0, N=1.0)
+    out = Phase(stage, T=1.0, start={"x": 0.0, "v": 0.0}, end={"x": 1.0}, name="out")
+    back = Phase(stage, T=1.0, end={"x": 0.0, "v": 0.0}, name="back")
+    return Problem(out >> back, FORCE, bounds={"force": (-20.0, 20.0)})
+
+
+@frictional("swing-up with friction in the bearing", 20.979, 1e-2, BEST)
+def pendulum(v_t: float = V_T) -> Problem:
+    """A motor of 3 N m swings a pendulum of 1 kg and 1 m up that it cannot lift at once."""
+    law = BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=v_t)
+    made = Mechanism("pendulum", gravity=(0.0, 0.0, -GRAVITY))
+    made.body("bob", 1.0, (1e-9, 1e-9, 1e-9))
+    made.frame("ground.h", z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
+    made.frame("bob.h", at=(0.0, 0.0, 1.0), z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
+    bearing = JointFriction(law, radius=1.0, normal=1.0)
+    made.joint(Revolute("phi", "ground.h", "bob.h", start=0.0, friction=bearing))
+    torque = made.input("torque", "N m", nominal=1.0)
+    made.force(JointSpringDamper("motor", "phi", actuator=torque))
+    up = Phase(
+        made.build(),
+        T=5.0,
+        start={"phi": 0.0, "phi_rate": 0.0},
+        end={"phi": pi, "phi_rate": 0.0},
+    )
+    return Problem(up, integral(lambda s: s.torque**2), bounds={"torque": (-3.0, 3.0)})
+
+
+@frictional("swing-up by a cart on a rail", 71.534, 2e-2, BEST)
+def cart_pendulum(v_t: float = V_T) -> Problem:
+    """A cart of 1 kg swings a pendulum of 0.3 kg and 0.5 m up, and stops 0.8 m further on."""
+    law = BrownMcPhee(mu_s=2.2, mu_d=1.5, mu_v=0.1, v_t=v_t, N_t=1e-3)
+    made = Mechanism("cart_pendulum", gravity=(0.0, 0.0, -GRAVITY))
+    made.body("cart", 1.0, (1e-9, 1e-9, 1e-9))
+    made.body("bob", 0.3, (1e-9, 1e-9, 1e-9))
+    made.frame("ground.rail", z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
+    made.frame("cart.rail", z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
+    made.frame("cart.h", z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
+    made.frame("bob.h", at=(0.0, 0.0, 0.5), z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
+    rail = JointFriction(law, normal=1.0)
+    made.joint(Prismatic("x", "ground.rail", "cart.rail", friction=rail))
+    made.joint(Revolute("theta", "cart.h", "bob.h"))
+    force = made.input("force", "N", nominal=10.0)
+    made.force(JointSpringDamper("motor", "x", "slide", actuator=force))
+    up = Phase(
+        made.build(),
+        T=2.0,
+        start={"x": 0.0, "x_rate": 0.0, "theta": 0.0, "theta_rate": 0.0},
+        end={"x": 0.8, "x_rate": 0.0, "theta": pi, "theta_rate": 0.0},
+    )
+    return Problem(up, FORCE, bounds={"force": (-20.0, 20.0), "x": (-2.0, 2.0)})
+
+
+def _coupled(name: str, v_t: float, share: float) -> Model:
+    """A motor of 0.5 kg moves a load of 1 kg on a guide through a spring of 200 N/m.
+
+    `share` is the friction under the motor, in multiples of that under the load.
+    """
+    x_motor, x = (Variable(n, "m", nominal=0.1) for n in ("x_motor", "x"))
+    v_motor, v = (Variable(n, "m/s", nominal=0.1) for n in ("v_motor", "v"))
+    force = Variable("force", "N", nominal=10.0)
+    spring = 200.0 * (x_motor.symbol - x.symbol) + 2.0 * (v_motor.symbol - v.symbol)
+    load = Contact("load", v.symbol, 1.0, guide(v_t))
+    contacts = (load,)
+    under_motor = ca.SX(0.0)
+    if share:
+        motor = Contact("motor", v_motor.symbol, share, guide(v_t))
+        contacts, under_motor = (motor, load), motor.force
+    return Model(
+        name,
+        x=(x_motor, x, v_motor, v),
+        u=(force,),
+        ode=ca.vertcat(
+            v_motor.symbol,
+            v.symbol,
+            (force.symbol - spring - under_motor) / 0.5,
+            (spring - load.force) / 1.0,
+        ),
+        contacts=contacts,
+    )
+
+
+def _there_and_back(model: Model) -> Problem:
+    rest = {"x_motor": 0.0, "x": 0.0, "v_motor": 0.0, "v": 0.0}
+    there = Phase(model, T=1.0, start=rest, end={"x": 0.3}, name="there")
+    back = Phase(model, T=1.0, end=rest, name="back")
+    return Problem(there >> back, FORCE, bounds={"force": (-40.0, 40.0)})
+
+
+@frictional("a load on a guide, there and back through a spring", 28.480, 3e-2, BEST)
+def load_through_spring(v_t: float = V_T) -> Problem:
+    """A load on a guide goes 0.3 m there and back, moved through a spring."""
+    return _there_and_back(_coupled("load_through_spring", v_t, 0.0))
+
+
+@frictional("two coupled blocks with a contact each", 59.18, 1e-2, BEST)
+def two_blocks(v_t: float = V_T) -> Problem:
+    """The same with friction under the motor, too: two contacts."""
+    return _there_and_back(_coupled("two_blocks", v_t, 0.5))
+
+
+@frictional("a parcel slides along a tray that a torque tilts", 8.8827, 1e-2, BEST)
+def parcel_on_tray(v_t: float = V_T) -> Problem:
+    """A parcel slides 0.3 m along a tray that a torque tilts; its normal force follows the motion.
+
+        m (v' - x w^2) = -m g sin(a) - F,   m (x w' + 2 v w) = N - m g cos(a),   J w' = M - x N
+
+    with position x along the tray from its pivot, and tilt a, w = a'. Nothing in the solver was
+    chosen by looking at this problem.
+    """
+    m, J = 1.0, 0.5
+    x = Variable("x", "m", start=0.3, nominal=0.3)
+    v = Variable("v", "m/s", nominal=0.5)
+    tilt = Variable("tilt", "rad", nominal=0.5)
+    w = Variable("tilt_rate", "rad/s", nominal=1.0)
+    torque = Variable("torque", "N m", nominal=3.0)
+    coriolis = 2.0 * v.symbol * w.symbol + GRAVITY * ca.cos(tilt.symbol)
+    N = m * (x.symbol * torque.symbol / J + coriolis) / (1.0 + m * x.symbol**2 / J)
+    law = BrownMcPhee(mu_s=0.4, mu_d=0.3, v_t=v_t)
+    sole = Contact("sole", v.symbol, N, law)
+    along = x.symbol * w.symbol**2 - GRAVITY * ca.sin(tilt.symbol) - sole.force / m
+    model = Model(
+        "parcel_on_tray",
+        x=(x, v, tilt, w),
+        u=(torque,),
+        ode=ca.vertcat(v.symbol, along, w.symbol, (torque.symbol - x.symbol * N) / J),
+        contacts=(sole,),
+    )
+    level = {"v": 0.0, "tilt": 0.0, "tilt_rate": 0.0}
+    move = Phase(model, T=1.5, start={"x": 0.3, **level}, end={"x": 0.0, **level})
+    bounds = {"torque": (-15.0, 15.0), "tilt": (-1.2, 1.2)}
+    return Problem(move, integral(lambda s: s.torque**2), bounds=bounds)
+
+
+OTHERS: list[Ready] = []
+"""Brachistochrone, Bryson-Denham, Goddard's rocket, hang glider, alp rider."""
+
+
+@ready(
+    OTHERS,
+    "a bead slides from (0, 10) to (10, 5) m in the least time",
+    1.80160312,
+    1e-8,
+    "closed form, a cycloid; data of the example of Dymos, 1.8016 s",
+)
+def brachistochrone() -> Problem:
+    """Fastest slide from (0, 10) to (10, 5) m along a wire of angle theta; the curve is a cycloid.
+
+    x' = v sin theta,  y' = -v cos theta,  v' = g cos theta
+    """
+    x, v = Variable("x", "m", nominal=10.0), Variable("v", "m/s", nominal=10.0)
+    y = Variable("y", "m", start=10.0, nominal=10.0)
+    theta = Variable("theta", "rad", lower=0.0, upper=3.14)
+    speed, along, g = v.symbol, theta.symbol, 9.80665
+    ode = ca.vertcat(speed * ca.sin(along), -speed * ca.cos(along), g * ca.cos(along))
+    bead = Model("brachistochrone", x=(x, y, v), u=(theta,), ode=ode)
+    return Problem(Phase(bead, Free(0.5, 10.0), end={"x": 10.0, "y": 5.0}), TIME)
+
+
+@ready(
+    OTHERS,
+    "a cart turns round before a wall with the least squared acceleration",
+    4.0,
+    0.0,
+    "closed form 4 / (9 wall); Bryson and Ho, Applied Optimal Control, 1975, 3.11",
+)
+def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
+    """A cart between walls turns round without touching, with the least squared acceleration.
+
+    x' = v,  v' = a,  x <= wall,  (x, v) from (0, 1) to (0, -1) in 1 s; J = integral of a^2 / 2
+
+    Args:
+        wall: where it stands [m]; for wall <= 1/6 the cart slows down along it, J = 4 / (9 wall).
+    """
+    x, v = Variable("x", "m", nominal=wall), Variable("v", "m/s", start=1.0)
+    a = Variable("a", "m/s^2", nominal=10.0)
+    cart = Model("bryson_denham", x=(x, v), u=(a,), ode=ca.vertcat(v.symbol, a.symbol))
+    return Problem(
+        Phase(cart, 1.0, end={"x": 0.0, "v": -1.0}),
+        integral(lambda s: 0.5 * s.a**2),
+        bounds={"x": (None, wall)},
+    )
+
+
+@ready(
+    OTHERS,
+    "a rocket flies as high as it can",
+    -1.01283692,
+    1e-8,
+    "1.01283 in Dolan, More and Munson, Benchmarking Optimization Software with COPS 3.0, "
+    "2004, 10; further digits by 800 intervals here, 3e-9 from those by 200",
+)
+def goddard() -> Problem:
+    """Highest flight of a rocket with 40 % fuel: full thrust, a singular arc against drag, none.
+
+    h' = v,  v' = (thrust - D) / m - 1 / h^2,  m' = -thrust / c,  D = 310 v^2 exp(500 (1 - h))
+
+    in units of the radius of the planet, its gravity and the mass at the start.
+    """
+    h, v = Variable("h", "1", start=1.0), Variable("v", "1", lower=0.0, nominal=0.1)
+    m = Variable("m", "1", start=1.0, lower=0.6, upper=1.0)
+    thrust = Variable("thrust", "1", lower=0.0, upper=3.5)
+    drag = 310.0 * v.symbol**2 * ca.exp(500.0 * (1.0 - h.symbol))
+    rise = (thrust.symbol - drag) / m.symbol - 1.0 / h.symbol**2
+    ode = ca.vertcat(v.symbol, rise, -thrust.symbol / 0.5)
+    rocket = Model("goddard", x=(h, v, m), u=(thrust,), ode=ode)
+    return Problem(
+        Phase(rocket, Free(0.05, 1.0), end={"m": 0.6}),
+        -1.0 * at_end(lambda s: s.h),
+        bounds={"h": (1.0, None)},
+    )
+
+
+@ready(
+    OTHERS,
+    "a hang glider flies as far as it can through a thermal",
+    -1248.03,
+    5e-3,
+    "Dolan, More and Munson, COPS 3.0, 2004, 11; Betts, Practical Methods, 2010, 6.5",
+)
+def hang_glider() -> Problem:
+    """Farthest flight of a hang glider through a thermal, by its lift coefficient.
+
+    From 1000 m down to 900 m, in steady glide at both ends.
+    """
+    x, y = Variable("x", "m", nominal=1000.0), Variable("y", "m", start=1000.0, nominal=1000.0)
+    vx = Variable("vx", "m/s", start=13.227567500, nominal=10.0)
+    vy = Variable("vy", "m/s", start=-1.2875005200)
+    lift = Variable("c_L", "1", lower=0.0, upper=1.4)
+    mass, area, density, g = 100.0, 14.0, 1.13, 9.80665
+    r = (x.symbol / 100.0 - 2.5) ** 2
+    sink = vy.symbol - 2.5 * (1.0 - r) * ca.exp(-r)  # against the air of the thermal
+    speed = ca.sqrt(vx.symbol**2 + sink**2)
+    L = 0.5 * lift.symbol * density * area * speed
+    D = 0.5 * (0.034 + 0.069662 * lift.symbol**2) * density * area * speed
+    ode = ca.vertcat(
+        vx.symbol,
+        vy.symbol,
+        (-L * sink - D * vx.symbol) / mass,
+        (L * vx.symbol - D * sink) / mass - g,
+    )
+    glider = Model("hang_glider", x=(x, y, vx, vy), u=(lift,), ode=ode)
+    end = {"y": 900.0, "vx": 13.227567500, "vy": -1.2875005200}
+    return Problem(
+        Phase(glider, Free(50.0, 200.0), end=end),
+        -1.0 * at_end(lambda s: s.x),
+        bounds={"x": (0.0, None), "vx": (0.0, None)},
+    )
+
+
+@ready(
+    OTHERS,
+    "stiff and unstable states ride over four peaks",
+    2030.85609,
+    1e-5,
+    "Betts, Practical Methods for Optimal Control and Estimation, 2010, 6.14",
+)
+def alp_rider() -> Problem:
+    """Four stiff states, two of them unstable together, ride over four peaks that grow from below.
+
+    |y|^2 >= 3 p(t, 3, 12) + 3 p(t, 6, 10) + 3 p(t, 10, 6) + 8 p(t, 15, 4) + 0.01,
+    p(t, a, b) = exp(-b (t - a)^2);  J = integral of 100 |y|^2 + 0.01 |u|^2 over 20 s
+
+    Errors of a simulation grow by e^40 over the ride: no control that is only held lands it.
+    """
+    starts = (2.0, 1.0, 2.0, 1.0)
+    y = [Variable(f"y{i + 1}", "1", start=start) for i, start in enumerate(starts)]
+    u = [Variable(f"u{i + 1}", "1", nominal=10.0) for i in range(2)]
+    t = ca.SX.sym("t")
+    a, b, c, d = (v.symbol for v in y)
+    e, f = (v.symbol for v in u)
+    ode = ca.vertcat(
+        -10.0 * a + e + f,
+        -2.0 * b + e + 2.0 * f,
+        -3.0 * c + 5.0 * d + e - f,
+        5.0 * c - 3.0 * d + e + 3.0 * f,
+    )
+    peaks = ((3.0, 3.0, 12.0), (3.0, 6.0, 10.0), (3.0, 10.0, 6.0), (8.0, 15.0, 4.0))
+    alps = sum(height * ca.exp(-width * (t - at) ** 2) for height, at, width in peaks) + 0.01
+    square = a**2 + b**2 + c**2 + d**2
+    outputs = {"clearance": Output(square - alps, "1")}
+    rider = Model("alp_rider", x=tuple(y), u=tuple(u), t=t, ode=ode, outputs=outputs)
+    return Problem(
+        Phase(rider, 20.0, end={"y1": 2.0, "y2": 3.0, "y3": 1.0, "y4": -2.0}),
+        integral(
+            lambda s: 100.0 * (s.y1**2 + s.y2**2 + s.y3**2 + s.y4**2) + 0.01 * (s.u1**2 + s.u2**2)
+        ),
+        bounds={"clearance": (0.0, None)},
+    )
+
+
+READY: dict[str, Ready] = {one.name: one for one in (*FRICTION, *OTHERS)}
+"""Name -> problem."""

@@ -1,1 +1,0 @@
-"""Ready problems with known optima."""

@@ -1,1 +1,0 @@
-"""The result of an optimal control problem: it plots, writes and stores itself."""

@@ -1,0 +1,40 @@
+/* Numbers are compared by their bits: as cheap, and NaN is found under -ffast-math, too. */
+static @whole @{name}_bits(@real x)
+{
+    @whole found;
+    memcpy(&found, &x, sizeof found);
+    return found;
+}
+
+/* Whether |x| is above limit, infinite or NaN. */
+static bool @{name}_beyond(@real x, @real limit)
+{
+    return (@{name}_bits(x) & @magnitude) > @{name}_bits(limit);
+}
+
+/* Whether x is outside low ... high, 0 <= low, or NaN; -0 is 0. */
+static bool @{name}_outside(@real x, @real low, @real high)
+{
+    const @whole span = @{name}_bits(high) - @{name}_bits(low);
+    return @{name}_bits(x) - @{name}_bits(low) > span && x != low;
+}
+
+/* x clamped to low ... high, or safe where it is not finite; says so by bits of the status. */
+static @real @{name}_mended(
+    @real x, @real low, @real high, @real safe,
+    unsigned int clamped, unsigned int not_finite, unsigned int *status)
+{
+    if ((@{name}_bits(x) & @magnitude) >= @infinite) {
+        *status |= not_finite;
+        return safe;
+    }
+    if (x < low) {
+        *status |= clamped;
+        return low;
+    }
+    if (x > high) {
+        *status |= clamped;
+        return high;
+    }
+    return x;
+}
