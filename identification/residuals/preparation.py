@@ -70,8 +70,11 @@ class Preparation:
         given = self.kind.dead_time
         tau = None if isinstance(given, tuple) else given
         if isinstance(given, tuple):
-            middle, width = sum(given) / 2, given[1] - given[0]
-            self.own.append(Unknown(DEAD_TIME, "s", middle, *given, width, nuisance=True))
+            low, high = given
+            unknown = Unknown(
+                DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
+            )
+            self.own.append(unknown)
         pieces, channels, rows = list[Shot](), list[Channel](), 0
         for number, record in enumerate(self.records):
             found = list(self._cut(number, record, rows))
