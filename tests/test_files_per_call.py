@@ -1,0 +1,75 @@
+"""The short way: how many files of the project run during one call of each kind."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+COUNT = """
+import inspect
+import sys
+from pathlib import Path
+
+import symfric
+
+root = Path(symfric.__file__).parents[1]
+packages = tuple(str(root / name) for name in ("symfric", "ocp", "identification"))
+
+
+def files(call):
+    seen = set()
+
+    def watch(frame, event, _):
+        if frame.f_code.co_flags & inspect.CO_OPTIMIZED:  # functions, not modules being imported
+            seen.add(frame.f_code.co_filename)
+
+    sys.setprofile(watch)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    return sum(name.startswith(packages) for name in seen)
+"""
+SIMULATE = """
+from symfric import LuGre, rabinowicz, simulate
+
+scene = rabinowicz(LuGre())
+print(files(lambda: simulate(scene, 20.0)), files(lambda: simulate(scene, 20.0)))
+"""
+FIT = """
+from identification import Fit, InverseDynamics, synthetic_drive_data
+
+print(files(Fit(InverseDynamics(), "stribeck", synthetic_drive_data(seed=1)).solve))
+"""
+SOLVE = """
+from ocp import Phase, Problem, integral, solve
+from symfric import BrownMcPhee, drive
+
+stage = drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=0.5, v_t=1e-5, N_t=1e-3), m=1.0, N=1.0)
+out = Phase(stage, T=1.0, start={"x": 0.0, "v": 0.0}, end={"x": 1.0})
+back = Phase(stage, T=1.0, end={"x": 0.0, "v": 0.0})
+move = Problem(out >> back, integral(lambda s: s.force**2))
+print(files(lambda: solve(move)))
+"""
+GENERATE = """
+from symfric import LuGre
+from symfric.codegen import generate
+
+print(files(lambda: generate(LuGre(), "c")))
+"""
+
+
+@pytest.mark.parametrize(
+    ("call", "most"),
+    [(SIMULATE, (36, 21)), (FIT, (61,)), (SOLVE, (119,)), (GENERATE, (39,))],
+    ids=["simulate, first and second", "Fit.solve", "ocp.solve", "generate"],
+)
+def test_a_call_runs_code_in_few_files(call: str, most: tuple[int, ...], tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", COUNT + call], cwd=tmp_path, capture_output=True, text=True,
+        check=True, env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
+    )  # fmt: skip
+    found = [int(text) for text in done.stdout.split()]
+    assert all(0 < n <= limit for n, limit in zip(found, most, strict=True)), found
