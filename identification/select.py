@@ -34,7 +34,7 @@ from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
-from identification.result.text import columns
+from identification.result.outcome import columns
 from identification.solving.many_starts import Progress
 from symfric.foundation import checks
 from symfric.foundation.shown import Shown, Table

@@ -26,7 +26,7 @@ CLASSES = (
     "symfric.integrator.stored:Later", "symfric.model.model:Model", "symfric.__main__:main",
     "symfric.laws.dynamic.lugre:LuGre", "symfric.foundation.variable:Variable",
     "symfric.foundation.packed:Given",
-    "identification.residuals.shots:unpacked", "identification.fit:Fit", "ocp.mpc.session:Session",
+    "identification.residuals.shots:delayed", "identification.fit:Fit", "ocp.mpc.session:Session",
     "symfric.foundation.packed:partial", "symfric.results.trajectory:Trajectory",
 )  # fmt: skip
 """Names that a file may try to give to its objects: dangerous, forbidden and allowed ones."""

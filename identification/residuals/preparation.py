@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
+from identification.data.dataset import Dataset
+from identification.data.record import Record
 from identification.residuals.evaluation import Channel
 from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
 from identification.residuals.open_loop import (
@@ -24,11 +26,6 @@ from symfric.foundation.parameters import Variable
 from symfric.integrator import Hold, Linear
 from symfric.model import Model
 
-if TYPE_CHECKING:
-    from identification.data.dataset import Dataset
-    from identification.data.record import Record
-    from identification.residuals.shooting import Shooting
-
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
 """Tolerances to choose from, and that of what they are compared with."""
 BIAS = 0.1
@@ -43,12 +40,19 @@ NOISELESS = 1e-9
 
 @final
 class Preparation:
-    """One set of residuals being made of a kind, a model and data."""
+    """Make the residuals of a model on data.
+
+    Args:
+        kind: a `Shooting`, whose fields say how; `Shooting.prepare` is the only caller.
+        model: of the motion.
+        data: whose records are compared.
+        start: parameter -> value where simulations choose tolerances.
+        every: take every this many windows of a record.
+    """
 
     def __init__(
-        self, kind: "Shooting", model: Model, data: "Dataset", start: Mapping[str, float],
-        every: int = 1,
-    ) -> None:  # fmt: skip
+        self, kind: Any, model: Model, data: Dataset, start: Mapping[str, float], every: int = 1
+    ) -> None:
         self.kind, self.model, self.every = kind, model, every
         self.values = {v.name: float(start.get(v.name, v.start)) for v in model.p}
         self.records = list(data)
@@ -66,8 +70,11 @@ class Preparation:
         given = self.kind.dead_time
         tau = None if isinstance(given, tuple) else given
         if isinstance(given, tuple):
-            middle, width = sum(given) / 2, given[1] - given[0]
-            self.own.append(Unknown(DEAD_TIME, "s", middle, *given, width, nuisance=True))
+            low, high = given
+            unknown = Unknown(
+                DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
+            )
+            self.own.append(unknown)
         pieces, channels, rows = list[Shot](), list[Channel](), 0
         for number, record in enumerate(self.records):
             found = list(self._cut(number, record, rows))
@@ -215,7 +222,7 @@ class Preparation:
 
     # ---- pieces of records
 
-    def _cut(self, number: int, record: "Record", row: int) -> Iterator[Shot]:
+    def _cut(self, number: int, record: Record, row: int) -> Iterator[Shot]:
         """The windows of one record; residuals begin at `row`, a signal after the other."""
         origin = float(record.time[0]) if self.timeless else 0.0
         t = record.time - origin
@@ -297,7 +304,7 @@ class Preparation:
         return Unknown(f"x0.{v.name}{label}", v.unit, value, scale=scale, nuisance=True)
 
     def _channels(
-        self, number: int, record: "Record", pieces: Sequence[Shot], row: int
+        self, number: int, record: Record, pieces: Sequence[Shot], row: int
     ) -> Iterator[Channel]:
         t = np.concatenate([piece.origin + piece.t for piece in pieces])
         breaks = tuple(np.cumsum([piece.t.size for piece in pieces])[:-1].tolist())

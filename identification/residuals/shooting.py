@@ -18,21 +18,19 @@ and the length of the least error is taken. Nothing is drawn by chance.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
+from identification.data.dataset import Dataset
+from identification.data.record import Record
 from identification.residuals.initial import FEWEST
 from identification.residuals.preparation import Preparation
 from identification.residuals.shots import DEAD_TIME, Shots
+from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 
-if TYPE_CHECKING:
-    from identification.data.dataset import Dataset
-    from identification.data.record import Record
-    from identification.unknowns.subject import Subject
-
-Solve = Callable[["Shooting", "Dataset"], Mapping[str, float] | None]
+Solve = Callable[["Shooting", Dataset], Mapping[str, float] | None]
 """Fits parameters to data by windows; None where that fails."""
 BLOCKS = 4
 RTOL = 1e-6
@@ -42,7 +40,7 @@ LENGTHS, LEAST = 5, 2.5
 `LEAST` times the fewest tell their start values badly."""
 
 
-def lengths(data: "Dataset") -> list[float | None]:
+def lengths(data: Dataset) -> list[float | None]:
     """Lengths to try [s]; None is whole records."""
     span = max(float(r.time[-1] - r.time[0]) for r in data)
     least = LEAST * FEWEST * max(r.median_step for r in data)
@@ -50,7 +48,7 @@ def lengths(data: "Dataset") -> list[float | None]:
     return [None, *(s for s in shorter if s >= least)]
 
 
-def choose(kind: "Shooting", subject: "Subject", data: "Dataset", solve: Solve) -> "Shooting":
+def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "Shooting":
     """The kind with windows of the length that predicts left-out quarters best.
 
     Args:
@@ -75,7 +73,7 @@ def choose(kind: "Shooting", subject: "Subject", data: "Dataset", solve: Solve) 
     return replace(kind, windows=best)
 
 
-def _left_out(kind: "Shooting", subject: "Subject", data: "Dataset", solve: Solve) -> float:
+def _left_out(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> float:
     """Mean square error of predicted quarters over the variance of each signal."""
     found = list[float]()
     for block in range(BLOCKS):
@@ -88,9 +86,9 @@ def _left_out(kind: "Shooting", subject: "Subject", data: "Dataset", solve: Solv
     return float(np.mean(found))
 
 
-def _divided(data: "Dataset", block: int) -> "tuple[Dataset, Dataset]":
+def _divided(data: Dataset, block: int) -> tuple[Dataset, Dataset]:
     """All but a quarter of each record, and these quarters."""
-    rest, other = list["Record"](), list["Record"]()
+    rest, other = list[Record](), list[Record]()
     for record in data:
         a, b = (record.size * k // BLOCKS for k in (block, block + 1))
         other.append(record.at(slice(a, b)))
@@ -99,7 +97,7 @@ def _divided(data: "Dataset", block: int) -> "tuple[Dataset, Dataset]":
 
 
 def _free_run(
-    kind: "Shooting", subject: "Subject", data: "Dataset", values: Mapping[str, float]
+    kind: "Shooting", subject: Subject, data: Dataset, values: Mapping[str, float]
 ) -> float:
     """Mean square error of simulated records over the variance of each signal."""
     shots = replace(kind, windows=None, x0="data").prepare(subject, data, values)
@@ -233,7 +231,7 @@ class Shooting:
             )
         return self.windows
 
-    def prepare(self, subject: "Subject", data: "Dataset", start: Mapping[str, float]) -> Shots:
+    def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Shots:
         """The residuals of `data`; simulations that choose the tolerance run at `start`.
 
         Raises:

@@ -9,9 +9,8 @@ further parameter theta, which stays 0, the model is driven by u - theta u_rate:
 theta is that of the motion by tau, whatever the model.
 """
 
-import pickle
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import casadi as ca
@@ -22,7 +21,6 @@ from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.open_loop import means, refined, stepped
 from identification.residuals.stepper import Motion
 from identification.unknowns.spec import Unknown
-from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked
 from symfric.integrator import Hold, Input, Linear, Trajectory, simulate
@@ -80,18 +78,6 @@ def plain(model: Model, signals: Iterable[str] | None = None) -> Model:
     return replace(
         model, outputs=outputs, contacts=(), opening=None, details=dict[str, Output], sketch=None
     )
-
-
-def packed(model: Model) -> bytes:
-    """A plain model as bytes."""
-    with ca.global_pickle_context():
-        return pickle.dumps(model)
-
-
-def unpacked(data: bytes) -> Model:
-    """The model of such bytes."""
-    with ca.global_unpickle_context():
-        return checks.kind("unpacked", pickle.loads(data), Model, "packed(model)")
 
 
 METHOD = "radau5"
@@ -253,14 +239,6 @@ class Shots:
     backend: str
     substeps: int = 0
     easier: "tuple[Shots, ...]" = ()
-
-    def __getstate__(self) -> dict[str, Any]:
-        state = {item.name: getattr(self, item.name) for item in fields(self)}
-        return {**state, "model": packed(self.model)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
-            object.__setattr__(self, name, unpacked(value) if name == "model" else value)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,12 +11,13 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
-from identification.result.fitted import Fitted, Tried
+from identification.result.fitted import Fitted
 from identification.result.live import Asked, Live, errors_of, labels
 from identification.result.series import (
     Curve,
     Estimate,
     Series,
+    Tried,
     of_drive,
     of_points,
     points_each,

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -10,22 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.findings import Finding
-from identification.result.live import Asked, Live
-from identification.result.series import Curve, Errors, Estimate, Series, Tried
-from identification.result.text import sentences, text_of
-from identification.verdict.judge import Verdict
+from identification.result.live import Live
+from identification.result.outcome import Outcome, sentences
+from identification.result.series import Errors
 from identification.verdict.profile import Profile, profile
 from symfric.foundation import packed
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.shown import Shown, Table
-from symfric.foundation.status import Status
-from symfric.foundation.typed import agree
-from symfric.laws import Law
 from symfric.model import Model
 from symfric.results.stored import Format
-from symfric.scenes import Drive
 from symfric.scenes.base import Scene
 
 if TYPE_CHECKING:
@@ -38,7 +32,7 @@ Array = NDArray[np.float64]
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Fitted:
+class Fitted(Outcome):
     """The result of a fit.
 
     `print(fit)` is a report of a page; `fit.to_html("out.html")` one with pictures; `fit.plot()`
@@ -71,40 +65,6 @@ class Fitted:
         live: its problem and its minimum; of a stored fit they are put again from `asked`.
         asked: the question and where it ended; None from JSON.
     """
-
-    name: str
-    kind: str
-    records: tuple[str, ...]
-    parameters: dict[str, Estimate]
-    names: tuple[str, ...]
-    correlation: Array
-    undetermined: tuple[tuple[str, ...], ...]
-    directions: tuple[str, ...]
-    status: Status
-    message: str
-    verdict: Verdict
-    errors: Errors
-    validation: Errors | None
-    noise: dict[str, float]
-    starts: tuple[Tried, ...]
-    findings: tuple[Finding, ...]
-    series: tuple[Series, ...]
-    curve: Curve | None
-    law: Law | None
-    machine: Parametric | None
-    seconds: float
-    evaluations: int
-    made: dict[str, str] = field(default_factory=dict[str, str])
-    live: Live | None = None
-    asked: Asked | None = None
-
-    def __str__(self) -> str:
-        return text_of(self)
-
-    def check_fields(self) -> None:
-        """Refuse estimates that do not belong to the names; for files."""
-        n = len(self.names)
-        agree("Fitted", self.correlation.shape == (n, n), {*self.names} <= self.parameters.keys())
 
     def to_pack(self) -> dict[str, Any]:
         """The fields; without the question where that holds functions that no file takes."""
@@ -141,16 +101,6 @@ class Fitted:
         table = Table(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
         title = f"{self.name} fitted by {self.kind}: {self.status.name}"
         return Shown(title, tuple(sentences(self)), table).html(self.plot())
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Every parameter by name, fitted or held."""
-        return {name: e.value for name, e in self.parameters.items()}
-
-    @property
-    def drive(self) -> Drive | None:
-        """The machine, where it is a mass with a force input."""
-        return self.machine if isinstance(self.machine, Drive) else None
 
     @property
     def model(self) -> Model:

@@ -2,15 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from identification.result.series import Curve, Errors, Estimate, Series, limits
-from identification.result.stored import source_of
-from identification.result.text import (
+from identification.result.outcome import (
     MANY,
     SAME,
+    Outcome,
     best_starts,
     correlated,
     count_of,
@@ -23,13 +22,11 @@ from identification.result.text import (
     unit_of,
     with_unit,
 )
+from identification.result.series import Curve, Errors, Estimate, Series, limits
+from identification.result.stored import source_of
+from identification.verdict.judge import Test
 from symfric.page import html
 from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
-
-if TYPE_CHECKING:
-    from identification.result.fitted import Fitted
-    from identification.verdict.judge import Test
-
 
 WINDOWS = 60
 """Beginnings of windows that are drawn."""
@@ -114,7 +111,7 @@ def friction(curve: Curve, name: str) -> str:
     return chart("Friction over velocity", x, y, marks, height=300.0, says=says)
 
 
-def waterfall(fit: "Fitted") -> str:
+def waterfall(fit: Outcome) -> str:
     """How far the starts ended from the best one; "" for a single start."""
     above = np.sort([s.above for s in fit.starts if isfinite(s.above)])
     if above.size < 2:
@@ -156,7 +153,7 @@ class Ranking(Protocol):
         ...
 
 
-def page_of(fit: "Fitted", ranking: Ranking | None = None) -> str:
+def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
     """The page as text."""
     parts = {
         "parameters": html.section("parameters", "Parameters", *_parameters(fit)),
@@ -183,14 +180,14 @@ def page_of(fit: "Fitted", ranking: Ranking | None = None) -> str:
     return html.page(f"{fit.name}: fit", "en", body)
 
 
-def kind_of(fit: "Fitted") -> str:
+def kind_of(fit: Outcome) -> str:
     """What the box of the verdict looks like: "good", "doubtful" or "bad"."""
     if not fit.status.ok:
         return "bad"
     return "good" if fit.status.name == "SOLVED" else "doubtful"
 
 
-def _parameters(fit: "Fitted") -> Iterator[str]:
+def _parameters(fit: Outcome) -> Iterator[str]:
     fitted = {n: e for n, e in fit.parameters.items() if not e.fixed}
     yield _estimates(
         "Fitted, with 95 % intervals", {n: e for n, e in fitted.items() if not e.nuisance}
@@ -247,14 +244,14 @@ def _errors(caption: str, errors: Errors, records: Sequence[str]) -> str:
     return html.table(caption, header, rows, (2, 3, 4, 5, 6))
 
 
-def _data(fit: "Fitted") -> Iterator[str]:
+def _data(fit: Outcome) -> Iterator[str]:
     yield _errors("What the fit leaves of each signal", fit.errors, fit.records)
     yield _errors("The same parameters on other data", fit.validation or {}, ())
     for one in fit.series:
         yield html.figure(data_and_fit(one) + left(one))
 
 
-def _friction(fit: "Fitted") -> Iterator[str]:
+def _friction(fit: Outcome) -> Iterator[str]:
     if fit.curve is not None:
         yield html.figure(
             friction(fit.curve, fit.name),
@@ -262,7 +259,7 @@ def _friction(fit: "Fitted") -> Iterator[str]:
         )
 
 
-def _residuals(fit: "Fitted") -> Iterator[str]:
+def _residuals(fit: Outcome) -> Iterator[str]:
     tests = fit.verdict.tests
     missed = [t for t in tests if not t.passed]
     if missed:
@@ -281,7 +278,7 @@ def _residuals(fit: "Fitted") -> Iterator[str]:
             yield html.figure(drawing)
 
 
-def _tests(caption: str, tests: "Sequence[Test]") -> str:
+def _tests(caption: str, tests: Sequence[Test]) -> str:
     rows = [
         (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}", _outcome(t))
         for t in tests
@@ -291,13 +288,13 @@ def _tests(caption: str, tests: "Sequence[Test]") -> str:
     return html.table(caption, header, rows, (2, 3, 4), kinds)
 
 
-def _outcome(test: "Test") -> str:
+def _outcome(test: Test) -> str:
     if test.passed:
         return "passed" if test.p >= test.limit else "too small to count"
     return "failed" if test.decides else "no, allowed for"
 
 
-def _starts(fit: "Fitted") -> Iterator[str]:
+def _starts(fit: Outcome) -> Iterator[str]:
     if len(fit.starts) < 2:
         return
     yield html.paragraph(
@@ -338,13 +335,13 @@ def _cell(value: object) -> str:
     return number(float(value), 4) if isinstance(value, int | float) else str(value)
 
 
-def _findings(fit: "Fitted") -> Iterator[str]:
+def _findings(fit: Outcome) -> Iterator[str]:
     rows = [(fit.records[f.record], f.signal, f.kind, f.severity, f.sentence) for f in fit.findings]
     header = ("record", "signal", "kind", "severity", "what and where")
     yield html.table("Findings of the checks", header, rows, (), ["note"] * len(rows))
 
 
-def _made(fit: "Fitted") -> Iterator[str]:
+def _made(fit: Outcome) -> Iterator[str]:
     made = [(name, text) for name, text in fit.made.items() if text]
     yield html.table("Call and versions", ("what", ""), made)
     if fit.law is not None:

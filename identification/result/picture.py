@@ -2,25 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from identification.result.outcome import Outcome
 from identification.result.series import Curve, Series, limits
 from symfric.foundation import checks
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
 
-if TYPE_CHECKING:
-    from identification.result.fitted import Fitted
-
 SHOWN = 4
 """Signals that are drawn if none is named; each takes three panels."""
 
 
-def picture(fit: "Fitted", names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
+def picture(fit: Outcome, names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
     """Data and fit, what is left and its correlation, for each signal; friction over velocity.
 
     Args:

@@ -13,10 +13,11 @@ from enum import Enum
 from math import inf, isnan, nan
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from identification.result.outcome import Outcome
 from symfric.foundation import checks, typed
 from symfric.foundation.files import read_json
 from symfric.foundation.numeric import is_symbolic
@@ -24,9 +25,6 @@ from symfric.foundation.parameters import Parametric
 from symfric.laws import ALL_LAWS, Asymmetric, Element, Law, Slider, Sum, Table, law_name
 from symfric.laws.catalogue import WRAPPERS
 from symfric.scenes import Drive
-
-if TYPE_CHECKING:
-    from identification.result.fitted import Fitted
 
 INFINITE = {"inf": inf, "-inf": -inf}
 DIGITS = 6
@@ -232,7 +230,7 @@ APART = ("law", "machine", "live", "asked")
 """Fields that are no plain data."""
 
 
-def to_dict(fit: "Fitted") -> dict[str, Any]:
+def to_dict(fit: Outcome) -> dict[str, Any]:
     """All but the problem; the law as its text and as data that make it again, and the drive."""
     data = {f.name: plain(getattr(fit, f.name)) for f in fields(fit) if f.name not in APART}
     return {
@@ -253,7 +251,7 @@ def _data(held: Parametric | None) -> dict[str, Any] | None:
         return None
 
 
-def read(kind: "type[Fitted]", path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:
+def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:
     """The fit that was written to `path`; see `Fitted.from_json`."""
     what = "a file that fit.to_json(path) wrote"
     data = read_json("fit", path, what)
@@ -272,7 +270,7 @@ def read(kind: "type[Fitted]", path: str | Path, own: Mapping[str, type[Parametr
         ) from None
 
 
-def _made(kind: "type[Fitted]", data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
+def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
     hints = get_type_hints(kind)
     plain_ones = {
         f.name: revived(hints[f.name], data[f.name]) for f in fields(kind) if f.name not in APART

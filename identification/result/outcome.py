@@ -1,15 +1,25 @@
-"""A fit as text, 80 columns wide: the verdict first, then what was found and how surely."""
+"""Numbers of a fit, and their text: the verdict first, then estimates and their uncertainty."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import zip_longest
 from math import floor, isfinite, log10
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
-from identification.result.series import Errors, Estimate
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from identification.result.fitted import Fitted
+from identification.data.findings import Finding
+from identification.result.live import Asked, Live
+from identification.result.series import Curve, Errors, Estimate, Series, Tried
+from identification.verdict.judge import Verdict
+from symfric.foundation.parameters import Parametric
+from symfric.foundation.status import Status
+from symfric.foundation.typed import agree
+from symfric.laws import Law
+from symfric.scenes import Drive
+
+Array = NDArray[np.float64]
 
 WIDTH = 80
 CLOSE = 0.9
@@ -22,7 +32,56 @@ MANY = 12
 """Start values and dead times that are listed; of more only how many there are."""
 
 
-def text_of(fit: "Fitted") -> str:
+@dataclass(frozen=True, eq=False, repr=False)
+class Outcome:
+    """The fields of a fit, which `Fitted` describes, and their text."""
+
+    name: str
+    kind: str
+    records: tuple[str, ...]
+    parameters: dict[str, Estimate]
+    names: tuple[str, ...]
+    correlation: Array
+    undetermined: tuple[tuple[str, ...], ...]
+    directions: tuple[str, ...]
+    status: Status
+    message: str
+    verdict: Verdict
+    errors: Errors
+    validation: Errors | None
+    noise: dict[str, float]
+    starts: tuple[Tried, ...]
+    findings: tuple[Finding, ...]
+    series: tuple[Series, ...]
+    curve: Curve | None
+    law: Law | None
+    machine: Parametric | None
+    seconds: float
+    evaluations: int
+    made: dict[str, str] = field(default_factory=dict[str, str])
+    live: Live | None = None
+    asked: Asked | None = None
+
+    def __str__(self) -> str:
+        return text_of(self)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter by name, fitted or held."""
+        return {name: e.value for name, e in self.parameters.items()}
+
+    @property
+    def drive(self) -> Drive | None:
+        """The machine, where it is a mass with a force input."""
+        return self.machine if isinstance(self.machine, Drive) else None
+
+    def check_fields(self) -> None:
+        """Refuse estimates that do not belong to the names; for files."""
+        n = len(self.names)
+        agree("Fitted", self.correlation.shape == (n, n), {*self.names} <= self.parameters.keys())
+
+
+def text_of(fit: Outcome) -> str:
     """What `print(fit)` shows, within 80 columns."""
     blocks = [
         [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
@@ -36,7 +95,7 @@ def text_of(fit: "Fitted") -> str:
     return "\n\n".join("\n".join(block) for block in blocks if block)
 
 
-def sentences(fit: "Fitted") -> list[str]:
+def sentences(fit: Outcome) -> list[str]:
     """What there is to say of the whole, most important first, each once."""
     said = [*fit.verdict.sentences, *fit.directions]
     message = fit.message
@@ -102,12 +161,12 @@ def remark(e: Estimate) -> str:
     return f"held: {e.note}" if e.fixed and e.note else ("held" if e.fixed else e.note)
 
 
-def best_starts(fit: "Fitted") -> int:
+def best_starts(fit: Outcome) -> int:
     """How many starts ended at the lowest cost."""
     return sum(s.above < SAME for s in fit.starts)
 
 
-def correlated(fit: "Fitted") -> list[tuple[str, str, float]]:
+def correlated(fit: Outcome) -> list[tuple[str, str, float]]:
     """Pairs of estimates with a correlation above `CLOSE`, the closest first."""
     n = len(fit.names)
     pairs = [
@@ -136,7 +195,7 @@ def _indented(texts: Iterable[str]) -> Iterator[str]:
         yield from wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
-def _head(fit: "Fitted") -> Iterator[str]:
+def _head(fit: Outcome) -> Iterator[str]:
     """Data, effort, noise."""
     rows = sum(e.rows for e in fit.errors.values())
     named = fit.records[:4]
@@ -156,7 +215,7 @@ def _head(fit: "Fitted") -> Iterator[str]:
         yield from wrap(f"noise   {', '.join(noise)}", WIDTH, subsequent_indent=" " * 8)
 
 
-def _parameters(fit: "Fitted") -> Iterator[str]:
+def _parameters(fit: Outcome) -> Iterator[str]:
     asked = {n: e for n, e in fit.parameters.items() if not e.nuisance and not e.fixed}
     held = {n: e for n, e in fit.parameters.items() if e.fixed}
     nuisance = {n: e for n, e in fit.parameters.items() if e.nuisance and not e.fixed}
@@ -183,7 +242,7 @@ def _table(name: str, estimates: dict[str, Estimate]) -> Iterator[str]:
     return columns(rows)
 
 
-def _correlations(fit: "Fitted") -> Iterator[str]:
+def _correlations(fit: Outcome) -> Iterator[str]:
     pairs = correlated(fit)
     if pairs:
         yield f"correlation above {CLOSE:g}"
@@ -202,7 +261,7 @@ def errors_table(title: str, errors: Errors) -> Iterator[str]:
         yield from columns(rows)
 
 
-def _data(fit: "Fitted") -> Iterator[str]:
+def _data(fit: Outcome) -> Iterator[str]:
     several = len(fit.records) > 1
     if fit.findings:
         yield "doubtful in the data"
