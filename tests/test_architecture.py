@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Callable, Iterator
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from floors import FLOORS, ON_TOP
@@ -119,6 +120,16 @@ def test_no_circle_between_folders() -> None:
     while leaves := {f for f, to in arrows.items() if not to & arrows.keys()}:
         arrows = {f: to for f, to in arrows.items() if f not in leaves}
     assert not arrows
+
+
+def test_no_circle_between_files() -> None:
+    """Imports inside functions and for type checkers included; fronts apart."""
+    files = {dotted(path): path for path in SOURCES if path.stem != "__init__"}
+    arrows = {
+        name: {other for other in imported(parsed(path)) if other in files and other != name}
+        for name, path in files.items()
+    }
+    TopologicalSorter(arrows).prepare()  # CycleError names a circle
 
 
 @each_source
