@@ -20,7 +20,7 @@ from identification.fit import Fit
 from identification.residuals.evaluation import Residuals
 from identification.result.fitted import Fitted
 from symfric.foundation import checks
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 from symfric.foundation.status import SolveError
 
 Array = NDArray[np.float64]

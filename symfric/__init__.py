@@ -43,12 +43,12 @@ if TYPE_CHECKING:
     from symfric.figures import compare as compare
     from symfric.figures import figure as figure
     from symfric.figures import recommended as recommended
+    from symfric.foundation.panels import for_print as for_print
     from symfric.foundation.parameters import Parameter as Parameter
     from symfric.foundation.parameters import Variable as Variable
     from symfric.foundation.parameters import parameters as parameters
     from symfric.foundation.parameters import symbolise as symbolise
     from symfric.foundation.parameters import with_values as with_values
-    from symfric.foundation.printing import for_print as for_print
     from symfric.foundation.status import EnergyWarning as EnergyWarning
     from symfric.foundation.status import OverloadWarning as OverloadWarning
     from symfric.foundation.status import SolveError as SolveError

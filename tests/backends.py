@@ -2,7 +2,7 @@
 
 import pytest
 
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 
 BACKENDS = ["vm"] + ["compiled"] * (find_compiler() is not None)
 """Those that run here."""

@@ -21,7 +21,7 @@ Arrays = dict[str, np.ndarray[Any, Any]]
 
 CLASSES = (
     "os:system", "subprocess:Popen", "casadi:external", "casadi.casadi:Function", "builtins:eval",
-    "pathlib:Path", "symfric.foundation.compiler:Compiler", "symfric.foundation.files:written",
+    "pathlib:Path", "symfric.foundation.programs:Compiler", "symfric.foundation.files:written",
     "symfric.integrator.compiled.columns:Rows", "symfric.integrator.stored:Stored",
     "symfric.integrator.stored:Later", "symfric.model.model:Model", "symfric.__main__:main",
     "symfric.laws.dynamic.lugre:LuGre", "symfric.foundation.variable:Variable",

@@ -25,7 +25,7 @@ from identification.data.filters import (
 )
 from identification.data.record import Record, runs
 from symfric.foundation import checks
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

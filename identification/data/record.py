@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 
 Array = NDArray[np.float64]
 

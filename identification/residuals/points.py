@@ -16,7 +16,7 @@ from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 from symfric.foundation.parameters import symbolise
-from symfric.foundation.symbols import symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import FORCE, chosen
 

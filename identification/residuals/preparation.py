@@ -20,9 +20,9 @@ from identification.residuals.open_loop import (
 from identification.residuals.shots import DEAD_TIME, Drives, Shot, Shots, delayed, plain
 from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
+from symfric.foundation.programs import find_compiler
 from symfric.integrator import Hold, Linear
 from symfric.model import Model
 

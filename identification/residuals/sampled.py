@@ -12,8 +12,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.numeric import Scalar
+from symfric.foundation.programs import (
+    CompileError,
+    find_compiler,
+)
 from symfric.integrator.compiled.columns import Columns
 from symfric.laws import Law
 

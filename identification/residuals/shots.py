@@ -22,7 +22,7 @@ from identification.residuals.open_loop import means, refined, stepped
 from identification.residuals.stepper import Motion
 from identification.unknowns.spec import Unknown
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, Input, Linear, Trajectory, simulate
 from symfric.model import Model, Output
 

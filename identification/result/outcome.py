@@ -15,7 +15,7 @@ from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.verdict.judge import Verdict
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.status import Status
-from symfric.foundation.typed import agree
+from symfric.foundation.storable import agree
 from symfric.laws import Law
 from symfric.scenes import Drive
 

@@ -13,7 +13,7 @@ from identification.data.differentiate import differentiate
 from identification.data.record import Record
 from identification.residuals.evaluation import Channel
 from identification.verdict.colour import Whiteness
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
 from symfric.laws import Law

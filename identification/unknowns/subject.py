@@ -20,8 +20,8 @@ from identification.unknowns.spec import Tied, Unknown
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.parameters import Variable, parameters, symbolise, with_values
-from symfric.foundation.symbols import symbols_of
 from symfric.foundation.units import turned
+from symfric.foundation.variable import symbols_of
 from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.scenes import Drive

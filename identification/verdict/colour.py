@@ -23,7 +23,7 @@ import numpy as np
 
 from identification.residuals.evaluation import Array
 from identification.verdict.minimum import Count
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 
 MOST = 30
 """Largest order."""

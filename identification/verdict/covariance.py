@@ -20,7 +20,7 @@ from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour, colour
 from identification.verdict.minimum import Minimum, Trace, lost, minimum, places, positions, trace
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 
 RANK = 1e-7
 """Smallest singular value of the scaled sensitivities, over the largest, that counts."""

@@ -23,7 +23,7 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import starts_of
+from symfric.foundation.variable import starts_of
 from symfric.model import Model, Output, check_model
 
 

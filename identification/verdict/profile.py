@@ -23,7 +23,7 @@ from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.covariance import Covariance
 from symfric.foundation import checks
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -25,7 +25,7 @@ from ocp.transcription.program import Report, in_stage
 from ocp.transcription.schemes import Radau, Scheme, Shooting
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Skeleton
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
 from ocp.transcription.unknowns import Points
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, simulate
 from symfric.results.trajectory import Trajectory
 

@@ -7,9 +7,9 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 from symfric.foundation.status import Status
-from symfric.foundation.typed import agree
+from symfric.foundation.storable import agree
 from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]

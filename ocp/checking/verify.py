@@ -26,7 +26,7 @@ from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
 from symfric.foundation import checks
 from symfric.foundation.status import Status
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 
 Array = NDArray[np.float64]
 CLOSER, PARTS = 2, 16

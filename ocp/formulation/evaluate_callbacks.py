@@ -19,7 +19,7 @@ from ocp.formulation.expressions import (
 )
 from ocp.formulation.phase import Join, Link, Row
 from ocp.formulation.statement import Setting, Statement
-from symfric.foundation.symbols import strays
+from symfric.foundation.variable import strays
 from symfric.model import Model
 
 

@@ -9,7 +9,7 @@ import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 EXPRESSION = "one expression of the signals, such as lambda s: s.x**2"

@@ -23,7 +23,7 @@ from ocp.formulation.statement import (
     settings_of,
     with_outputs,
 )
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 ROUNDS = 50

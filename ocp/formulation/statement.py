@@ -25,7 +25,7 @@ from ocp.formulation.phase import (
     is_range,
 )
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.model import Model
 
 T = TypeVar("T")

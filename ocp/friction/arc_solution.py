@@ -32,7 +32,7 @@ from ocp.transcription.unknowns import (
     SpanPoints,
 )
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 
 Array = NDArray[np.float64]
 LEAST = 3

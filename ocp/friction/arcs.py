@@ -38,7 +38,7 @@ from ocp.formulation.statement import Duration
 from ocp.friction.mode_models import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.friction.transfer import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.model import Contact, Model
 
 MARGIN = 1e-2

@@ -27,7 +27,7 @@ from ocp.friction.mode_models import loops_of, mode_model, nominal_load, slip_ch
 from ocp.friction.smooth_models import jumps
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
-from symfric.foundation.symbols import at_start
+from symfric.foundation.variable import at_start
 from symfric.model import Contact, Event, Model
 
 Array = NDArray[np.float64]

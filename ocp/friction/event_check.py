@@ -37,7 +37,7 @@ from ocp.solving.solution import Solution
 from symfric import Hold, Trajectory, simulate
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
-from symfric.foundation.symbols import symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.integrator.equations.initial import JammedError
 from symfric.model import Model
 from symfric.model.model import check_model

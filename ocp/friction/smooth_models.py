@@ -19,7 +19,10 @@ from ocp.transcription.unknowns import (
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
-from symfric.foundation.symbols import at_start, strays
+from symfric.foundation.variable import (
+    at_start,
+    strays,
+)
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor

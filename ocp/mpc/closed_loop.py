@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from ocp.mpc.design import CycleData, CycleStatus, Design, Plan
 from ocp.mpc.session import Action, Session
 from symfric.foundation import checks
-from symfric.foundation.brief import brief
 from symfric.foundation.files import write_table
 from symfric.foundation.numeric import evaluate_all
 from symfric.foundation.panels import panels, save
+from symfric.foundation.shown import brief
 from symfric.foundation.style import line
 from symfric.integrator.stepper import stepper
 from symfric.model import Model, check_model

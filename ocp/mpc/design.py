@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ocp.mpc.horizon import Horizon
 from ocp.mpc.kernels import Kernels, kernels
-from symfric.foundation.brief import brief
+from symfric.foundation.shown import brief
 
 Array = NDArray[np.float64]
 

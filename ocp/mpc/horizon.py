@@ -21,8 +21,8 @@ from ocp.formulation.expressions import Cost
 from ocp.formulation.phase import Free, Row, Span
 from ocp.formulation.problem import Problem
 from symfric.foundation import checks
-from symfric.foundation.symbols import stacked
-from symfric.integrator.flow import flow
+from symfric.foundation.variable import stacked
+from symfric.integrator.stepper import flow
 from symfric.model import Model
 
 Array = NDArray[np.float64]

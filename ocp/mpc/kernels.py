@@ -20,7 +20,7 @@ from typing import Any, final
 import casadi as ca
 
 from ocp.mpc.horizon import Horizon, Limit
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 
 
 @final

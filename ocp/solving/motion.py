@@ -14,7 +14,7 @@ from ocp.transcription.program import Iterate
 from ocp.transcription.schemes import Coefficients, Scheme
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import check_names
-from symfric.foundation.typed import agree
+from symfric.foundation.storable import agree
 
 Array = NDArray[np.float64]
 

@@ -24,8 +24,8 @@ from ocp.formulation.phase import Span
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, order_of
 from ocp.transcription.schemes import Coefficients
 from ocp.transcription.unknowns import Data, Layout, Local
-from symfric.foundation.compiler import CompileError
-from symfric.foundation.symbols import stacked
+from symfric.foundation.programs import CompileError
+from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.compiler import library
 from symfric.model.holonomic import Holonomic

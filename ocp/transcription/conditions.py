@@ -24,7 +24,7 @@ from ocp.transcription.blocks import (
 )
 from ocp.transcription.schemes import Coefficients
 from ocp.transcription.unknowns import Columns, Data, Layout, Local, time_scale
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 
 
 @final

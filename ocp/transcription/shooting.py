@@ -20,7 +20,7 @@ from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Data, Layout, Local
 from symfric import integrator
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 LARGEST = 20_000

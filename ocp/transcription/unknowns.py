@@ -10,7 +10,7 @@ import numpy as np
 
 from ocp.formulation.phase import Free, Span
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, select
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 
 
 @final

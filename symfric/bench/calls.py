@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from symfric.bench import table
 from symfric.bench.contenders import buffered, compiled, tolerances
 from symfric.bench.table import interleaved, unwarned
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.background import wait
 from symfric.integrator.equations.inputs import Hold, input_data

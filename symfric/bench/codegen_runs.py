@@ -28,7 +28,7 @@ from symfric.compensation import (
 from symfric.embedded import measure as on_core
 from symfric.fmu import Exported, export_fmu
 from symfric.fmu.export import running
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator import Input
 from symfric.laws import GMS, ElastoPlastic
 from symfric.laws.dynamic.maxwell_slip import Element

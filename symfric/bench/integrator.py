@@ -18,7 +18,7 @@ from symfric.bench import contenders, table
 from symfric.bench.contenders import Contender, equations, tolerances
 from symfric.bench.ensemble import EnsembleRow, measure_ensemble
 from symfric.bench.table import best_time, unwarned
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre

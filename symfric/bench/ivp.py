@@ -12,7 +12,7 @@ from symfric.bench import table
 from symfric.bench.ivp_mechanisms import PROBLEMS
 from symfric.bench.ivp_problems import Problem
 from symfric.bench.table import best_time
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench.table import best_time, compile_time
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import bound
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS

@@ -31,7 +31,7 @@ from symfric.bench.mechanisms import (
     scaling,
 )
 from symfric.bench.table import best_time, unwarned
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank

@@ -20,7 +20,7 @@ from ocp.solving.methods import Ipopt
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.bench.table import interleaved
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Model
 from symfric.scenes.blocks import drive

@@ -32,8 +32,8 @@ from symfric.figures.regularisation import (
     regularisation,
     sample,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import parameters
+from symfric.foundation.programs import find_compiler
 from symfric.laws import (
     BrownMcPhee,
     Coulomb,

@@ -12,8 +12,8 @@ from symfric.codegen.routines import routines
 from symfric.embedded import measure
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
-from symfric.foundation.compiler import CompileError
 from symfric.foundation.parameters import Parameter, options, parameters
+from symfric.foundation.programs import CompileError
 from symfric.laws import Law, steady_force
 
 NEEDS = {

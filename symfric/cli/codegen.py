@@ -35,8 +35,8 @@ from symfric.codegen.generated import with_cores
 from symfric.codegen.verification import Check
 from symfric.embedded import CORES, Measured, measure
 from symfric.foundation import checks
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import check_names
+from symfric.foundation.programs import find_compiler
 from symfric.laws import AnyLaw
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}

@@ -25,10 +25,9 @@ from symfric.codegen.guards import parameter_range, range_of, state_limit
 from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, prefix
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
-from symfric.foundation.compiler import Compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.graph import graph
-from symfric.foundation.programs import finished
+from symfric.foundation.programs import Compiler, finished
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=undefined,address",
              "-fno-sanitize-recover=all")  # fmt: skip

@@ -20,9 +20,12 @@ from symfric.codegen.routines import routines, source
 from symfric.codegen.runner import footprint
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
-from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.programs import (
+    CompileError,
+    find_compiler,
+)
 from symfric.laws import AnyLaw, Population
 
 

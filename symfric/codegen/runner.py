@@ -21,10 +21,15 @@ from symfric.codegen.blocks.block import GROUPS, Block
 from symfric.codegen.guards import STEP_SIZE, Range, Status, parameter_range, range_of, state_limit
 from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, prefix
 from symfric.emitter.c99 import Real
-from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.graph import graph
 from symfric.foundation.numeric import bound
-from symfric.foundation.programs import PATIENCE, ProgramError, finished
+from symfric.foundation.programs import (
+    PATIENCE,
+    CompileError,
+    Compiler,
+    ProgramError,
+    finished,
+)
 
 WARNINGS = tuple(
     f"-W{name}"

@@ -17,9 +17,14 @@ from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
-from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.numeric import bound
+from symfric.foundation.programs import (
+    CompileError,
+    Compiler,
+    find_compiler,
+    no_compiler,
+)
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import strays
 from symfric.foundation.units import per_second
+from symfric.foundation.variable import strays
 from symfric.model import Model
 
 LEAST_RTOL, LARGEST_RTOL = 1e-13, 0.1

@@ -1,11 +1,13 @@
-"""The operations of a CasADi function as a graph in which equal parts are one node."""
+"""Operations of a CasADi function as a graph in which equal parts are one node; coupled groups."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 
 SELECT = -1
 """Operation of a node that stands for `if_else`, which CasADi writes as a sum of two halves."""
@@ -166,3 +168,23 @@ def rebuild(
         else:
             found.append(ca.SX.binary(node.op, *args))
     return [stacked(found[i] for i in row) for row in source.results]
+
+
+def coupled(pattern: NDArray[np.bool_]) -> list[tuple[list[int], list[int]]]:
+    """(columns, rows) of each group of rows that share columns.
+
+    Args:
+        pattern: which column each row depends on, shape (rows, columns).
+    """
+    left, found = set(range(pattern.shape[0])), list[tuple[list[int], list[int]]]()
+    while left:
+        rows, columns = {left.pop()}, set[int]()
+        while True:
+            columns |= {int(k) for row in rows for k in np.flatnonzero(pattern[row])}
+            more = {row for row in left if pattern[row][sorted(columns)].any()}
+            if not more:
+                break
+            rows |= more
+            left -= more
+        found.append((sorted(columns), sorted(rows)))
+    return found

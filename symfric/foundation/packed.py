@@ -24,7 +24,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import archive, checks, identity, storable, typed
+from symfric.foundation import archive, checks, identity, storable
 from symfric.foundation.instructions import Instructions
 
 FUNCTION = tuple[str, list[ca.SX], list[ca.SX], list[str], list[str]]
@@ -346,7 +346,7 @@ class _Reader:
 
     def _of_expressions(self, parts: Any) -> ca.Function:
         """A Function of SX expressions; options of CasADi, which could run code, have no place."""
-        if not typed.fits(tuple(parts), FUNCTION):
+        if not storable.fits(tuple(parts), FUNCTION):
             raise _foreign()
         return ca.Function(*parts)
 

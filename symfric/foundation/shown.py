@@ -5,11 +5,14 @@ Everything that comes from a user is escaped; there are no scripts, and pictures
 
 from abc import ABC, abstractmethod
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from html import escape
 from io import BytesIO
-from typing import TYPE_CHECKING, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, cast, final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Scalar, is_casadi, is_number
 
@@ -188,3 +191,41 @@ def _image(figure: "Figure", words: str) -> str:
         f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
         f'src="{data_uri(figure, DOTS_PER_INCH)}">'
     )
+
+
+SHORT = 8
+"""Numbers that are written out."""
+
+
+def brief(self: Any) -> str:
+    """Class and fields of a dataclass, a line each, within a screen."""
+    lines = [f"  {item.name}: {told(getattr(self, item.name))}" for item in fields(self)]
+    if len(lines) > HEIGHT - 2:
+        lines = [*lines[: HEIGHT - 2], f"  ... {len(lines) - HEIGHT + 2} more"]
+    return "\n".join([f"<{type(self).__name__}", *(cut(line, WIDTH - 1) for line in lines)]) + ">"
+
+
+def told(value: Any) -> str:
+    """A value in a line."""
+    if isinstance(value, np.ndarray):
+        return _array(cast(NDArray[Any], value))
+    if is_casadi(value):
+        return f"expression of shape {value.shape}"
+    if isinstance(value, Mapping):
+        inside = cast(Mapping[object, object], value)
+        return among(f"{name}: {told(held)}" for name, held in inside.items()) or "none"
+    if isinstance(value, tuple | list):
+        parts = [told(one) for one in cast(tuple[object, ...], value)]
+        return f"({among(parts)})"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return " ".join(repr(value).split())
+
+
+def _array(value: NDArray[Any]) -> str:
+    if value.size <= SHORT and value.ndim == 1:
+        return f"[{', '.join(told(x.item()) for x in value)}]"
+    shape = " x ".join(map(str, value.shape))
+    finite = value[np.isfinite(value)] if value.dtype.kind in "iuf" else value[:0]
+    reach = f" from {finite.min():.6g} to {finite.max():.6g}" if finite.size else ""
+    return f"{shape} values{reach}"

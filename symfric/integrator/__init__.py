@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Input as Input
     from symfric.integrator.equations.inputs import Linear as Linear
     from symfric.integrator.equations.inputs import rate_of as rate_of
-    from symfric.integrator.flow import flow as flow
     from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate
+    from symfric.integrator.stepper import flow as flow
     from symfric.integrator.stepper import stepper as stepper
     from symfric.integrator.stored import load_run as load_run
     from symfric.results.ensemble import Ensemble as Ensemble
     from symfric.results.ensemble import load_ensemble as load_ensemble
-    from symfric.results.statistics import Statistics as Statistics
+    from symfric.results.stored import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
 
 hand_out(__name__)

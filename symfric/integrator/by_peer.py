@@ -50,7 +50,7 @@ from symfric.integrator.running.record import Dense, Outputs, Run, hermite
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.stored import trajectory_of
 from symfric.model import Model
-from symfric.results.statistics import Statistics
+from symfric.results.stored import Statistics
 from symfric.results.trajectory import Trajectory
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks, packed
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import CompileError
 from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,

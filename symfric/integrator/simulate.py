@@ -44,7 +44,7 @@ from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import Tolerances, integrate, own_scale
 from symfric.integrator.stored import Basis, Stored, trajectory_of
 from symfric.model import Model
-from symfric.results.statistics import Statistics
+from symfric.results.stored import Statistics
 from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
-from symfric.foundation.typed import agree
+from symfric.foundation.storable import agree
 from symfric.integrator.arguments import BACKENDS
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.path import Path, Seeds
@@ -22,8 +22,7 @@ from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.record import Dense, Jumps, Outputs, Run
 from symfric.model import Model
 from symfric.model.kinds import in_results
-from symfric.results.statistics import Statistics
-from symfric.results.stored import Format
+from symfric.results.stored import Format, Statistics
 from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -21,9 +21,12 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Parametric, Variable
 from symfric.foundation.symbolic import take_symbols
-from symfric.foundation.symbols import at_start, symbols_of
 from symfric.foundation.units import turned
-from symfric.foundation.variable import take_si
+from symfric.foundation.variable import (
+    at_start,
+    symbols_of,
+    take_si,
+)
 from symfric.model.kinds import MODE
 from symfric.model.parts import Event, Monitor
 

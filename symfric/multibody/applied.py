@@ -43,9 +43,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.coupling import coupled
+from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import at_start, starts_of, symbols_of
+from symfric.foundation.variable import (
+    at_start,
+    starts_of,
+    symbols_of,
+)
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch

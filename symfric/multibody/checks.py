@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
-from symfric.foundation.symbols import strays
+from symfric.foundation.variable import strays
 from symfric.model import Variables
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force

@@ -16,7 +16,7 @@ from typing import final
 
 import casadi as ca
 
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.joint import Joint
 from symfric.multibody.joints import Floating

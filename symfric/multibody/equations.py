@@ -7,7 +7,7 @@ from typing import final
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.dynamics import (

@@ -8,7 +8,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests

@@ -13,7 +13,7 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_table
 from symfric.foundation.shown import Showing, Shown, Table, among, counted, valued
 from symfric.foundation.status import Status
-from symfric.foundation.typed import agree
+from symfric.foundation.storable import agree
 from symfric.results.stored import Format, module
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing
 from symfric.foundation.status import Status
-from symfric.foundation.symbols import strays
+from symfric.foundation.variable import strays
 from symfric.model import Model
 from symfric.results.quadrature import extremes, integral_between, integrals, looks
-from symfric.results.statistics import Statistics
+from symfric.results.stored import Statistics
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ What a file is, which format, and what it cannot be is stated here once for runs
 and optimal motions; how objects become arrays is `symfric.foundation.packed`.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from os import PathLike
 from typing import Any, Generic, TypeVar, final
@@ -81,3 +81,42 @@ def module(where: str, name: str) -> Any:
             f"{where}: expected the package {name}, got none; install it by 'pip install {name}', "
             "or take to_csv, which needs nothing"
         ) from None
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Cost of a simulation.
+
+    Attributes:
+        backend: what ran it.
+        method: integration method.
+        steps, rejections: accepted and rejected steps.
+        evaluations, jacobians, factorisations: calls of the right-hand side, of its Jacobian, and
+            LU factorisations.
+        events: events that happened.
+        smallest_step: smallest accepted step [s].
+        build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
+            reused), compiling it, and running it.
+        error: measured error relative to each state's magnitude, the largest; NaN if not requested.
+        sensitivity_errors: measured error of derivatives by each requested name, relative
+            to the largest value of each state's derivative, the largest; NaN where there is none.
+    """
+
+    backend: str
+    method: str
+    steps: int
+    rejections: int
+    evaluations: int
+    jacobians: int
+    factorisations: int
+    events: int
+    smallest_step: float
+    build_time: float
+    compile_time: float
+    run_time: float
+    error: float = float("nan")
+    sensitivity_errors: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields by name; errors that were not measured are left out."""
+        return {k: v for k, v in asdict(self).items() if v == v and v != {}}

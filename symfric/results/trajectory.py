@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.shown import Showing, Shown, Table, among, counted
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.model.kinds import WORK
 from symfric.model.model import friction
 from symfric.results.quadrature import integrals

@@ -21,9 +21,12 @@ from symfric.foundation.parameters import (
     with_values,
 )
 from symfric.foundation.shown import WIDTH
-from symfric.foundation.symbols import strays, symbols_of
 from symfric.foundation.units import turned
-from symfric.foundation.variable import check_si
+from symfric.foundation.variable import (
+    check_si,
+    strays,
+    symbols_of,
+)
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables

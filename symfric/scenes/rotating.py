@@ -11,7 +11,7 @@ import casadi as ca
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, param
-from symfric.foundation.symbols import symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.laws import Benson, LuGre, Stribeck, Tustin
 from symfric.laws.base import smooth
 from symfric.model import Model, Output, Variables

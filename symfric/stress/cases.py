@@ -11,7 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, TypeVar, final
 
-from symfric.foundation import typed
+from symfric.foundation import storable
 from symfric.foundation.files import read_json, write_text
 from symfric.foundation.parameters import Parameter, options, parameters, with_values
 from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
@@ -119,7 +119,7 @@ class Case:
             }
         except (TypeError, KeyError, AttributeError, ValueError) as error:
             raise ValueError(f"case: expected what `symfric stress` wrote, {error!r}") from None
-        wrong = [n for n, v in content.items() if not typed.fits(v, typed.hints_of(cls)[n])]
+        wrong = [n for n, v in content.items() if not storable.fits(v, storable.hints_of(cls)[n])]
         if wrong:
             raise ValueError(f"case: expected what `symfric stress` wrote, got others: {wrong}")
         return cls(**content)

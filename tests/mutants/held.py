@@ -23,7 +23,7 @@ HELD = (
     ),
     Mutant(
         "options of CasADi are read from a file", PACKED,
-        "if not typed.fits(tuple(parts), FUNCTION):", "if False:", T_PACKED,
+        "if not storable.fits(tuple(parts), FUNCTION):", "if False:", T_PACKED,
     ),
     Mutant(
         "CasADi's serialization is read from a file", PACKED,
@@ -36,7 +36,7 @@ HELD = (
     ),
     Mutant(
         "fields of a file may be of any type", "symfric/foundation/storable.py",
-        "if not typed.fits(value, hint):", "if False:", T_PACKED,
+        "if not fits(value, hint):", "if False:", T_PACKED,
     ),
     Mutant(
         "operands may follow their operation", INSTRUCTIONS,

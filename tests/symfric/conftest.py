@@ -4,7 +4,10 @@ import shutil
 
 import pytest
 
-from symfric.foundation.compiler import Compiler, find_compiler
+from symfric.foundation.programs import (
+    Compiler,
+    find_compiler,
+)
 
 
 @pytest.fixture(scope="session")

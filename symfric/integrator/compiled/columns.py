@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import CompileError
 from symfric.foundation.numeric import bound
+from symfric.foundation.programs import CompileError
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.compiler import load
 

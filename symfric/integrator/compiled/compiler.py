@@ -25,16 +25,18 @@ from tempfile import TemporaryFile
 from time import perf_counter
 from typing import final
 
-from symfric.foundation.compiler import (
+from symfric.foundation.programs import (
     CompileError,
     Compiler,
+    ProgramError,
+    end,
     find_compiler,
     first_error,
     is_clang,
     needed_compiler,
     patience,
+    started,
 )
-from symfric.foundation.programs import ProgramError, end, started
 
 MOST_BYTES = 256 * 2**20
 """The oldest files go when a cache grows beyond this; a step of a robot has half a megabyte."""

@@ -13,11 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.brief import brief
 from symfric.foundation.memory import remember
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import stacked, strays
+from symfric.foundation.shown import brief
+from symfric.foundation.variable import (
+    stacked,
+    strays,
+)
 from symfric.integrator.equations.expressions import lifted, onsets, pace
 from symfric.model import Model
 

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
-from symfric.foundation.symbols import stacked
+from symfric.foundation.variable import stacked
 from symfric.integrator.equations.expressions import branchless, divided_once
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import packed
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_steps
 from symfric.integrator.equations.inputs import InputData

@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import CompileError
 from symfric.foundation.memory import remember
-from symfric.foundation.symbols import stacked
+from symfric.foundation.programs import CompileError
+from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.blocks import refinement

@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import bound
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
 from symfric.integrator.running import loop

@@ -22,8 +22,8 @@ from symfric import (
     simulate,
     with_values,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import Variable
+from symfric.foundation.programs import find_compiler
 from symfric.model import Model
 
 STEP = 1e-3

@@ -3,7 +3,7 @@
 import pytest
 
 from symfric.codegen.runner import compile_object, needed_symbols
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import CompileError
 
 
 def test_warnings_are_returned(compiler, tmp_path):

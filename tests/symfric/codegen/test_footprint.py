@@ -6,7 +6,7 @@ from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate, law_block
 from symfric.codegen.runner import footprint
 from symfric.emitter.c99 import FLOAT
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 
 
 def test_text_and_stack_are_those_of_the_object_file(tmp_path):

@@ -14,7 +14,7 @@ from symfric.codegen.header import header
 from symfric.codegen.routines import source
 from symfric.codegen.runner import GuardModel, link_program, program, run_c, run_vm, signals
 from symfric.emitter.c99 import DOUBLE, FLOAT
-from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import Compiler
 
 N = 10.0
 GIVEN: dict[str, tuple[list[float], int]] = {

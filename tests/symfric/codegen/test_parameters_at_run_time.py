@@ -11,8 +11,8 @@ from symfric.codegen import Block, generate, law_block, plant_block
 from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.codegen.vectors import changed_value, excitation
 from symfric.emitter.c99 import DOUBLE
-from symfric.foundation.compiler import Compiler
 from symfric.foundation.files import write_text
+from symfric.foundation.programs import Compiler
 from symfric.laws import GMS
 from symfric.scenes import ALL_SCENES, Drive, Rabinowicz
 

@@ -10,7 +10,7 @@ from symfric.codegen import Block, generate, plant_block, verify
 from symfric.codegen.runner import run_vm
 from symfric.codegen.verification import longest_step, runs_away, step_size
 from symfric.emitter.c99 import REALS
-from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import Compiler
 from symfric.scenes import Arm
 
 x = Variable("x", "m", start=1.0, nominal=2.0)

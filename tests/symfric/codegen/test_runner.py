@@ -8,7 +8,7 @@ from symfric import Output, Variable
 from symfric.codegen import Block, generate, runner
 from symfric.codegen.runner import link_program, program, run_c, run_vm, signals
 from symfric.emitter.c99 import DOUBLE
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import CompileError
 
 
 def swap() -> Block:

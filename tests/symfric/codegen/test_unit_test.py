@@ -11,7 +11,7 @@ from law_cases import CASES, NO_STEP
 from symfric import BrownMcPhee, LuGre, law_from_text
 from symfric.codegen import Generated, generate, plant_block
 from symfric.codegen.runner import FLAGS, WARNINGS
-from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import Compiler
 from symfric.laws import GMS, MaxwellSlip
 from symfric.scenes import ALL_SCENES, Rabinowicz
 

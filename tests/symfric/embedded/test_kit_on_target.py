@@ -6,7 +6,7 @@ from cortex import on_target
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate
 from symfric.embedded import Absent, wrong_on_target
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import CompileError
 
 
 @on_target

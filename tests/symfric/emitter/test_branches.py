@@ -12,8 +12,8 @@ from symfric.codegen.routines import routines
 from symfric.codegen.runner import link_program, program, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.emitter.emit import Code, emit
-from symfric.foundation.compiler import Compiler
 from symfric.foundation.graph import graph
+from symfric.foundation.programs import Compiler
 
 x, y, z = (ca.SX.sym(name) for name in "xyz")
 less = x < y

@@ -10,7 +10,7 @@ from symfric import Output, Variable
 from symfric.codegen import Block, generate
 from symfric.codegen.runner import compile_object, link_program, program, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE
-from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import Compiler
 
 UNARY = [
     lambda x, u: ca.sin(x + u),

@@ -9,7 +9,7 @@ from symfric import BrownMcPhee, Hold, LuGre, law_from_text, simulate
 from symfric.fmu import export_fmu
 from symfric.fmu.export import KINDS
 from symfric.fmu.package import compile_unit
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.scenes import ALL_SCENES
 
 WHY = "the validator of FMPy: pip install symfric[fmu]"

@@ -8,9 +8,14 @@ from time import sleep
 
 import pytest
 
-from symfric.foundation import compiler as module
 from symfric.foundation import programs
-from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
+from symfric.foundation import programs as module
+from symfric.foundation.programs import (
+    CompileError,
+    Compiler,
+    find_compiler,
+    no_compiler,
+)
 
 needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
 

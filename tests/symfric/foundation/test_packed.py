@@ -162,7 +162,7 @@ def holding(content: Any, **arrays: Any) -> BytesIO:
 
 def test_a_file_cannot_name_what_is_no_data() -> None:
     for path in ("symfric.foundation.files:write_text", "symfric.foundation.checks:Path",
-                 "symfric.cli.app:typer.Typer", "symfric.foundation.compiler:Compiler",
+                 "symfric.cli.app:typer.Typer", "symfric.foundation.programs:Compiler",
                  "identification.residuals.shots:delayed", "symfric.laws:LuGre"):  # fmt: skip
         with pytest.raises(ValueError, match="expected a file that symfric wrote"):
             packed.load(naming(path), "kind", 1)

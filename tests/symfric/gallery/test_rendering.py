@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from symfric.gallery import rendering
-from symfric.gallery.pages import index_page
 from symfric.gallery.plate import chosen, figure_of, plate_of, plates, script, sections, short
-from symfric.gallery.rendering import draw, read, render, together
+from symfric.gallery.rendering import draw, index_page, read, render, together
 from symfric.stress.campaign import Crashed, TimedOut
 
 NAME = "self_tuning/fig_07_shape_factor"

@@ -27,7 +27,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import CompileError
 from symfric.integrator.many import chunk as chunk_module
 from symfric.integrator.many import program as program_module
 from symfric.model import Event

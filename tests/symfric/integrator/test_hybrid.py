@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import Event, Model, Variable, simulate
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 
 STICK, SLIP, BELT, DELTA = 0.0, 1.0, 0.2, 3.0
 

@@ -20,7 +20,7 @@ from symfric import (
 )
 from symfric.codegen import generate, plant_block, verify
 from symfric.codegen.blocks.block import Block
-from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import Compiler
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
 from symfric.scenes import Arm, DoublePendulum, Drive, Rabinowicz

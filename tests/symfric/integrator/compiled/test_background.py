@@ -14,7 +14,7 @@ from backends import needs_compiler
 
 import symfric.integrator.compiled.background as module
 from symfric import Trajectory, rabinowicz, simulate
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled.background import Prospect, make, wait
 from symfric.integrator.compiled.compiler import compiled_before
 from symfric.laws import BrownMcPhee
@@ -176,8 +176,8 @@ def test_failures_are_quiet(monkeypatch: pytest.MonkeyPatch, folder: Path) -> No
 
 
 def test_a_compiler_that_hangs_is_given_up(calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("symfric.foundation.compiler.PATIENCE", 0.0)
-    monkeypatch.setattr("symfric.foundation.compiler.PER_BYTE", 0.0)
+    monkeypatch.setattr("symfric.foundation.programs.PATIENCE", 0.0)
+    monkeypatch.setattr("symfric.foundation.programs.PER_BYTE", 0.0)
     making = make(SOURCE, "twice")
     started(calls, 1)
     wait()

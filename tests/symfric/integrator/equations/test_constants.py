@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from symfric import LuGre, Viscous, drive, simulate
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled import compiler
 from symfric.integrator.equations import expressions
 from symfric.integrator.equations.expressions import lifted

@@ -17,7 +17,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.following import following
 from symfric.integrator.equations.initial import (

@@ -12,7 +12,7 @@ import symfric.integrator.compiled.compiler as compiler
 import symfric.integrator.many.program as module
 import symfric.integrator.running.integrator as built
 from symfric import Model, simulate, simulate_many
-from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import Compiler
 
 
 @pytest.mark.parametrize("make", [oscillator, switched])
