@@ -7,13 +7,7 @@ Multibody System Dynamics 16, 2006. Lengths 1 m, masses 1 kg where nothing else 
 from itertools import pairwise
 from math import pi
 
-from symfric.multibody import (
-    Mechanism,
-    PointOnLine,
-    Prismatic,
-    Revolute,
-    SpringDamper,
-)
+from symfric.multibody import Mechanism, PointOnLine, Prismatic, Revolute, SpringDamper
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 G = 9.81

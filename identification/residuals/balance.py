@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from identification.residuals.sampled import Equations, imposed_step
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    stacked,
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Model

@@ -22,14 +22,7 @@ from numpy.typing import NDArray
 from identification.data.record import PositionLoop, Record
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.initial import local, noise_of
-from identification.residuals.stepper import (
-    Chain,
-    Feedback,
-    Mass,
-    Motion,
-    Tangent,
-    why_no_motion,
-)
+from identification.residuals.stepper import Chain, Feedback, Mass, Motion, Tangent, why_no_motion
 from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
 

@@ -11,12 +11,7 @@ from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.residuals.evaluation import Channel
 from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
-from identification.residuals.open_loop import (
-    SHARE,
-    SUBSTEPS,
-    choose_substeps,
-    why_not,
-)
+from identification.residuals.open_loop import SHARE, SUBSTEPS, choose_substeps, why_not
 from identification.residuals.shots import DEAD_TIME, Drives, Shot, Shots, delayed, plain
 from identification.unknowns.spec import Unknown
 from symfric.foundation import checks

@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.integrator.compiled.columns import Columns
 from symfric.laws import Law
 

@@ -16,12 +16,7 @@ from numpy.typing import NDArray
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
 from ocp.checking.verification import Miss, Verification
-from ocp.formulation.phase import (
-    FREE,
-    Box,
-    Row,
-    fixed,
-)
+from ocp.formulation.phase import FREE, Box, Row, fixed
 from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
 from symfric.foundation import checks

@@ -10,10 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import zoh_losses
-from ocp.formulation.phase import (
-    Row,
-    Span,
-)
+from ocp.formulation.phase import Row, Span
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.mode_models import SIDES
@@ -27,10 +24,7 @@ from ocp.transcription.program import Iterate, Outcome, Report, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
-from ocp.transcription.unknowns import (
-    Points,
-    SpanPoints,
-)
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 

@@ -35,10 +35,7 @@ from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scale, Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
-from ocp.solving.motion import (
-    Stored,
-    stored_spans,
-)
+from ocp.solving.motion import Stored, stored_spans
 from ocp.solving.one_solve import Solver, solution_of, starts_around
 from ocp.solving.prepared import Clock, Prepared
 from ocp.solving.solution import Solution

@@ -35,16 +35,11 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from ocp.friction.smooth_models import (
-    jumps,
-)
+from ocp.friction.smooth_models import jumps
 from symfric.foundation import checks
 from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    at_start,
-    stacked,
-)
+from symfric.foundation.variable import at_start, stacked
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Output
 from symfric.multibody.applied import null_direction

@@ -32,14 +32,7 @@ from ocp.formulation.problem import Problem
 from ocp.friction.arc_solution import ModeSolver, Solved, reassemble
 from ocp.friction.arcs import MARGIN
 from ocp.friction.mode_models import restless
-from ocp.friction.sequence import (
-    Leg,
-    flat,
-    inserted,
-    neighbours,
-    pruned,
-    shown,
-)
+from ocp.friction.sequence import Leg, flat, inserted, neighbours, pruned, shown
 from ocp.friction.transfer import Known, Reading, sequence_of, sizes_of, starts_at_rest
 from ocp.solving.methods import Ipopt
 from ocp.solving.prepared import Clock

@@ -12,17 +12,11 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Chain, Span
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import along_points
-from ocp.transcription.unknowns import (
-    Points,
-    SpanPoints,
-)
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
-from symfric.foundation.variable import (
-    at_start,
-    strays,
-)
+from symfric.foundation.variable import at_start, strays
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor

@@ -24,10 +24,7 @@ from symfric.codegen.runner import compile_object, needed_symbols
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.model import Model
 
 Array = NDArray[np.float64]

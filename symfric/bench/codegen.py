@@ -24,10 +24,7 @@ from symfric.embedded import (
 )
 from symfric.emitter.c99 import REALS
 from symfric.foundation.parameters import check_names
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
 from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import Arm, Drive, Rabinowicz, rabinowicz

@@ -23,12 +23,7 @@ from symfric.foundation.numeric import bound
 from symfric.integrator.arguments import chosen
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.compiler import library
-from symfric.integrator.equations.initial import (
-    consistent,
-    first_guess,
-    first_step,
-    smallest_step,
-)
+from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.running.engine import Stop

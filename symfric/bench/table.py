@@ -11,10 +11,7 @@ from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, final
 
 from symfric.foundation.files import write_table
-from symfric.foundation.programs import (
-    find_compiler,
-    no_compiler,
-)
+from symfric.foundation.programs import find_compiler, no_compiler
 from symfric.integrator.compiled.compiler import FLAGS
 
 if TYPE_CHECKING:

@@ -22,10 +22,7 @@ from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.laws import AnyLaw, Population
 
 

@@ -23,13 +23,7 @@ from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, p
 from symfric.emitter.c99 import Real
 from symfric.foundation.graph import graph
 from symfric.foundation.numeric import bound
-from symfric.foundation.programs import (
-    PATIENCE,
-    CompileError,
-    Compiler,
-    ProgramError,
-    finished,
-)
+from symfric.foundation.programs import PATIENCE, CompileError, Compiler, ProgramError, finished
 
 WARNINGS = tuple(
     f"-W{name}"

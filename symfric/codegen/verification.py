@@ -29,12 +29,7 @@ from symfric.codegen.runner import (
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation.checks import kind
 from symfric.foundation.files import write_text
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-    find_compiler,
-    missing_compiler,
-)
+from symfric.foundation.programs import CompileError, Compiler, find_compiler, missing_compiler
 
 Array = NDArray[np.float64]
 

@@ -19,12 +19,7 @@ from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.numeric import bound
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-    find_compiler,
-    no_compiler,
-)
+from symfric.foundation.programs import CompileError, Compiler, find_compiler, no_compiler
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant

@@ -33,10 +33,7 @@ from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 
 Array = NDArray[np.float64]
 

@@ -23,12 +23,7 @@ from symfric.codegen.layout import called, filled, prefix
 from symfric.codegen.routines import source
 from symfric.emitter.c99 import REALS
 from symfric.foundation.files import write_text
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-    ProgramError,
-    finished,
-)
+from symfric.foundation.programs import CompileError, Compiler, ProgramError, finished
 
 BY = ("symfric", "casadi", "casadi, functions of float")
 """Who writes the C: we; CasADi, whose code of float calls tanh, exp, fmax of double; CasADi with a

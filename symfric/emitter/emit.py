@@ -16,16 +16,7 @@ import casadi as ca
 
 from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, Writer, operation_name
 from symfric.emitter.logic import LOWERED, logical, settled, simplified
-from symfric.emitter.statements import (
-    Branch,
-    Local,
-    Plan,
-    Side,
-    Statement,
-    Store,
-    Stores,
-    planned,
-)
+from symfric.emitter.statements import Branch, Local, Plan, Side, Statement, Store, Stores, planned
 from symfric.foundation.graph import LEAVES, Graph
 
 INDENT = "    "

@@ -17,11 +17,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 from symfric.fmu.variables import Entry
 from symfric.foundation.files import written
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, Compiler, find_compiler
 from symfric.foundation.units import CELSIUS, exponents
 
 CATEGORIES = ("logStatusDiscard", "logStatusError")

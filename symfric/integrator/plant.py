@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.many.members import pays, side_by_side

@@ -22,11 +22,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Parametric, Variable
 from symfric.foundation.symbolic import take_symbols
 from symfric.foundation.units import turned
-from symfric.foundation.variable import (
-    at_start,
-    symbols_of,
-    take_si,
-)
+from symfric.foundation.variable import at_start, symbols_of, take_si
 from symfric.model.kinds import MODE
 from symfric.model.parts import Event, Monitor
 

@@ -25,11 +25,7 @@ import casadi as ca
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    stacked,
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import APPLIED, Contact, Variables
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.start import System

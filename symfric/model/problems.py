@@ -7,10 +7,7 @@ import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    starts_of,
-    strays,
-)
+from symfric.foundation.variable import starts_of, strays
 from symfric.model.contact import Contact
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.start import System

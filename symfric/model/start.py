@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    stacked,
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import Contact, Variables
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output

@@ -45,11 +45,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    at_start,
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import at_start, starts_of, symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch

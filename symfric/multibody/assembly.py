@@ -21,11 +21,7 @@ import numpy as np
 from symfric.foundation.checks import listed
 from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    at_start,
-    stacked,
-    symbols_of,
-)
+from symfric.foundation.variable import at_start, stacked, symbols_of
 from symfric.laws.catalogue import law_name
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds

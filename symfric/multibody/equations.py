@@ -10,14 +10,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.variable import stacked
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.constraints import Constraint, Held
-from symfric.multibody.dynamics import (
-    Loop,
-    Wrench,
-    balance,
-    kinetic_energy,
-    loops,
-    normalisations,
-)
+from symfric.multibody.dynamics import Loop, Wrench, balance, kinetic_energy, loops, normalisations
 from symfric.multibody.forces import Axial, Force, Gravity, Load
 from symfric.multibody.joint import Contact, Joint
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, Turns, kinematics

@@ -2,11 +2,7 @@
 
 import casadi as ca
 
-from symfric.foundation.variable import (
-    stacked,
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Variables
 from symfric.multibody.kinematics import angles
 from symfric.multibody.mechanism import Mechanism

@@ -9,10 +9,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    stacked,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.model.kinds import POSITION
 from symfric.multibody.joint import Joint
 from symfric.multibody.spatial import GROUND

@@ -15,10 +15,7 @@ from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.symbolic import plain, with_symbols
-from symfric.foundation.variable import (
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble, coordinates

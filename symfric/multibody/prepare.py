@@ -8,12 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.variable import (
-    stacked,
-    starts_of,
-    strays,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, starts_of, strays, symbols_of
 from symfric.model import Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import coordinates

@@ -12,10 +12,7 @@ from symfric.foundation.numeric import equals
 from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import Shown, Table, among, counted, figure_of
 from symfric.foundation.style import EDGE, colour
-from symfric.foundation.variable import (
-    stacked,
-    strays,
-)
+from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol

@@ -14,13 +14,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests
 from symfric.laws.base.law import FORCE, Switch
 from symfric.model import Event, Variables, kinds
-from symfric.multibody.applied import (
-    Rest,
-    applied_forces,
-    capacity_of,
-    forward,
-    switches_at,
-)
+from symfric.multibody.applied import Rest, applied_forces, capacity_of, forward, switches_at
 from symfric.multibody.equations import Equations
 from symfric.multibody.joint import Contact
 

@@ -13,20 +13,10 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.foundation.parameters import (
-    Parametric,
-    Variable,
-    parameters,
-    symbolise,
-    with_values,
-)
+from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise, with_values
 from symfric.foundation.shown import WIDTH
 from symfric.foundation.units import turned
-from symfric.foundation.variable import (
-    check_si,
-    strays,
-    symbols_of,
-)
+from symfric.foundation.variable import check_si, strays, symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables

@@ -4,10 +4,7 @@ import shutil
 
 import pytest
 
-from symfric.foundation.programs import (
-    Compiler,
-    find_compiler,
-)
+from symfric.foundation.programs import Compiler, find_compiler
 
 
 @pytest.fixture(scope="session")

@@ -13,10 +13,7 @@ import casadi as ca
 from symfric.emitter.c99 import FUNCTIONS
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
-from symfric.foundation.variable import (
-    strays,
-    symbols_of,
-)
+from symfric.foundation.variable import strays, symbols_of
 from symfric.model import Output, Variables
 
 GROUPS = ("state", "param", "in", "out")

@@ -14,11 +14,7 @@ from symfric.codegen.blocks.joints import ContactStep, contact_step, with_gravit
 from symfric.codegen.blocks.variables import in_arrays, numbered
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    stacked,
-    starts_of,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
 from symfric.multibody.equations import Equations

@@ -11,10 +11,7 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import law_block
 from symfric.foundation.numeric import equals, is_number
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    stacked,
-    symbols_of,
-)
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.model import Variables
 from symfric.multibody import GROUND, Body, Mechanism
 from symfric.multibody.forces import Gravity

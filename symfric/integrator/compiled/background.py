@@ -13,10 +13,7 @@ from dataclasses import dataclass
 from time import sleep
 from typing import final
 
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.integrator.compiled.compiler import Unfinished, begun, compiled_before
 
 _OWNER = os.getpid()

@@ -17,10 +17,7 @@ from symfric.foundation.memory import remember
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import brief
-from symfric.foundation.variable import (
-    stacked,
-    strays,
-)
+from symfric.foundation.variable import stacked, strays
 from symfric.integrator.equations.expressions import lifted, onsets, pace
 from symfric.model import Model
 

@@ -13,13 +13,7 @@ from numpy.typing import NDArray
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, Equations
 from symfric.integrator.equations.manifold import Manifold
-from symfric.integrator.many.members import (
-    CompiledMembers,
-    Follow,
-    Members,
-    VmMembers,
-    many_source,
-)
+from symfric.integrator.many.members import CompiledMembers, Follow, Members, VmMembers, many_source
 from symfric.integrator.running.integrator import Integrator
 
 Array = NDArray[np.float64]

@@ -36,10 +36,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.memory import remember
 from symfric.foundation.status import EnergyWarning, OverloadWarning
-from symfric.foundation.variable import (
-    strays,
-    symbols_of,
-)
+from symfric.foundation.variable import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator

@@ -8,15 +8,7 @@ from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import Levels, Sticking, carried, rests, stick_and_slip
-from symfric.laws.base.law import (
-    APPLIED_FORCE,
-    Facts,
-    Input,
-    State,
-    StaticLaw,
-    Switch,
-    one_sided,
-)
+from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, State, StaticLaw, Switch, one_sided
 
 FORMS = ("smooth", "original")
 WITH_MODES = (*FORMS, "event")

@@ -12,14 +12,7 @@ from ocp.checking.verify import verify
 from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.problems import (
-    OTHERS,
-    alp_rider,
-    brachistochrone,
-    bryson_denham,
-    goddard,
-    hang_glider,
-)
+from ocp.problems import OTHERS, alp_rider, brachistochrone, bryson_denham, goddard, hang_glider
 from ocp.solving.methods import Ipopt
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Progress

@@ -13,10 +13,7 @@ from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import Controller, controller_of
 from ocp.mpc.design import CycleData
-from symfric.foundation.programs import (
-    CompileError,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, find_compiler
 
 pytestmark = needs_compiler
 

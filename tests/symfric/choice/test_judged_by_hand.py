@@ -15,15 +15,7 @@ from symfric.choice.ranking import INACCURATE, RANKED, REFUSED, Row, ordered
 from symfric.choice.softness import MOST, NARROW, Ladder, Rung, ladder, limit_order, softness
 from symfric.choice.text import number, short, verdict
 from symfric.foundation.parameters import parameters
-from symfric.laws import (
-    ALL_LAWS,
-    GMS,
-    BrownMcPhee,
-    Gonthier,
-    LeineSwitch,
-    LuGre,
-    steady_force,
-)
+from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, Gonthier, LeineSwitch, LuGre, steady_force
 
 ROW = Row(
     "a", RANKED, error=1e-5, method="Rodas5P", attempts=10, instructions=100, time_s=1e-3,

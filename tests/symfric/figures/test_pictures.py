@@ -10,13 +10,7 @@ from matplotlib.figure import Figure
 from symfric import BrownMcPhee, Karnopp, LuGre, law_from_text, with_values
 from symfric.figures import compare, figure, hysteresis
 from symfric.figures.data import Curve, FigureData, clear
-from symfric.figures.pictures import (
-    behaviours,
-    decades,
-    plot_catalogue,
-    plot_laws,
-    window,
-)
+from symfric.figures.pictures import behaviours, decades, plot_catalogue, plot_laws, window
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import steady_force
 

@@ -14,10 +14,7 @@ from symfric.fmu import export_fmu
 from symfric.fmu.export import KINDS
 from symfric.fmu.variables import direct
 from symfric.foundation.parameters import Variable
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-)
+from symfric.foundation.programs import CompileError, Compiler
 from symfric.model import Model, Output
 from symfric.scenes import Drive, Pendulum, Rabinowicz, SliderCrank
 

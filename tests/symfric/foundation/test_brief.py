@@ -7,10 +7,7 @@ import casadi as ca
 import numpy as np
 from pages import on_a_screen, shown
 
-from symfric.foundation.shown import (
-    brief,
-    told,
-)
+from symfric.foundation.shown import brief, told
 from symfric.integrator import Hold, Linear, simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import FourBar

@@ -10,12 +10,7 @@ import pytest
 
 from symfric.foundation import programs
 from symfric.foundation import programs as module
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-    find_compiler,
-    no_compiler,
-)
+from symfric.foundation.programs import CompileError, Compiler, find_compiler, no_compiler
 
 needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
 

@@ -13,13 +13,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
-from symfric.foundation.panels import (
-    Picture,
-    blank,
-    grid,
-    panels,
-    save,
-)
+from symfric.foundation.panels import Picture, blank, grid, panels, save
 from symfric.foundation.shown import data_uri
 from symfric.foundation.style import COLOURS
 

@@ -3,13 +3,7 @@
 import casadi as ca
 
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    at_start,
-    stacked,
-    starts_of,
-    strays,
-    symbols_of,
-)
+from symfric.foundation.variable import at_start, stacked, starts_of, strays, symbols_of
 
 
 def test_no_rows_are_a_column_without_rows() -> None:

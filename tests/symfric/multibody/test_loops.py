@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, simulate
-from symfric.multibody import (
-    Cylindrical,
-    JointFriction,
-    Mechanism,
-    Prismatic,
-    Revolute,
-    Spherical,
-)
+from symfric.multibody import Cylindrical, JointFriction, Mechanism, Prismatic, Revolute, Spherical
 
 LAW = BrownMcPhee()
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

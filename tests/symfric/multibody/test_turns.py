@@ -5,13 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import simulate
-from symfric.multibody import (
-    JointSpringDamper,
-    Mechanism,
-    Revolute,
-    UserForce,
-    functions,
-)
+from symfric.multibody import JointSpringDamper, Mechanism, Revolute, UserForce, functions
 from symfric.multibody.kinematics import Moved, Turns
 
 

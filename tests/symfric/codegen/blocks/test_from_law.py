@@ -8,16 +8,7 @@ import pytest
 from law_cases import CASES
 from rigs import prescribed_motion
 
-from symfric import (
-    Dahl,
-    LoadDependent,
-    LuGre,
-    Stribeck,
-    Sum,
-    law_from_text,
-    parameters,
-    simulate,
-)
+from symfric import Dahl, LoadDependent, LuGre, Stribeck, Sum, law_from_text, parameters, simulate
 from symfric.codegen import law_block
 from symfric.foundation.graph import graph
 from symfric.laws import (

@@ -14,11 +14,7 @@ from backends import needs_compiler
 from symfric import LuGre, Status, rabinowicz, simulate
 from symfric.cli import main
 from symfric.foundation import programs as finder
-from symfric.foundation.programs import (
-    CompileError,
-    Compiler,
-    find_compiler,
-)
+from symfric.foundation.programs import CompileError, Compiler, find_compiler
 from symfric.integrator.compiled import background, compiler
 from symfric.integrator.compiled.compiler import compiled_before, key_of, library, load
 from symfric.integrator.equations.inputs import input_data
