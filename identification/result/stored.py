@@ -18,7 +18,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from identification.result.outcome import Outcome
-from symfric.foundation import checks, typed
+from symfric.foundation import checks, storable
 from symfric.foundation.files import read_json
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Parametric
@@ -278,7 +278,7 @@ def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Para
     law, machine = data["law_data"], data["machine"]
     made = kind(**plain_ones, law=_known(law, own), machine=_known(machine, own))
     for name, value in plain_ones.items():
-        if not typed.fits(value, hints[name]):
+        if not storable.fits(value, hints[name]):
             raise ValueError(f"{name} of another type")
     made.check_fields()
     return made
