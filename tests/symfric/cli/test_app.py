@@ -183,7 +183,10 @@ def test_a_defect_is_one_line_too() -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_an_interrupt_ends_with_status_130_and_keeps_what_there_is(tmp_path: Path) -> None:
-    loaded = "import symfric.cli.run, symfric.integrator.simulate; print('ready', flush=True)"
+    loaded = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # if ignored
+        "import symfric.cli.run, symfric.integrator.simulate; print('ready', flush=True)"
+    )
     code = START.replace("sys.exit", f"{loaded}; sys.exit")
     line = "run rabinowicz --law lugre --t-end 1e7 --backend vm --out part.csv --json part.json"
     process = subprocess.Popen(
