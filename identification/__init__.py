@@ -9,7 +9,7 @@ Other kinds of residuals: `Points`, `Shooting`, `ClosedLoop`.
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from identification.cross import cross_validate as cross_validate
@@ -52,4 +52,4 @@ if TYPE_CHECKING:
     from identification.verdict.design import expected_errors as expected_errors
     from identification.verdict.design import informative as informative
 
-hand_out(__name__)
+load_lazily(__name__)

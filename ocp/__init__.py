@@ -6,7 +6,7 @@ done about friction.
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from ocp.checking.verification import Miss as Miss
@@ -48,4 +48,4 @@ if TYPE_CHECKING:
     from ocp.transcription.schemes import Radau as Radau
     from ocp.transcription.schemes import Shooting as Shooting
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -33,7 +33,7 @@ Optimal control is the package `ocp`, identification `identification`; C is writ
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.choice import Choice as Choice
@@ -79,6 +79,6 @@ if TYPE_CHECKING:
     from symfric.scenes import drive as drive
     from symfric.scenes import rabinowicz as rabinowicz
 
-hand_out(__name__)
+load_lazily(__name__)
 
 __version__ = "0.1.0"

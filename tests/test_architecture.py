@@ -123,7 +123,7 @@ def test_no_circle_between_folders() -> None:
 
 
 def test_no_circle_between_files() -> None:
-    """Imports inside functions and for type checkers included; fronts apart."""
+    """Imports inside functions and for type checkers count; `__init__.py` files do not."""
     files = {dotted(path): path for path in SOURCES if path.stem != "__init__"}
     arrows = {
         name: {other for other in imported(parsed(path)) if other in files and other != name}

@@ -248,7 +248,7 @@ def limits(item: Any) -> str:
 def limit_page() -> str:
     """Limits of laws, scenes and public names, each with its link."""
     found = rst.title("Limits")
-    found += "What a docstring says about where a thing ends; each stands beside it, too.\n\n"
+    found += "Limits that docstrings state; each is also on the page of its object.\n\n"
     kinds: dict[str, dict[str, Any]] = {
         "Laws": ALL_LAWS | POPULATIONS | MADE_OF_LAWS,
         "Scenes": dict(ALL_SCENES),

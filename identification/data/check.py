@@ -151,7 +151,7 @@ WIDTH = 12.0
 ALIKE = 0.7
 """Correlation that both must have."""
 OFF = 0.2
-"""Relative error of the scale from which on it is told."""
+"""Relative error of the scale above which it is reported."""
 KNOWN = {
     57.2958: "deg/s taken as rad/s",
     0.0174533: "rad/s taken as deg/s",

@@ -53,7 +53,7 @@ def of_direction(view: View, model: Rough) -> Iterator[Finding]:
     if both and model.sure(0) < -SURE and put_in > 0 and model.explained > LITTLE:
         text = (
             f"{names[0]} accelerates against the motion (a rough mass is {model.values[0]:.3g} +- "
-            f"{model.errors[0]:.1g}): it is late, or something else drives, too."
+            f"{model.errors[0]:.1g}): it is delayed, or another force drives the axis."
         )
         yield view.warning("sign", names[0], text)
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.bench.calls import CallBenchmark as CallBenchmark
@@ -33,4 +33,4 @@ if TYPE_CHECKING:
     from symfric.bench.regularisation import RegularisationBenchmark as RegularisationBenchmark
     from symfric.bench.regularisation import bench_regularisation as bench_regularisation
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.choice.friction import Friction as Friction
@@ -11,4 +11,4 @@ if TYPE_CHECKING:
     from symfric.choice.select import Choice as Choice
     from symfric.choice.select import select as select
 
-hand_out(__name__)
+load_lazily(__name__)

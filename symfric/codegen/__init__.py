@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.codegen.blocks.block import Block as Block
@@ -19,4 +19,4 @@ if TYPE_CHECKING:
     from symfric.codegen.verification import Verification as Verification
     from symfric.codegen.verification import verify as verify
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.compensation.compensator import Cascade as Cascade
@@ -21,4 +21,4 @@ if TYPE_CHECKING:
     from symfric.compensation.settings import Compensation as Compensation
     from symfric.compensation.settings import settings_from_text as settings_from_text
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.embedded.measure import Measured as Measured
@@ -15,4 +15,4 @@ if TYPE_CHECKING:
     from symfric.embedded.target import Tools as Tools
     from symfric.embedded.target import find_tools as find_tools
 
-hand_out(__name__)
+load_lazily(__name__)

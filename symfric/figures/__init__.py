@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.figures.catalogue import FIGURES as FIGURES
@@ -30,4 +30,4 @@ if TYPE_CHECKING:
     from symfric.figures.sliding import transition as transition
     from symfric.figures.sliding import velocity_step as velocity_step
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.fmu.export import Exported as Exported
     from symfric.fmu.export import export_fmu as export_fmu
     from symfric.fmu.export import running as running
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -10,7 +10,7 @@ plate.picture.savefig("fig_07.png")
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.gallery.plate import Plate as Plate
@@ -21,4 +21,4 @@ if TYPE_CHECKING:
     from symfric.gallery.plate import scripts as scripts
     from symfric.gallery.plate import short as short
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.integrator.by_peer import simulate_by_peer as simulate_by_peer
@@ -21,4 +21,4 @@ if TYPE_CHECKING:
     from symfric.results.stored import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -5,7 +5,7 @@ Knows nothing of mechanisms, integration or optimisation; a law drops into any C
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.laws.base.law import PHENOMENA as PHENOMENA
@@ -90,4 +90,4 @@ if TYPE_CHECKING:
     from symfric.laws.static.smooth_peak import SimscapeBreakaway as SimscapeBreakaway
     from symfric.laws.static.smooth_peak import Specker as Specker
 
-hand_out(__name__)
+load_lazily(__name__)

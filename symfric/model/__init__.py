@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.model.contact import Contact as Contact
@@ -14,4 +14,4 @@ if TYPE_CHECKING:
     from symfric.model.parts import Monitor as Monitor
     from symfric.model.parts import Output as Output
 
-hand_out(__name__)
+load_lazily(__name__)

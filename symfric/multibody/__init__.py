@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.multibody.constraints import Constraint as Constraint
@@ -40,4 +40,4 @@ if TYPE_CHECKING:
     from symfric.multibody.spatial import Frame as Frame
     from symfric.multibody.urdf import read_urdf as read_urdf
 
-hand_out(__name__)
+load_lazily(__name__)

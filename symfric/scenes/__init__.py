@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.scenes.base import GivenInput as GivenInput
@@ -34,4 +34,4 @@ if TYPE_CHECKING:
     from symfric.scenes.spatial import FourMass as FourMass
     from symfric.scenes.spatial import Robot as Robot
 
-hand_out(__name__)
+load_lazily(__name__)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from symfric.foundation.fronts import hand_out
+from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.stress.campaign import Report as Report
@@ -12,4 +12,4 @@ if TYPE_CHECKING:
     from symfric.stress.judge import CLASSES as CLASSES
     from symfric.stress.judge import Verdict as Verdict
 
-hand_out(__name__)
+load_lazily(__name__)

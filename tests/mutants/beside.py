@@ -2,13 +2,13 @@
 
 from mutants.mutant import Mutant
 
-FRONTS = "symfric/foundation/fronts.py"
+LAZY = "symfric/foundation/lazy.py"
 BACKGROUND = "symfric/integrator/compiled/background.py"
 COMPILER = "symfric/integrator/compiled/compiler.py"
 BRANCHES = "symfric/integrator/equations/expressions.py"
 ELIMINATED = "symfric/integrator/methods/explicit.py"
 WRITTEN = "symfric/integrator/step/attempt.py"
-T_FRONTS = ("tests/symfric/foundation/test_fronts.py",)
+T_LAZY = ("tests/symfric/foundation/test_lazy.py",)
 T_BACKGROUND = ("tests/symfric/integrator/compiled/test_background.py",)
 T_BRANCHES = ("tests/symfric/integrator/equations/test_branches.py",)
 T_ELIMINATED = ("tests/symfric/integrator/equations/test_eliminated.py",)
@@ -16,13 +16,13 @@ T_WRITTEN = ("tests/symfric/integrator/step/test_written.py",)
 
 BESIDE = (
     Mutant(
-        "a room stands for the function in it", FRONTS,
-        "if not (isinstance(value, ModuleType) and name in self._places):", "if True:", T_FRONTS,
+        "a submodule replaces the function of its name", LAZY,
+        "if not (isinstance(value, ModuleType) and name in self._places):", "if True:", T_LAZY,
     ),
     Mutant(
         "the table of commands loads them", "symfric/cli/app.py",
         "formatter.write_dl([*COMMANDS.items()])",
-        "formatter.write_dl([(n, self.get_command(ctx, n).help) for n in COMMANDS])", T_FRONTS,
+        "formatter.write_dl([(n, self.get_command(ctx, n).help) for n in COMMANDS])", T_LAZY,
     ),
     Mutant(
         "an exit leaves its compiler alone", BACKGROUND,

@@ -224,14 +224,14 @@ LEVELS = 3
 PULSE = 10.0
 """Height of a pulse within a jump, over that of the jump."""
 BRIEF = 16
-"""Intervals of the grid that stages of one step may lie on both sides of."""
+"""Length of a pulse, in intervals of the grid, that may lie between two stages of a step."""
 MOST_JUMPS = 64
-"""A function with more jumps than this is looked at on the grid only."""
+"""Jumps of a function above which it is sampled on the grid only."""
 HALVINGS = 60
 """Halvings of an interval of the grid, down to rounding."""
 
 HUGE = 1e300
-"""What is larger counts as this: differences of values are to be finite."""
+"""Bound of values, so that their differences are finite."""
 
 QUICKEST = 1.0
 """Percent of the span that set the pace of a function: more than what a few jumps take."""
@@ -271,7 +271,7 @@ class _Look(NamedTuple):
 
 @lru_cache(64)
 def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
-    """The look at a function of time; None for a constant."""
+    """Levels and pulses of a function of time; None for a constant."""
     expression = ca.SX.deserialize(function)
     time = ca.symvar(expression)
     if not time:
