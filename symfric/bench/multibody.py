@@ -10,26 +10,9 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from symfric.bench import exudyn_peer, table
+from symfric.bench import exudyn_peer, mechanisms, table
 from symfric.bench.contenders import MECHANISMS, Array, Contender
-from symfric.bench.mechanisms import (
-    DRIFT_S,
-    SIZES,
-    ChainRow,
-    CompileRow,
-    CountRow,
-    DriftRow,
-    Fact,
-    NormRow,
-    chain,
-    compile_rows,
-    counts,
-    drifts,
-    exponent,
-    facts,
-    norms,
-    scaling,
-)
+from symfric.bench.mechanisms import SIZES, chain
 from symfric.bench.table import best_time, unwarned
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.simulate import simulate
@@ -128,12 +111,12 @@ class MultibodyBenchmark(table.Report):
     """
 
     runs: tuple[RunRow, ...]
-    compiled: tuple[CompileRow, ...] = ()
-    counts: tuple[CountRow, ...] = ()
-    chains: tuple[ChainRow, ...] = ()
-    facts: tuple[Fact, ...] = ()
-    norms: tuple[NormRow, ...] = ()
-    drifts: tuple[DriftRow, ...] = ()
+    compiled: tuple[mechanisms.CompileRow, ...] = ()
+    counts: tuple[mechanisms.CountRow, ...] = ()
+    chains: tuple[mechanisms.ChainRow, ...] = ()
+    facts: tuple[mechanisms.Fact, ...] = ()
+    norms: tuple[mechanisms.NormRow, ...] = ()
+    drifts: tuple[mechanisms.DriftRow, ...] = ()
     skipped: dict[str, str] = field(default_factory=dict[str, str])
 
     def loosest(self, case: str, integrator: str, bound: float) -> RunRow | None:
@@ -229,7 +212,10 @@ class MultibodyBenchmark(table.Report):
         """Growth of instructions and time of a step with the links, where chains were measured."""
         if len(self.chains) < 2:
             return {}
-        return {column: exponent(self.chains, column) for column in ("instructions", "step_s")}
+        return {
+            column: mechanisms.exponent(self.chains, column)
+            for column in ("instructions", "step_s")
+        }
 
     def drawn(self) -> tuple[Any, ...]:
         """Work-precision diagram: time against error, a panel per case."""
@@ -253,12 +239,12 @@ def bench_multibody(
     runs, skipped = _runs(quick, progress)
     return MultibodyBenchmark(
         runs=tuple(runs),
-        compiled=tuple(compile_rows(formulations)),
-        counts=tuple(counts(formulations)),
-        chains=tuple(scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
-        facts=tuple(facts()),
-        norms=tuple(norms(formulations)),
-        drifts=tuple(drifts(1.0 if quick else DRIFT_S)),
+        compiled=tuple(mechanisms.compile_rows(formulations)),
+        counts=tuple(mechanisms.counts(formulations)),
+        chains=tuple(mechanisms.scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
+        facts=tuple(mechanisms.facts()),
+        norms=tuple(mechanisms.norms(formulations)),
+        drifts=tuple(mechanisms.drifts(1.0 if quick else mechanisms.DRIFT_S)),
         skipped=skipped,
     )
 
