@@ -1,4 +1,4 @@
-"""`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
+"""`symfric codegen`: generate C99 for a friction law or a plant and verify it on this machine."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -30,7 +30,7 @@ def codegen(
         Path | None,
         argument(
             "FIT.json|ROBOT.urdf",
-            "What `symfric identify --json` wrote; a robot with --inverse-dynamics.",
+            "Output of `symfric identify --json`; or a robot, with --inverse-dynamics.",
         ),
     ] = None,
     law: Annotated[
@@ -44,7 +44,7 @@ def codegen(
         str | None,
         option(
             "--scene NAME",
-            "The plant of this scene, or FILE.urdf, with the law.",
+            "Plant: this scene, or FILE.urdf, with the law.",
             completions.scenes,
         ),
     ] = None,
@@ -52,64 +52,67 @@ def codegen(
         str | None,
         option(
             "--method NAME",
-            "Formula of a plant; default rodas3, of mechanisms with friction backward_euler.",
+            "Method of a plant; default rodas3, for mechanisms with friction backward_euler.",
         ),
     ] = None,
     real: Annotated[
         str | None,
         option(
-            "--real", "Type of numbers; default both, double for a plant.", metavar="|".join(REALS)
+            "--real",
+            "Floating point type; default both, for a plant double.",
+            metavar="|".join(REALS),
         ),
     ] = None,
     step_size: Annotated[
         float | None,
-        option("--step-size SECONDS", "Step as a constant, for laws with states, plants."),
+        option("--step-size SECONDS", "Constant step, for plants and laws with states."),
     ] = None,
     name: Annotated[
-        str | None, option("--name NAME", "C identifier; default from the law.")
+        str | None, option("--name NAME", "C identifier; default: that of the law.")
     ] = None,
     fold: Annotated[
-        bool, option("--fold", "Bake all parameters in; without it all can be changed.")
+        bool, option("--fold", "Make all parameters constants; default: all are variable.")
     ] = False,
     free: Annotated[
-        list[str] | None, option("--free NAME", "Keep this one variable, bake the others in.")
+        list[str] | None,
+        option("--free NAME", "Keep this parameter variable; others are constants."),
     ] = None,
     guards: Annotated[
-        bool, option("--guards/--no-guards", "Clamp, repair and report what cannot be.")
+        bool, option("--guards/--no-guards", "Clamp, repair and report invalid inputs.")
     ] = True,
     kit: Annotated[
         bool,
-        option("--kit/--no-kit", "Unit test, CMake, Python and Simulink files beside the sources."),
+        option("--kit/--no-kit", "Add unit test, CMake, Python and Simulink files."),
     ] = True,
     core: Annotated[
         list[str] | None,
-        option("--core NAME", f"Measure it on this core, too: {', '.join(CORES)}."),
+        option("--core NAME", f"Measure on this core: {', '.join(CORES)}."),
     ] = None,
     turning: Annotated[
-        bool, option("--turning", "A law in rad/s and N m: units in the header.")
+        bool, option("--turning", "Rotation: units rad/s and N m in the header.")
     ] = False,
     inverse_dynamics: Annotated[
         bool,
         option(
             "--inverse-dynamics",
-            "Forces of the joints that a motion needs, of ROBOT.urdf or --scene, with the "
-            "friction of --law or of the file.",
+            "Joint forces for a motion of ROBOT.urdf or --scene, with the friction of --law or of "
+            "the file.",
         ),
     ] = False,
     payload: Annotated[
-        str | None, option("--payload FRAME", "Link or frame that carries a load, set at run time.")
+        str | None, option("--payload FRAME", "Link or frame with a load that is set at run time.")
     ] = None,
     tunable_gravity: Annotated[
-        bool, option("--tunable-gravity", "Gravity is set at run time.")
+        bool, option("--tunable-gravity", "Set gravity at run time.")
     ] = False,
     compensator: Annotated[
-        bool, option("--compensator", "A friction compensator of the law, or of a fit.")
+        bool, option("--compensator", "Friction compensator of the law or of a fit.")
     ] = False,
     compensation: Annotated[
         list[str] | None,
         option(
             "--compensation NAME=VALUE",
-            "What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
+            "Setting, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
             f"{', '.join(subjects.SETTINGS)}.",
         ),
     ] = None,
@@ -120,10 +123,10 @@ def codegen(
 ) -> None:
     """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
-    The C is compiled and compared with CasADi over more than 20 000 steps, bad inputs and other
-    parameters among them. The exit status is 1 where it could not be verified, as without a
-    compiler, or differs; the files are written all the same.
-    The law of a fit has the fitted numbers, and so has its drive with `--scene drive`.
+    The C is compiled and compared with CasADi over more than 20 000 steps, including bad inputs and
+    other parameters. The exit status is 1 if it differs or could not be verified, for example
+    without a compiler; the files are written anyway.
+    The law of a fit has the fitted parameters, and so has its drive with `--scene drive`.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
 
@@ -184,20 +187,20 @@ def codegen(
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
     if forces:
         names = ", ".join(forces)
-        output.note(f"{names}: forces, fitted under a load of 1 N; call the C with N = 1")
+        output.note(f"{names}: fitted as forces under a load of 1 N; call the C with N = 1")
     measured = on_cores(generated, core or ())
     generated = with_cores(generated, [m.to_dict() for m in measured])
-    _proved(text, generated, verification, measured, json)
+    _report(text, generated, verification, measured, json)
 
 
-def _proved(
+def _report(
     text: str,
     generated: Generated,
     verification: Verification,
     measured: list[Measured],
     json: str | None,
 ) -> None:
-    """Say what was written and whether it was verified; the exit status says it, too."""
+    """Print files and verification; the exit status is 1 if it failed."""
     output.emit_json(to_dict(text, generated, verification, measured), json)
     if json != "-":
         show_verification(verification)
@@ -209,7 +212,7 @@ def _proved(
 
 
 def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
-    """The block on Cortex-M cores, in every type that was generated."""
+    """Measure the block on Cortex-M cores in every generated type."""
     return [
         measure(generated.block, real, core, guards=generated.guards)
         for core in cores
@@ -220,7 +223,7 @@ def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
 def to_dict(
     law: str, generated: Generated, verification: Verification, measured: Sequence[Measured]
 ) -> dict[str, Any]:
-    """Content of `--json`."""
+    """Return the content of `--json`."""
     return {
         "law": law,
         "files": [str(path) for path in generated.files],
@@ -231,12 +234,12 @@ def to_dict(
 
 
 def show_verification(verification: Verification) -> None:
-    """Print how the C compares with CasADi, one row a floating point type."""
+    """Print the comparison of the C with CasADi, one row per floating point type."""
     compiler = f" ({verification.compiler})" if verification.compiler else ""
     output.show(f"{verification.name}: {verification.status}{compiler}")
     if verification.checks:
         output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "of", "foreign symbols"],
+            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign symbols"],
             [
                 (
                     check.real,
@@ -253,25 +256,25 @@ def show_verification(verification: Verification) -> None:
     for check in verification.checks:
         if check.ties:
             output.show(
-                f"{check.real}: in {check.ties} of {check.steps} steps a mode ties and rounding "
-                "decides it, in CasADi as in C"
+                f"{check.real}: in {check.ties} of {check.steps} steps rounding decides a mode, "
+                "in CasADi as in C"
             )
 
 
 def compared(check: Check) -> str:
-    """The comparison of the C with CasADi, in words."""
+    """Describe the comparison of the C with CasADi."""
     return "differs" if check.ulp is None and not check.near else bits(check.ulp)
 
 
 def bits(ulp: int | None) -> str:
-    """The distance of the C in double from CasADi, in words."""
+    """Describe the distance of the C in double from CasADi."""
     if ulp is None:
         return "within rounding"
     return "bit for bit equal" if ulp == 0 else f"{ulp} ulp apart"
 
 
 def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print what the C needs here, by size and -fstack-usage, and on other cores, by QEMU."""
+    """Print memory on this machine, by size and -fstack-usage, and cost on other cores, by QEMU."""
     rows: list[tuple[str | float, ...]] = []
     for real in generated.reals:
         found = generated.manifest["real"][real].get("measured")
@@ -283,7 +286,8 @@ def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
         numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
         rows.append((m.real, m.core, *numbers))
     if rows:
-        head = ["type", "built by, for", "code [B]", "stack [B]", "instructions", "at most"]
+        head = ["type", "compiler or core", "code [B]", "stack [B]", "average instructions",
+                "most instructions"]  # fmt: skip
         output.show_table(head, rows)
     for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
         output.show(f"{core}: {status}")

@@ -1,6 +1,7 @@
-"""`symfric laws`: what laws there are, and what one of them says."""
+"""`symfric laws`: list the friction laws, or show one in full."""
 
 from dataclasses import asdict
+from functools import partial
 from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any
@@ -41,10 +42,9 @@ def laws(
 ) -> None:
     """List the friction laws, or show one in full.
 
-    In full: equation, limits, source, parameters with units and bounds, and a picture. With
-    --figure or --compare its behaviour instead, computed as in the papers; --figure takes
-    scenes such as rabinowicz, too. --set then holds for every law that is compared, and
-    --set gms.C=10 for one of them.
+    In full: equation, limits, source, parameters with units and bounds, and a picture. --figure
+    and --compare show its behaviour instead, computed as in the papers; --figure also accepts
+    scenes such as rabinowicz. --set then applies to every law, and --set gms.C=10 to one of them.
 
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
@@ -65,10 +65,8 @@ def laws(
         load = 1.0 if normal_force is None else normal_force
         draw(chosen, load, plot)
     described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
-    output.emit_json(described[0] if name else {"laws": described}, json)
-    if json != "-":
-        show_law(name, chosen[name]) if name else show_list(chosen)
-    output.say_written(plot, json)
+    show = partial(show_law, name, chosen[name]) if name else partial(show_list, chosen)
+    output.finish(described[0] if name else {"laws": described}, json, show, plot)
 
 
 def behaviour(
@@ -80,7 +78,7 @@ def behaviour(
     plot: Path | None,
     json: str | None,
 ) -> None:
-    """Compute a figure of one or several laws, and write, draw or summarise it."""
+    """Compute a figure of one or several laws; write, draw or summarise it."""
     if not name:
         raise ValueError("--figure, --compare: expected the name of a law before it, got none")
     scenario = "profile" if figure is None else figure
@@ -91,14 +89,11 @@ def behaviour(
         data = compare(chosen, scenario, load)
     if plot:
         data.plot(plot)
-    output.emit_json(data.to_dict(), json)
-    if json != "-":
-        show_figure(data)
-    output.say_written(plot, json)
+    output.finish(data.to_dict(), json, partial(show_figure, data), plot)
 
 
 def show_figure(data: FigureData) -> None:
-    """The range of every column that is drawn, for each curve."""
+    """Print the range of every column that is drawn, for each curve."""
     drawn = list(dict.fromkeys(column for panel in data.panels for column in panel))
     rows = [
         (curve.label, name, data.units[name], float(curve[name].min()), float(curve[name].max()))
@@ -111,7 +106,7 @@ def show_figure(data: FigureData) -> None:
 
 
 def to_dict(law: AnyLaw) -> dict[str, Any]:
-    """Content of `--json` for one law."""
+    """Return the content of `--json` for one law."""
     return {
         "title": title(law),
         "phenomena": {code: PHENOMENA[code] for code in phenomena(law)},
@@ -127,14 +122,7 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
         "inputs": {i.name: {"unit": i.unit, "doc": i.doc} for i in law.inputs},
         "options": {o.name: asdict(o) for o in options(law).values()},
         "parameters": {
-            p.name: {
-                "value": p.value,
-                "unit": p.unit,
-                "role": p.role,
-                "lower": p.lower,
-                "upper": p.upper,
-                "doc": p.doc,
-            }
+            p.name: {n: getattr(p, n) for n in ("value", "unit", "role", "lower", "upper", "doc")}
             for p in parameters(law).values()
         },
         "doc": "\n\n".join(getdoc(part) or "" for part in parts(law)),
@@ -142,17 +130,17 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
 
 
 def costs(law: AnyLaw) -> str:
-    """The quantities that the instructions of `law` compute."""
+    """Return the quantity whose cost in instructions is reported."""
     return "a step of one contact" if isinstance(law, Population) else "force and rate"
 
 
 def title(law: AnyLaw) -> str:
-    """The first line of the docstring."""
+    """Return the first line of the docstring."""
     return (getdoc(type(law)) or "").partition("\n")[0].removesuffix(".")
 
 
 def show_list(chosen: dict[str, AnyLaw]) -> None:
-    """All laws, one a line, and what the codes mean."""
+    """Print all laws, one per line, and the meaning of the codes."""
     output.show_table(
         ["law", "shows", "z", "value", "slope", "formula"],
         [
@@ -173,7 +161,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
         f"\nshows:\n{codes}\n"
         "z: number of states, then smoothness (set: set-valued)\n"
         "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
-        "formula: what it was compared with; unverified: written from memory\n"
+        "formula: verification of the formula; unverified: written from memory\n"
         "symfric laws NAME shows equation, parameters and more;\n"
         f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
         f"Other names: {others}.\n"
@@ -183,7 +171,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
 
 
 def show_law(name: str, law: AnyLaw) -> None:
-    """Docstring, facts and parameters of one law."""
+    """Print docstring, properties and parameters of one law."""
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
     shown = ", ".join(PHENOMENA[code] for code in phenomena(law))

@@ -86,7 +86,7 @@ def show(text: str = "") -> None:
 
 
 def show_doc(text: str) -> None:
-    """Print a docstring: equations as they stand, sentences wrapped anew."""
+    """Print a docstring: equations unchanged, paragraphs wrapped again."""
     paragraph: list[str] = []
     for line in [*text.splitlines(), ""]:
         kept = not line or line.startswith(" ")
@@ -101,11 +101,11 @@ def show_doc(text: str) -> None:
 
 @contextmanager
 def progress(text: str) -> Generator[Callable[[float], None]]:
-    """A bar on standard error where that is a terminal; takes the fraction done."""
+    """Show a progress bar on a terminal; yield a function that takes the fraction done."""
     if not sys.stderr.isatty():
         yield lambda fraction: None
         return
-    from rich.progress import Progress  # noqa: PLC0415  (of terminals only)
+    from rich.progress import Progress  # noqa: PLC0415  (for terminals only)
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=1.0)
@@ -117,7 +117,7 @@ def progress(text: str) -> Generator[Callable[[float], None]]:
 
 
 def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
-    """`tell` as what takes the name of the item, too."""
+    """Return `tell` as a function of an item name, which is ignored, and the fraction done."""
 
     def advance(name: str, fraction: float) -> None:
         del name
@@ -127,7 +127,7 @@ def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
 
 
 def note(text: str) -> None:
-    """Say `text` on standard error, where it disturbs no result."""
+    """Print `text` on standard error."""
     typer.echo(text, err=True)
 
 
@@ -142,15 +142,28 @@ def emit_json(content: Mapping[str, Any], destination: str | None) -> None:
         write_text(destination, text + "\n")
 
 
+def finish(
+    content: Mapping[str, Any],
+    json: str | None,
+    show: Callable[[], None],
+    *paths: str | Path | None,
+) -> None:
+    """Write JSON, call `show` unless it went to standard output, and name the files written."""
+    emit_json(content, json)
+    if json != "-":
+        show()
+    say_written(*paths, json)
+
+
 def say_written(*paths: str | Path | None) -> None:
-    """Name the files written, on standard error."""
+    """Print the names of the files written on standard error."""
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")
 
 
 def say_folder(folder: Path, paths: Sequence[Path]) -> None:
-    """Name the files written into one folder, on standard error, in lines of a terminal's width."""
+    """Print the names of the files written into a folder on standard error, in wrapped lines."""
     names = "  ".join(str(path.relative_to(folder)) for path in paths)
     note(f"wrote {len(paths)} files into {folder}:")
     note(
@@ -166,7 +179,7 @@ def say_folder(folder: Path, paths: Sequence[Path]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON can hold it: infinity and NaN become null."""
+    """Return `value` as JSON data; infinity and NaN become None."""
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -177,8 +190,8 @@ def plain(value: Any) -> Any:
 
 
 def printable(text: str) -> str:
-    """`text` from the command line as UTF-8 can hold it.
+    """Return `text` from the command line as valid UTF-8.
 
-    Where the locale is C, Python keeps bytes that it cannot read as lone surrogates.
+    In the C locale, Python keeps undecodable bytes as lone surrogates.
     """
     return os.fsencode(text).decode("utf-8", errors="replace")

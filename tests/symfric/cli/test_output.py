@@ -96,4 +96,4 @@ def test_a_full_disk_is_told_with_the_way_out() -> None:
     for file in (("run.npz",), ()):
         told = sentence(OSError(ENOSPC, "No space left on device", *file))
         place = " for 'run.npz'" if file else ""
-        assert told.startswith(f"expected room on the disk, got none left{place}; free some")
+        assert told.startswith(f"expected free disk space, got none{place}; free some")
