@@ -102,11 +102,19 @@ CONTROLLERS = (
 EVENT = (
     Mutant(
         "a falling event fires on the way up", ISOLATION,
-        "(before < 0) & (after >= 0) & (directions >= 0)", "(before < 0) & (after >= 0)",
+        "(before < 0) * (after >= 0) * (directions >= 0)", "(before < 0) * (after >= 0)",
         T_EVENTS,
     ),
     Mutant(
         "a step behind an event may be lost in t", EVENTS, ", SURE * abs(t))", ")", T_EVENTS,
+    ),
+    Mutant(
+        "the virtual machine passes by steps with a possible event", EVENTS,
+        "some = self._some[: len(part)] != 0", "some = self._some[: len(part)] > 1", T_ISOLATION,
+    ),
+    Mutant(
+        "values before a step are those of the last step of a call", EVENTS,
+        "self._ends[passed_by - 1]", "self._ends[-1]", ("tests/symfric/integrator/running/test_crossings.py",),
     ),
     Mutant(
         "no piece of a step is in doubt", ISOLATION,

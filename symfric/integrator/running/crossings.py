@@ -12,6 +12,8 @@ quarters of its own, down to the event tolerance.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 from math import inf
 from typing import Any, final
 
@@ -28,6 +30,8 @@ LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where each step, and each piece in doubt, is looked at."""
 FINER = 64
 """Pieces of a step that are cut, at most: more than two crossings an event tolerance apart take."""
+AT_ONCE = 8
+"""Steps that one call of `Crossings.possible` looks at."""
 ROUNDING = 64 * float(np.finfo(float).eps)
 """Bends of an expression below this part of its terms are rounding: no sign there is a crossing."""
 STRAIGHT = 3.01
@@ -131,6 +135,25 @@ class Crossings:
     def data(self) -> int:
         """Number of run data d."""
         return self.jump.numel_in(1)
+
+    @cached_property
+    def possible(self) -> ca.Function:
+        """(values before, `AT_ONCE` rows, their d) -> values at their ends, and if one may happen.
+
+        The same tests as those of `Isolation`, without noise, for the virtual machine, which would
+        need longer for them than for the steps.
+        """
+        five, directions = ca.SX.sym("five", len(LOOKS) * self.count), ca.DM(self.directions)
+        none, pieces = ca.SX.zeros(self.count), ca.vertsplit(five, self.count)
+        crossed = [passed(*ends, directions) for ends in pairwise(pieces)]
+        test = ca.vertcat(self.doubts(five, none), *crossed)
+        some = ca.Function("symfric_some", [five], [ca.mmax(test)])
+        before, row = ca.MX.sym("before", self.count), ca.MX.sym("row", self.record.width)
+        d = ca.MX.sym("d", self.data)
+        after = self.looks(0.0, row, d)
+        results = [after[-self.count :], some(ca.vertcat(before, after))]
+        step = ca.Function("symfric_possible", [before, row, d], results)
+        return step.mapaccum(AT_ONCE)
 
     @property
     def functions(self) -> tuple[ca.Function, ...]:
@@ -332,9 +355,9 @@ class Isolation:
 
 
 def passed(before: Any, after: Any, directions: Any) -> Any:
-    """Whether events go through zero in their directions."""
-    rising = (before < 0) & (after >= 0) & (directions >= 0)
-    return rising | ((before > 0) & (after <= 0) & (directions <= 0))
+    """Return where events pass through zero in their directions; of arrays, or of SX and DM."""
+    rising = (before < 0) * (after >= 0) * (directions >= 0)
+    return rising + (before > 0) * (after <= 0) * (directions <= 0)
 
 
 def locate(

@@ -118,7 +118,7 @@ class VmEngine:
 
         With `events` these are carried out on the way; `size` attempts are made in one call.
         """
-        batch, search = self._batch(size), None if events is None else Search(events)
+        batch, search = self._batch(size), None if events is None else events.search
         S_out, D = batch.S_out, batch.D
         batch.R[:] = R
         found: list[Array] = []
@@ -208,10 +208,13 @@ def _searched(
         R: what was given.
     """
     took, used = attempts
-    for i, k in enumerate(np.flatnonzero(took)):
+    accepted, i = np.flatnonzero(took), 0
+    while (i := i + search.without(records[i:], R)) < accepted.size:
+        k = int(accepted[i])
         change, asked = search(records[i], S_out[k], R)
+        i += 1
         if change:
-            return records[: i + (change is not Change.DROPPED)], int(k) + 1, asked
+            return records[: i - (change is Change.DROPPED)], k + 1, asked
     return records, used, Happened.NOTHING
 
 

@@ -7,7 +7,7 @@ C (`search.c`), operation by operation.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import partial
+from functools import cached_property, partial
 from typing import final
 
 import casadi as ca
@@ -18,6 +18,7 @@ from symfric.foundation.numeric import bound
 from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running.crossings import (
     ALIKE,
+    AT_ONCE,
     KEPT,
     LEAST,
     LOOKS,
@@ -74,6 +75,11 @@ class Eventful:
     memory: Array = field(init=False)
     rows: Array = field(init=False)
 
+    @cached_property
+    def search(self) -> "Search":
+        """The search of the virtual machine, with its buffers."""
+        return Search(self)
+
     def __post_init__(self) -> None:
         self.memory = Memory.new(self.crossings.count, self.tolerance)
         self.rows = np.empty((JUMPS, self.crossings.width))
@@ -118,6 +124,32 @@ class Search:
         self._doubts = _called(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
         self._none = np.zeros(self.crossings.count)
+        possible, count = self.crossings.possible, self.crossings.count
+        self._first, self._ends = np.zeros(count), np.zeros((AT_ONCE, count))
+        self._rows = np.zeros((AT_ONCE, self.crossings.record.width))
+        self._data, self._some = np.zeros((AT_ONCE, self.crossings.data)), np.zeros(AT_ONCE)
+        inputs = self._first, self._rows, self._data
+        self._possible = bound(possible, inputs, (self._ends, self._some))
+
+    def without(self, rows: Array, R: Array) -> int:
+        """Return how many accepted steps from the first of `rows` on have no event for certain."""
+        if self.memory[Memory.PHASE] != Memory.ON or self.memory[Memory.RESUME]:
+            return 0
+        self._data[:] = R[R.size - self.crossings.data :]
+        done = 0
+        while done < len(rows):
+            part = rows[done : done + AT_ONCE]
+            self._first[:], self._rows[: len(part)] = self._before, part
+            self._possible()
+            some = self._some[: len(part)] != 0
+            passed_by = int(some.argmax()) if some.any() else len(part)
+            if passed_by:
+                self._before[:] = self._ends[passed_by - 1]
+            done += passed_by
+            if passed_by < len(part):
+                break
+        self.eventful.steps += done
+        return done
 
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
         """Look for events in the accepted step `row`, which led to S.

@@ -40,7 +40,7 @@ INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
 same form."""
 
-EVENT_BATCH = 4
+EVENT_BATCH = 8
 """Attempts of one call of the virtual machine with events; those behind one are made in vain."""
 
 SPARE = 2
