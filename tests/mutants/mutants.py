@@ -114,7 +114,7 @@ EVENT = (
     ),
     Mutant(
         "values before a step are those of the last step of a call", EVENTS,
-        "self._ends[passed_by - 1]", "self._ends[-1]", ("tests/symfric/integrator/running/test_crossings.py",),
+        "self._ends[passed_by - 1]", "self._ends[-1]", T_EVENTS,
     ),
     Mutant(
         "no piece of a step is in doubt", ISOLATION,

@@ -140,8 +140,7 @@ class Crossings:
     def possible(self) -> ca.Function:
         """(values before, `AT_ONCE` rows, their d) -> values at their ends, and if one may happen.
 
-        The same tests as those of `Isolation`, without noise, for the virtual machine, which would
-        need longer for them than for the steps.
+        The tests of `Isolation`, without noise; the virtual machine saves most searches by it.
         """
         five, directions = ca.SX.sym("five", len(LOOKS) * self.count), ca.DM(self.directions)
         none, pieces = ca.SX.zeros(self.count), ca.vertsplit(five, self.count)
