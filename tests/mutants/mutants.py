@@ -34,7 +34,6 @@ WATCH = "symfric/integrator/step/attempt.py"
 EVENTS = "symfric/integrator/running/events.py"
 SEARCH = "symfric/integrator/running/search.c"
 CROSSINGS = "symfric/integrator/running/crossings.py"
-ISOLATION = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/emitter/emit.py"
@@ -101,7 +100,7 @@ CONTROLLERS = (
 
 EVENT = (
     Mutant(
-        "a falling event fires on the way up", ISOLATION,
+        "a falling event fires on the way up", CROSSINGS,
         "(before < 0) * (after >= 0) * (directions >= 0)", "(before < 0) * (after >= 0)",
         T_EVENTS,
     ),
@@ -117,7 +116,7 @@ EVENT = (
         "self._ends[passed_by - 1]", "self._ends[-1]", T_EVENTS,
     ),
     Mutant(
-        "no piece of a step is in doubt", ISOLATION,
+        "no piece of a step is in doubt", CROSSINGS,
         "suspects, sure = doubts != 0,", "suspects, sure = doubts < 0,", T_ISOLATION,
     ),
     Mutant(
@@ -133,7 +132,7 @@ EVENT = (
         "sizes[0] < first - noise", "sizes[0] < first - inf", T_ISOLATION,
     ),
     Mutant(
-        "a piece before a sure root is taken for empty", ISOLATION,
+        "a piece before a sure root is taken for empty", CROSSINGS,
         "if at[k] >= sure:", "if sure <= 1:", T_ISOLATION,
     ),
     Mutant(
