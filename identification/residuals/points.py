@@ -82,7 +82,7 @@ class Points:
         """Return the residuals of `data`.
 
         Raises:
-                ValueError: a subject without a law, missing channels, a law that needs an applied force
+            ValueError: a subject without a law, missing channels, a law that needs an applied force
                 or whose static level is unknown although break-away needs it.
         """
         del start

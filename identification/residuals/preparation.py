@@ -176,7 +176,7 @@ class Preparation:
         return found
 
     def _timeless(self) -> bool:
-        """Return True if the motion is independent of absolute time (no step must resolve 1e9 s)."""
+        """Return True if the motion is independent of the time origin (no step resolves 1e9 s)."""
         given = [u for u in self.inputs.values() if not isinstance(u, str)]
         model, outputs = self.model, [self.model.outputs[n].expression for n in self.signals
                                       if n in self.model.outputs]  # fmt: skip

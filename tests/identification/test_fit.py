@@ -106,7 +106,7 @@ def test_inverse_dynamics_finds_mass_and_friction() -> None:
 
 
 def test_what_the_kind_takes_out_of_free() -> None:
-    with pytest.raises(ValueError, match="dead_time, which Points has not"):
+    with pytest.raises(ValueError, match="dead_time, which Points lacks"):
         Fit(Points(), "stribeck", points(), free={"dead_time": (0.0, 0.1)}).solve()
     fit = Fit(Shooting(), "lugre", motion(Coulomb(mu_d=1.0)), free={"x0": "given"})
     assert fit.prepared().task.unknowns.nuisance == ()
