@@ -207,7 +207,7 @@ def broken_compilers(tmp_path: Path) -> dict[str, str]:
     ("kind", "message"),
     [
         ("refusing", "refusing failed with status 1: licence expired"),
-        ("silent", "expected to keep compiled code"),
+        ("silent", "expected a folder to store and load compiled code"),
         ("absent", "expected a C compiler"),
         ("hanging", "hanging came to no end within"),
     ],

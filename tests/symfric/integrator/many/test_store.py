@@ -293,7 +293,7 @@ def test_damage_is_told_and_the_results_are_right(tmp_path: Path) -> None:
     first = run()
     (folder,) = tmp_path.iterdir()
     (folder / "x.npy").unlink()
-    with pytest.warns(UserWarning, match="out: 3 of 3 chunks in .* are not what was written"):
+    with pytest.warns(UserWarning, match="out: 3 of 3 chunks in .* have been deleted"):
         assert_same(run(), first)
     assert_same(run(), first)
 
@@ -317,7 +317,7 @@ def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         small.put(0, solved(0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
         with pytest.raises(
-            ValueError, match=r"expected room for members from 2 on .* got File too large"
+            ValueError, match=r"expected disk space for members from 2 on .* got File too large"
         ):
             small.put(2, solved(2))
     finally:
