@@ -15,15 +15,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from symfric.cli import completions, output
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    WorkersOption,
-    argument,
-    check_folder,
-    check_outputs,
-    option,
-)
+from symfric.cli import options as opt
+from symfric.cli.options import argument, option
 from symfric.foundation.files import make_folder
 from symfric.foundation.parameters import check_names
 
@@ -67,11 +60,11 @@ def bench(
     links: Annotated[
         str | None, option("--links N,N,...", "Lengths of chains; multibody only.")
     ] = None,
-    plot: PlotOption = None,
+    plot: opt.PlotOption = None,
     csv: Annotated[
         Path | None, option("--csv FILE.csv", "Runs of multibody, regularisation.")
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Measure symfric beside other integrators.
 
@@ -100,7 +93,7 @@ def bench(
     given = [o for o, value, where in only if value is not None and subject not in where]
     if given:
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
-    check_outputs(json, csv, picture=plot)
+    opt.check_outputs(json, csv, picture=plot)
     from symfric import bench as measures  # noqa: PLC0415  (only this command needs it)
 
     sizes = {"links": lengths(links)} if links else {}
@@ -150,7 +143,7 @@ def gallery(
     ] = None,
     out: Annotated[Path, option("--out DIR", "Where pictures and numbers go.")] = Path("gallery"),
     quick: Annotated[bool, option("--quick", "At reduced size, a second a figure.")] = False,
-    workers: WorkersOption = None,
+    workers: opt.WorkersOption = None,
     listed: Annotated[bool, option("--list", "List the figures and compute none.")] = False,
 ) -> None:
     """Compute the figures of the papers again.
@@ -241,11 +234,11 @@ def stress(
     out: Annotated[Path, option("--out DIR", "Where failing cases are kept.")] = Path(
         "stress_cases"
     ),
-    workers: WorkersOption = None,
+    workers: opt.WorkersOption = None,
     limit: Annotated[
         float, option("--limit SECONDS", "Processor time of a case; more counts as hanging.")
     ] = 120.0,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Judge runs of random laws in random scenes.
 
@@ -264,7 +257,7 @@ def stress(
     from symfric.stress.cases import Case  # noqa: PLC0415  (likewise)
     from symfric.stress.judge import FAILING  # noqa: PLC0415  (likewise)
 
-    check_outputs(json)
+    opt.check_outputs(json)
     if case is not None:
         one = Case.read(case)
         verdict = rerun(one, limit)
@@ -273,7 +266,7 @@ def stress(
             show_verdict(one, verdict)
         passed, saved = verdict.kind not in FAILING, []
     else:
-        check_folder(out)
+        opt.check_folder(out)
         written = monotonic()
         with output.progress(f"{cases} cases") as show_fraction:
 

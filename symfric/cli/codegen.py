@@ -7,29 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
+from symfric.cli import codegen_subject as subjects
 from symfric.cli import completions, output
-from symfric.cli.codegen_subject import (
-    PLANT,
-    SETTINGS,
-    check_applicable,
-    chosen_law,
-    compensator_block,
-    machine_of,
-    robot_block,
-    subject_of,
-)
+from symfric.cli import options as opt
 from symfric.cli.machines import LawOfOption, PresetOption, kind_of
-from symfric.cli.options import (
-    JsonOption,
-    SetOption,
-    argument,
-    assignments,
-    check_folder,
-    check_outputs,
-    numbers,
-    option,
-    with_settings,
-)
+from symfric.cli.options import argument, option
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.codegen.generated import with_cores
 from symfric.codegen.verification import Check
@@ -55,7 +37,7 @@ def codegen(
         str | None,
         option("--law NAME", "Friction law, such as lugre; or FIT.json.", completions.laws),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     scene: Annotated[
@@ -128,13 +110,13 @@ def codegen(
         option(
             "--compensation NAME=VALUE",
             "What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
-            f"{', '.join(SETTINGS)}.",
+            f"{', '.join(subjects.SETTINGS)}.",
         ),
     ] = None,
     compiler: Annotated[
         str | None, option("--compiler COMMAND", "Default: $CC, gcc or clang.")
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
@@ -150,15 +132,15 @@ def codegen(
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
     """
     check_names("--core", core or (), CORES)
-    check_folder(out)
-    check_outputs(json)
+    opt.check_folder(out)
+    opt.check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
-    chosen = None if inverse_dynamics else chosen_law(fit, law)
-    subject = subject_of(chosen, scene, compensator)
+    chosen = None if inverse_dynamics else subjects.chosen_law(fit, law)
+    subject = subjects.subject_of(chosen, scene, compensator)
     kind = real
     if kind is None:
-        kind = "double" if subject == PLANT else "both"
+        kind = "double" if subject == subjects.PLANT else "both"
     check_names("--real", [kind], REALS)
     given = {
         "--step-size": step_size is not None, "--method": method is not None, "--free": bool(free),
@@ -166,33 +148,35 @@ def codegen(
         "--tunable-gravity": tunable_gravity, "--compensation": bool(compensation),
         "--preset": preset is not None, "--law-of": bool(law_of),
     }  # fmt: skip
-    check_applicable(subject, [option for option, there in given.items() if there])
+    subjects.check_applicable(subject, [option for option, there in given.items() if there])
     own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     adjustable, forces = None, ()
     if chosen is None:
-        values = numbers("--set", settings)
-        made: Block | AnyLaw = robot_block(
+        values = opt.numbers("--set", settings)
+        made: Block | AnyLaw = subjects.robot_block(
             fit, scene, law, values,
             name=name, h=step_size, fold=fold, payload=payload, tunable_gravity=tunable_gravity,
         )  # fmt: skip
         text, own = law or made.name, {}
     elif scene is not None:
         kind_of_scene = kind_of(scene, "--scene", preset, law_of)
-        machine = machine_of(scene, kind_of_scene, chosen, assignments("--set", settings))
+        machine = subjects.machine_of(
+            scene, kind_of_scene, chosen, opt.assignments("--set", settings)
+        )
         own["method"] = "auto" if method is None else method
         made = plant_block(machine, **own)
         adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
         text, own = chosen.text, {}
     elif compensator:
-        compensated = with_settings(chosen.law, chosen.text, settings)
-        made = compensator_block(
+        compensated = opt.with_settings(chosen.law, chosen.text, settings)
+        made = subjects.compensator_block(
             compensated, chosen.drive, compensation or (),
             name=name, h=step_size, turning=turning, fold=fold,
         )  # fmt: skip
         text, own = chosen.text, {}
     else:
-        made = with_settings(chosen.law, chosen.text, settings)
+        made = opt.with_settings(chosen.law, chosen.text, settings)
         if turning or chosen.turning:
             own["turning"] = True
         text, forces = chosen.text, chosen.forces

@@ -4,16 +4,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from symfric.cli import completions, output
+from symfric.cli import options as opt
 from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
-from symfric.cli.options import (
-    JsonOption,
-    SetOption,
-    argument,
-    assignments,
-    check_outputs,
-    held_by_file,
-    option,
-)
+from symfric.cli.options import argument, option
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
 from symfric.fmu.export import KINDS
@@ -38,7 +31,7 @@ def export_fmu(
     law: Annotated[
         str | None, option("--law NAME", "Friction law of a scene.", completions.laws)
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     free: Annotated[
@@ -63,7 +56,7 @@ def export_fmu(
     name: Annotated[
         str | None, option("--name NAME", "Model identifier; default from the model.")
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Write a scene or a model as a Functional Mock-up Unit.
 
@@ -74,9 +67,9 @@ def export_fmu(
 
     Example: symfric export-fmu press.py:model --rtol 1e-8
     """
-    check_outputs(out, json)
+    opt.check_outputs(out, json)
     make = from_file if ".py" in what else scene_of
-    model = make(what, law, assignments("--set", settings), preset, law_of)
+    model = make(what, law, opt.assignments("--set", settings), preset, law_of)
     unit = exported(
         model,
         Path(f"{named(model, what)}.fmu") if out is None else out,
@@ -135,7 +128,7 @@ def from_file(
             raise ValueError(f"{name}: expected none with '{what}', which has its laws")
     kind = Model | Scene
     values = {n: checks.parsed(f"--set {n}", text) for n, text in settings.items()}
-    return held_by_file("export-fmu", what, DEFAULT_NAME, values, "Model", kind)
+    return opt.held_by_file("export-fmu", what, DEFAULT_NAME, values, "Model", kind)
 
 
 def to_dict(unit: Exported) -> dict[str, Any]:

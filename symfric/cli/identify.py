@@ -22,21 +22,10 @@ from identification.starts.start import findings_of
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status
+from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import LawsOption
-from symfric.cli.options import (
-    HtmlOption,
-    JsonOption,
-    MissingOption,
-    PlotOption,
-    ResampleOption,
-    argument,
-    assignments,
-    check_outputs,
-    law_names,
-    numbers,
-    option,
-)
+from symfric.cli.options import argument, option
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
@@ -102,7 +91,7 @@ def _named_or_all(
     if not texts:
         return None
     if all("=" in text for text in texts):
-        return assignments(option, texts)
+        return opt.assignments(option, texts)
     if len(texts) > 1:
         raise ValueError(f"{option}: expected {such}, repeated, or once {other}, got both")
     return [part.strip() for part in texts[0].split(",")]
@@ -208,8 +197,8 @@ def identify(
     variable: Annotated[
         str | None, option("--variable NAME", "Struct or matrix in a .mat file.")
     ] = None,
-    missing: MissingOption = "refuse",
-    resample: ResampleOption = False,
+    missing: opt.MissingOption = "refuse",
+    resample: opt.ResampleOption = False,
     normal_force: Annotated[
         float, option("--normal-force NUMBER", "Normal force [N]; with 1 coefficients are forces.")
     ] = 1.0,
@@ -232,9 +221,9 @@ def identify(
     profiles: Annotated[
         list[str] | None, option("--profile NAME", "Interval by profile likelihood.")
     ] = None,
-    html: HtmlOption = None,
-    plot: PlotOption = None,
-    json: JsonOption = None,
+    html: opt.HtmlOption = None,
+    plot: opt.PlotOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Fit friction laws to measured data, and say what they are worth.
 
@@ -243,15 +232,15 @@ def identify(
 
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
     """
-    check_outputs(html, json, picture=plot)
-    laws, wishes = law_names(law), free_in(free)
+    opt.check_outputs(html, json, picture=plot)
+    laws, wishes = opt.law_names(law), free_in(free)
     chosen = residuals_of(kind, windows, wishes)
     read = reading(columns, units, step, variable, kind == "points", missing, resample)
     asked: dict[str, Any] = {
         "free": wishes or None,
-        "fixed": numbers("--fix", fixed) or None,
+        "fixed": opt.numbers("--fix", fixed) or None,
         "normal_force": normal_force,
-        "noise": numbers("--noise", noise) or "estimate",
+        "noise": opt.numbers("--noise", noise) or "estimate",
         "loss": loss,
         "starts": starts,
     }

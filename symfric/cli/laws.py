@@ -7,16 +7,8 @@ from typing import Annotated, Any
 
 from symfric import ALL_LAWS, parameters
 from symfric.cli import completions, output
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    SetOption,
-    all_with,
-    any_with,
-    argument,
-    check_outputs,
-    option,
-)
+from symfric.cli import options as opt
+from symfric.cli.options import argument, option
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.data import NORMAL_FORCE, parts, phenomena
 from symfric.foundation import checks
@@ -31,8 +23,8 @@ def laws(
     name: Annotated[
         str | None, argument("NAME", "One law, such as lugre.", completions.all_laws)
     ] = None,
-    settings: SetOption = None,
-    plot: PlotOption = None,
+    settings: opt.SetOption = None,
+    plot: opt.PlotOption = None,
     figure: Annotated[
         str | None,
         option("--figure FIGURE", f"Behaviour: {', '.join(FIGURES)}.", completions.figures),
@@ -45,7 +37,7 @@ def laws(
         float | None,
         option("--normal-force NUMBER", "Normal force [N]; default 1, and 7.848 for --figure."),
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """List the friction laws, or show one in full.
 
@@ -56,14 +48,14 @@ def laws(
 
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
-    check_outputs(json, picture=plot)
+    opt.check_outputs(json, picture=plot)
     if normal_force is not None:
         checks.number("--normal-force", normal_force, unit="N", above=0.0)
     if figure is not None or others:
         behaviour(name, settings, figure, others or [], normal_force, plot, json)
         return
     every = [name] if name else [*ALL_LAWS, *POPULATIONS]
-    chosen = {text: any_with(text, settings if name else None) for text in every}
+    chosen = {text: opt.any_with(text, settings if name else None) for text in every}
     if settings and not name:
         raise ValueError("--set: expected the name of a law before it, got none")
     if plot:
@@ -94,7 +86,7 @@ def behaviour(
     scenario = "profile" if figure is None else figure
     check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
     load = NORMAL_FORCE if normal_force is None else normal_force
-    chosen = all_with([name, *others], settings)
+    chosen = opt.all_with([name, *others], settings)
     with output.progress(f"{scenario} of {', '.join([name, *others])}"):
         data = compare(chosen, scenario, load)
     if plot:

@@ -10,17 +10,8 @@ from ocp.strategies import Friction
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import completions, output
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    SetOption,
-    argument,
-    called_with,
-    check_outputs,
-    held_by_file,
-    numbers,
-    option,
-)
+from symfric.cli import options as opt
+from symfric.cli.options import argument, option
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
@@ -38,7 +29,7 @@ def ocp(
             completions.problems,
         ),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     intervals: Annotated[
         int | None, option("--intervals N", "Equal intervals to begin with.")
     ] = None,
@@ -67,8 +58,8 @@ def ocp(
     guess: Annotated[Path | None, option("--guess FILE", "Start from a saved solution.")] = None,
     save: Annotated[Path | None, option("--save FILE", "Save it for a warm start.")] = None,
     csv: Annotated[Path | None, option("--csv FILE.csv", "Write all signals.")] = None,
-    plot: PlotOption = None,
-    json: JsonOption = None,
+    plot: opt.PlotOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Solve an optimal control problem and check it.
 
@@ -82,10 +73,10 @@ def ocp(
     if problem is None:
         _list()
         return
-    check_outputs(csv, save, json, picture=plot)
+    opt.check_outputs(csv, save, json, picture=plot)
     check_names("--solver", [solver], SOLVERS)
     check_names("--friction", [friction], get_args(Friction))
-    values = numbers("--set", settings)
+    values = opt.numbers("--set", settings)
     ready, asked = problem_of(problem, values)
     margin = checks.number("--resting-margin", resting_margin, above=0.0, upper=0.1)
     how: dict[str, Any] = {} if intervals is None else {"intervals": intervals}
@@ -128,8 +119,8 @@ def problem_of(text: str, values: dict[str, float]) -> tuple[Ready | None, Probl
     _, _, name = text.partition(".py")
     if not (name == "" and text.endswith(".py")) and not name.startswith(":"):
         check_names("ocp", [text], READY)
-        return READY[text], called_with(text, READY[text].make, values)
-    return None, held_by_file("ocp", text, DEFAULT_NAME, values, "Problem", Problem)
+        return READY[text], opt.called_with(text, READY[text].make, values)
+    return None, opt.held_by_file("ocp", text, DEFAULT_NAME, values, "Problem", Problem)
 
 
 def scheme_of(text: str) -> Scheme:

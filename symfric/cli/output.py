@@ -1,4 +1,4 @@
-"""Output of the commands: tables and notes for people, JSON for programs."""
+"""Output of the commands: tables and notes for readers, JSON for programs."""
 
 import json
 import math
@@ -19,19 +19,30 @@ from rich.text import Text
 from symfric.foundation.files import write_text
 
 EXACT = 12
-"""Digits of numbers that somebody may type again."""
+"""Significant digits of numbers that a user may enter again."""
+UNLIMITED = 100_000
+"""Width of tables in files and pipes [columns]: cells are never wrapped there."""
+GAP = 3
+"""Blanks between the columns of a table."""
 
 
 def number(value: float, digits: int = 6) -> str:
-    """So many significant digits; a dash for an absent bound."""
+    """Return a number rounded to significant digits; a dash if it is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def show_table(
     columns: Sequence[str], rows: Iterable[Sequence[str | float]], title: str = "", digits: int = 6
 ) -> None:
-    """Print a table on standard output; numbers, of so many digits, stand at the right."""
+    """Print a table on standard output, with numbers right-aligned and rounded to `digits`.
+
+    Cells and column titles wrap at the width of the terminal, or at COLUMNS if that is set. In
+    files and pipes, every row is one line.
+    """
     rows = [list(row) for row in rows]
+    console = Console(highlight=False)
+    if not (console.is_terminal or "COLUMNS" in os.environ):
+        console.width = UNLIMITED
     table = Table(
         title=Text(title) if title else None,
         title_justify="left",
@@ -39,17 +50,34 @@ def show_table(
         pad_edge=False,
         show_edge=False,
     )
-    for index, name in enumerate(columns):
+    texts = [[c if isinstance(c, str) else number(c, digits) for c in row] for row in rows]
+    widths = column_widths([columns, *texts], console.width)
+    for index, (name, width) in enumerate(zip(columns, widths, strict=True)):
         numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
         table.add_column(
-            Text(name),
-            justify="right" if numeric else "left",
-            no_wrap=numeric or index == 0,
-            overflow="fold",
+            Text(name), justify="right" if numeric else "left", width=width, overflow="fold"
         )
-    for row in rows:
-        table.add_row(*(Text(c if isinstance(c, str) else number(c, digits)) for c in row))
-    Console(highlight=False).print(table)
+    for row in texts:
+        table.add_row(*map(Text, row))
+    with console.capture() as drawn:
+        console.print(table)
+    typer.echo("\n".join(line.rstrip() for line in drawn.get().splitlines()))
+
+
+def column_widths(rows: Sequence[Sequence[str]], total: int) -> list[int]:
+    """Return the widths of the columns of `rows`, of the `total` width of a table if possible.
+
+    Every column is at least as wide as its longest word; columns share the remaining width.
+    """
+    cells = list(zip(*rows, strict=True))
+    widths = [max((len(w) for text in column for w in text.split()), default=0) for column in cells]
+    lacking = [max(map(len, column)) - w for column, w in zip(cells, widths, strict=True)]
+    rest = total - sum(widths) - GAP * (len(widths) - 1)
+    for k, index in enumerate(sorted(range(len(widths)), key=lambda i: lacking[i])):
+        share = min(lacking[index], max(rest, 0) // (len(widths) - k))
+        widths[index] += share
+        rest -= share
+    return widths
 
 
 def show(text: str = "") -> None:

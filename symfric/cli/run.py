@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from symfric import Law, SolveError, Trajectory, parameters, simulate
+from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import (
     LawOfOption,
@@ -20,18 +21,7 @@ from symfric.cli.machines import (
     kind_of,
     scenes_with,
 )
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    RtolOption,
-    SetOption,
-    StartOption,
-    assignments,
-    check_outputs,
-    law_names,
-    option,
-    seconds,
-)
+from symfric.cli.options import option
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
@@ -42,7 +32,7 @@ from symfric.scenes import MECHANISMS, Scene
 def run(
     scene: SceneArgument,
     law: LawsOption,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     inputs: Annotated[
@@ -54,14 +44,14 @@ def run(
             "shows.",
         ),
     ] = None,
-    x0: StartOption = None,
+    x0: opt.StartOption = None,
     t_end: Annotated[
         float | None,
         option(
             "--t-end SECONDS", "Last time [s]; default the last sample, or what shows the scene."
         ),
     ] = None,
-    rtol: RtolOption = 1e-6,
+    rtol: opt.RtolOption = 1e-6,
     method: Annotated[
         str, option("--method NAME", "Formula: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
     ] = "auto",
@@ -82,7 +72,7 @@ def run(
     ] = None,
     samples: Annotated[int, option("--samples N", "Equally spaced times of the result.")] = 2001,
     csv: Annotated[Path | None, option("--csv --out FILE.csv", "Write the signals.")] = None,
-    plot: PlotOption = None,
+    plot: opt.PlotOption = None,
     panels: Annotated[
         str,
         option("--panels main|all", "Of --plot; main are positions, friction, energy or power."),
@@ -90,7 +80,7 @@ def run(
     movie: Annotated[
         Path | None, option("--animate FILE.gif", "Film the machine: .gif, .html, .mp4.")
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Simulate SCENE with a friction law.
 
@@ -105,20 +95,20 @@ def run(
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --csv arm.csv
     """
     kind_of(scene, preset=preset, law_of=law_of)
-    how: Any = {"max_step": max_step, "times": seconds("--times", times)}
+    how: Any = {"max_step": max_step, "times": opt.seconds("--times", times)}
     if peer is not None and (method, backend, max_step, times) != ("auto", "auto", None, None):
         raise ValueError(
             "--peer: expected no --method, --backend, --max-step and --times, which are of symfric"
         )
-    laws = law_names(law)
+    laws = opt.law_names(law)
     if len(laws) > 1 and (csv or json or movie):
         raise ValueError(
             f"--csv, --json and --animate: expected one --law, got {len(laws)}; compare several "
             "with --plot"
         )
-    check_outputs(csv, json, movie, picture=plot)
+    opt.check_outputs(csv, json, movie, picture=plot)
     checks.choice("--panels", panels, ("main", "all"))
-    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
+    machines = scenes_with(scene, laws, opt.assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     check_movie(movie, scene, models[laws[0]])
     machine = next(iter(machines.values()))
@@ -274,15 +264,15 @@ def report(
     html: Annotated[Path, option("--html --out FILE.html", "Write one page of it all.")] = Path(
         "report.html"
     ),
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     inputs: Annotated[list[str] | None, option("--input NAME=VALUE", "Input, as of `run`.")] = None,
-    x0: StartOption = None,
+    x0: opt.StartOption = None,
     t_end: Annotated[
         float | None, option("--t-end SECONDS", "Last time [s]; default as of `run`.")
     ] = None,
-    rtol: RtolOption = 1e-6,
+    rtol: opt.RtolOption = 1e-6,
 ) -> None:
     """Simulate SCENE and write one page: signals, friction, error, laws.
 
@@ -293,9 +283,9 @@ def report(
     """
     from symfric.results.report import report as write_report  # noqa: PLC0415  (not for `run`)
 
-    check_outputs(html)
-    laws = law_names(law)
-    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
+    opt.check_outputs(html)
+    laws = opt.law_names(law)
+    machines = scenes_with(scene, laws, opt.assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
     given = driven(machine, models[laws[0]], inputs, x0, t_end)

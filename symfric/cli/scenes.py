@@ -7,16 +7,9 @@ from typing import Annotated, Any
 
 from symfric import Law, SolveError, Trajectory, Viscous, parameters, simulate
 from symfric.cli import completions, output
+from symfric.cli import options as opt
 from symfric.cli.machines import LawOfOption, PresetOption, driven, scenes_with
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    SetOption,
-    argument,
-    assignments,
-    check_outputs,
-    option,
-)
+from symfric.cli.options import argument, option
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Parameter, Variable, options
 from symfric.model import Model
@@ -43,11 +36,11 @@ def scenes(
             completions.laws,
         ),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    plot: PlotOption = None,
-    json: JsonOption = None,
+    plot: opt.PlotOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """List the scenes, or show one in full.
 
@@ -59,7 +52,7 @@ def scenes(
 
     Example: symfric scenes pendulum_box --law lugre --preset jing_mi_table_7 --plot box.png
     """
-    check_outputs(json, picture=plot)
+    opt.check_outputs(json, picture=plot)
     if name is None:
         check_alone(law, settings, preset, law_of, plot)
         every = {scene: kind(Viscous()) for scene, kind in ALL_SCENES.items()}
@@ -70,7 +63,7 @@ def scenes(
         output.say_written(json)
         return
     text = LAW if law is None else law
-    machine = scenes_with(name, [text], assignments("--set", settings), preset, law_of)[text]
+    machine = scenes_with(name, [text], opt.assignments("--set", settings), preset, law_of)[text]
     model = machine.model()
     found = to_dict(name, machine, model, text if law else None)
     output.emit_json(found, json)

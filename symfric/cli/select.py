@@ -19,24 +19,10 @@ from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
 from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
+from symfric.cli import options as opt
 from symfric.cli.identify import Reading, reading, residuals_of
 from symfric.cli.machines import LawOfOption, PresetOption, formed, kind_of
-from symfric.cli.options import (
-    HtmlOption,
-    JsonOption,
-    MissingOption,
-    PlotOption,
-    ResampleOption,
-    SetOption,
-    WorkersOption,
-    argument,
-    assignments,
-    check_outputs,
-    function_of_file,
-    law_names,
-    option,
-    with_settings,
-)
+from symfric.cli.options import argument, option
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
@@ -67,7 +53,7 @@ def select(
             completions.each_law,
         ),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     t_end: Annotated[float | None, option("--t-end SECONDS", "Last time [s].")] = None,
@@ -81,7 +67,7 @@ def select(
     effort: Annotated[
         float, option("--effort NUMBER", "What a law may cost, in times of the usual.")
     ] = 1.0,
-    workers: WorkersOption = None,
+    workers: opt.WorkersOption = None,
     data: Annotated[
         list[str] | None, option("--data FILE", "Fit the candidates to it first.")
     ] = None,
@@ -92,18 +78,18 @@ def select(
     units: Annotated[
         list[str] | None, option("--unit SIGNAL=UNIT", "Unit of a column in the data.")
     ] = None,
-    missing: MissingOption = "refuse",
-    resample: ResampleOption = False,
+    missing: opt.MissingOption = "refuse",
+    resample: opt.ResampleOption = False,
     normal_force: Annotated[
         float, option("--normal-force NUMBER", "Normal force [N] of the data.")
     ] = 1.0,
     paper: Annotated[
         bool, option("--paper", "Jing and Mi's tables beside ours; two scenes have them.")
     ] = False,
-    plot: PlotOption = None,
-    html: HtmlOption = None,
+    plot: opt.PlotOption = None,
+    html: opt.HtmlOption = None,
     csv: Annotated[Path | None, option("--csv FILE.csv", "Write the table.")] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Rank friction laws on a machine, and say which to take.
 
@@ -118,7 +104,7 @@ def select(
 
     Example: symfric select my_machine.py:press --t-end 2 --need presliding
     """
-    check_outputs(html, csv, json, picture=plot)
+    opt.check_outputs(html, csv, json, picture=plot)
     if paper:
         _paper(scene, json, any((law, settings, preset, law_of, plot, html, csv)))
         return
@@ -210,9 +196,9 @@ def _asked(
     Raises:
         ValueError: unknown names; numbers and forms that nothing here has.
     """
-    given = assignments("--set", settings)
+    given = opt.assignments("--set", settings)
     friction = _numbers({n: given.pop(n) for n in OF_FRICTION if n in given})
-    texts = law_names(names) if names else list(ALL_LAWS)
+    texts = opt.law_names(names) if names else list(ALL_LAWS)
     laws = {text: law_from_text(text) for text in texts}
     said = _formed(laws, given)
     for key in [key for key in given if "." in key]:
@@ -220,9 +206,9 @@ def _asked(
         check_names(f"--set {key}", [of], laws)
         if own in options(laws[of]):
             said.add(of)
-        laws[of] = with_settings(laws[of], of, [f"{own}={given.pop(key)}"])
+        laws[of] = opt.with_settings(laws[of], of, [f"{own}={given.pop(key)}"])
     if ".py" in scene:
-        machine: Any = function_of_file("select", scene, "machine", _numbers(given))
+        machine: Any = opt.function_of_file("select", scene, "machine", _numbers(given))
     else:
         machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     levels = Friction(**friction) if friction else None
