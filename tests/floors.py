@@ -179,5 +179,5 @@ FLOORS: dict[str, set[str]] = {
 """Folder -> folders it may import (CONVENTIONS, section 8). A folder stands for its rooms,
 too, except for the rooms themselves: these name each other. A house sees its own rooms."""
 
-ON_TOP = ("symfric.cli", "symfric.bench", "symfric.stress", "symfric.gallery")
-"""They see all, and they may print."""
+ON_TOP = ("symfric.__main__", "symfric.cli", "symfric.bench", "symfric.stress", "symfric.gallery")
+"""Packages that may import everything and may print."""

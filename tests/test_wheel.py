@@ -32,12 +32,9 @@ def metadata(wheel: ZipFile, name: str) -> str:
     return wheel.read(path).decode()
 
 
-def test_it_holds_the_three_packages_and_the_command_alone(wheel: ZipFile) -> None:
+def test_it_holds_the_three_packages_alone(wheel: ZipFile) -> None:
     tops = {name.split("/")[0] for name in wheel.namelist()}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {
-        *PACKAGES,
-        "symfric_command.py",
-    }
+    assert {top for top in tops if not top.endswith(".dist-info")} == set(PACKAGES)
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -65,4 +62,4 @@ def test_it_asks_for_these_libraries_only(wheel: ZipFile) -> None:
 
 def test_it_cannot_be_uploaded_by_accident_and_installs_the_command(wheel: ZipFile) -> None:
     assert "Classifier: Private :: Do Not Upload" in metadata(wheel, "METADATA")
-    assert "symfric = symfric_command:main" in metadata(wheel, "entry_points.txt")
+    assert "symfric = symfric.__main__:main" in metadata(wheel, "entry_points.txt")

@@ -158,7 +158,7 @@ def output(command: str) -> str:
 def in_shell(command: str) -> str:
     """Run in a shell that knows `python` and `symfric` as the ones that run here."""
     python = shlex.quote(sys.executable)
-    tools = f'python() {{ {python} "$@"; }}; symfric() {{ {python} -m symfric_command "$@"; }}; '
+    tools = f'python() {{ {python} "$@"; }}; symfric() {{ {python} -m symfric "$@"; }}; '
     done = subprocess.run(
         ["bash", "-c", tools + command],
         env=os.environ

@@ -39,11 +39,11 @@ def started(script: str, **variables: str) -> subprocess.Popen[str]:
 
 
 @pytest.mark.heavy
-def test_five_processes_under_load_agree_to_the_bit() -> None:
-    threads = ["1", "2", "4", "1", "2"]
+def test_processes_side_by_side_agree_to_the_bit() -> None:
+    threads = ["1", "4"]
     running = [started(SCRIPT, OPENBLAS_NUM_THREADS=n, OMP_NUM_THREADS=n) for n in threads]
     ends = [process.communicate(timeout=300) for process in running]
-    assert [p.returncode for p in running] == [0] * 5, ends[0][1]
+    assert [p.returncode for p in running] == [0] * len(threads), ends[0][1]
     assert len({out for out, _ in ends}) == 1
     assert ends[0][0].strip()
 

@@ -34,7 +34,6 @@ WATCH = "symfric/integrator/step/attempt.py"
 EVENTS = "symfric/integrator/running/events.py"
 SEARCH = "symfric/integrator/running/search.c"
 CROSSINGS = "symfric/integrator/running/crossings.py"
-ISOLATION = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/emitter/emit.py"
@@ -101,15 +100,23 @@ CONTROLLERS = (
 
 EVENT = (
     Mutant(
-        "a falling event fires on the way up", ISOLATION,
-        "(before < 0) & (after >= 0) & (directions >= 0)", "(before < 0) & (after >= 0)",
+        "a falling event fires on the way up", CROSSINGS,
+        "(before < 0) * (after >= 0) * (directions >= 0)", "(before < 0) * (after >= 0)",
         T_EVENTS,
     ),
     Mutant(
         "a step behind an event may be lost in t", EVENTS, ", SURE * abs(t))", ")", T_EVENTS,
     ),
     Mutant(
-        "no piece of a step is in doubt", ISOLATION,
+        "the virtual machine passes by steps with a possible event", EVENTS,
+        "some = self._some[: len(part)] != 0", "some = self._some[: len(part)] > 1", T_ISOLATION,
+    ),
+    Mutant(
+        "values before a step are those of the last step of a call", EVENTS,
+        "self._ends[passed_by - 1]", "self._ends[-1]", T_EVENTS,
+    ),
+    Mutant(
+        "no piece of a step is in doubt", CROSSINGS,
         "suspects, sure = doubts != 0,", "suspects, sure = doubts < 0,", T_ISOLATION,
     ),
     Mutant(
@@ -125,7 +132,7 @@ EVENT = (
         "sizes[0] < first - noise", "sizes[0] < first - inf", T_ISOLATION,
     ),
     Mutant(
-        "a piece before a sure root is taken for empty", ISOLATION,
+        "a piece before a sure root is taken for empty", CROSSINGS,
         "if at[k] >= sure:", "if sure <= 1:", T_ISOLATION,
     ),
     Mutant(

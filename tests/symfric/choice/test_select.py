@@ -179,7 +179,7 @@ def test_the_exact_form_comes_first_where_a_controller_can_take_it() -> None:
 TWO_FORMS = ("gms", "karnopp", "threlfall")
 
 
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_gms_keeps_an_accuracy_by_events_where_it_may_cost_more() -> None:
     asked: dict[str, Any] = {"accuracy": 1e-2, "t_end": SHORT, "fixed_steps": False}
     law = {"event": GMS(form="event")}

@@ -110,7 +110,7 @@ def test_an_interrupt_while_something_is_imported_is_one_sentence(module: str, l
         "    def find_spec(self, name, path=None, target=None):\n"
         f"        if name == '{module}': raise KeyboardInterrupt\n"
         "sys.meta_path.insert(0, Interrupt())\n"
-        "from symfric_command import main\n"
+        "from symfric.__main__ import main\n"
         "sys.exit(main())\n"
     )
     root = Path(symfric.__file__).parents[1]

@@ -61,7 +61,7 @@ def test_signatures_name_types_as_the_source_does() -> None:
     assert seen > 500
 
 
-@pytest.mark.parametrize("call", ["import symfric", "import symfric_command, symfric.cli"])
+@pytest.mark.parametrize("call", ["import symfric", "import symfric.__main__, symfric.cli"])
 def test_importing_loads_nothing_heavy(call: str) -> None:
     loaded = fresh(f"{call}\nimport sys; print(*sys.modules)").split()
     heavy = [name for name in HEAVY if name in loaded]

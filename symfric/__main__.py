@@ -1,7 +1,6 @@
-"""The command `symfric`: what stands before the first import that takes time.
+"""Entry point of `symfric` and of `python -m symfric`.
 
-It lies outside of the package, which imports CasADi and NumPy before any of its rooms: Ctrl-C in
-that second ends in a sentence, too.
+It imports the command line inside `main`, so that Ctrl-C during that import ends in a sentence.
 """
 
 import sys
