@@ -112,7 +112,7 @@ def test_numpy_files(tmp_path: Path) -> None:
         data = Dataset.read(tmp_path / name, units="m, N", **said)
         np.testing.assert_array_equal(data[0]["force"], np.cos(T))
     (tmp_path / "d.npz").write_bytes(b"PK\x03\x04 nonsense")
-    with pytest.raises(ValueError, match="expected a NumPy file of numbers, got one that is damag"):
+    with pytest.raises(ValueError, match="expected a NumPy file of numbers, got a damaged"):
         Dataset.read(tmp_path / "d.npz")
 
 

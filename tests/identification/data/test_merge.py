@@ -62,7 +62,7 @@ def test_shift_is_found_to_a_fraction_of_a_sample(
 def test_drift_of_the_clocks_is_refused_or_estimated() -> None:
     first, second = pair(lively(1), 0.7654, (500, 200), drift=2e-4, noise=0.02, end=60.0)
     with pytest.raises(
-        ValueError, match=r"got a drift of 20\d ppm, 0\.012 s over the record; write"
+        ValueError, match=r"got a drift of 20\d ppm, 0\.012 s over the record; pass"
     ):
         first.merged(second, on=("x", "y"))
     record = first.merged(second, on=("x", "y"), drift="estimate")[0]

@@ -101,7 +101,7 @@ def test_headerless_files_are_named_by_the_call(tmp_path: Path) -> None:
 def test_time_comes_from_the_step_where_there_is_none(tmp_path: Path) -> None:
     same(read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]), step=0.01))
     with pytest.raises(
-        ValueError, match=r"expected a column of time.*give step= .* or points=True"
+        ValueError, match=r"expected a column of time.*pass step= .* or points=True"
     ):
         read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]))
     with pytest.raises(ValueError, match="step= only without a time"):
