@@ -57,7 +57,7 @@ OWN = ("kind", "what", "data")
 @final
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One law of a ranking.
+    """A law of a ranking.
 
     Attributes:
         law: name as given.

@@ -42,7 +42,7 @@ class Coordinate:
 @final
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One balance: for the input it is solved for, or for a coordinate without an input.
+    """A balance of forces: for the input it is solved for, or for a coordinate without an input.
 
     Attributes:
         signal: name of the input, or "balance of <rate>".

@@ -283,7 +283,7 @@ def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[st
 @final
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One record with its drive and controller.
+    """A record with its drive and controller.
 
     Attributes:
         number, name: of the record.

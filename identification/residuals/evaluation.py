@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One signal of one record among the rows, in order of time.
+    """A signal of a record among the rows, in order of time.
 
     Attributes:
         record: number of the record.

@@ -149,7 +149,7 @@ def _filter_of(
 @final
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One record with its decimation.
+    """A record with its decimation.
 
     Attributes:
         motion: the measured motion.

@@ -139,7 +139,7 @@ class Points:
 @final
 @dataclass(frozen=True, eq=False)
 class Table:
-    """One record: imposed values (2 + inputs, n), measured forces, weights, break-away points."""
+    """A record: imposed values (2 + inputs, n), measured forces, weights, break-away points."""
 
     t: Array | None
     w: Array

@@ -126,7 +126,7 @@ class Drives:
 @final
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One simulation: a window of a record, or a whole one.
+    """A simulation: a window of a record, or a whole one.
 
     Attributes:
         record: its name.

@@ -67,7 +67,7 @@ class Outcome:
 
     @property
     def values(self) -> dict[str, float]:
-        """All parameters by name, fitted or held."""
+        """Values of the parameters by name, fitted or held."""
         return {name: e.value for name, e in self.parameters.items()}
 
     @property

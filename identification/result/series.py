@@ -24,7 +24,7 @@ from symfric.scenes import Drive
 @final
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter, start value or dead time.
+    """A parameter, start value or dead time.
 
     Attributes:
         value, unit: the estimate, in the unit of the user.
@@ -83,7 +83,7 @@ class Error:
 @final
 @dataclass(frozen=True)
 class Tried:
-    """One start and its end.
+    """A start and its end.
 
     Attributes:
         number: of the start.
@@ -133,7 +133,7 @@ class Line:
 @final
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One signal of one record.
+    """A signal of a record.
 
     Attributes:
         record, signal, unit: names.

@@ -53,7 +53,7 @@ ROUGH = 0.1
 @final
 @dataclass(frozen=True, eq=False)
 class Start:
-    """One start and its end.
+    """A start and its end.
 
     Attributes:
         number: of the start, in order of generation.

@@ -111,7 +111,7 @@ APART = 2.0
 @final
 @dataclass(frozen=True)
 class BreakAway:
-    """One break-away event.
+    """A break-away event.
 
     Attributes:
         t: time of the largest force [s].
@@ -129,7 +129,7 @@ class BreakAway:
 @final
 @dataclass(frozen=True, eq=False)
 class BreakAways:
-    """All break-aways of a data set.
+    """Break-aways of a data set.
 
     Attributes:
         events: in order of time.

@@ -41,7 +41,7 @@ LEAST = 4
 @final
 @dataclass(frozen=True)
 class Step:
-    """One step: its number, its result, the number of points used, and the values."""
+    """A step: its number, its result, the number of points used, and the values."""
 
     number: int
     what: str
