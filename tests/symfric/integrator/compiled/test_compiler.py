@@ -148,7 +148,9 @@ def test_refused_source_quotes_the_compiler_and_leaves_nothing_behind(folder: Pa
 @needs_compiler
 def test_a_missing_function_is_a_sentence_and_is_not_kept(folder: Path) -> None:
     """It was an AttributeError."""
-    with pytest.raises(CompileError, match="compile: expected a library that defines question, found none"):
+    with pytest.raises(
+        CompileError, match="compile: expected a library that defines question, found none"
+    ):
         load(SOURCE, "question")
     assert list(folder.iterdir()) == []
 

@@ -311,7 +311,9 @@ def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, before[1]))
-        with pytest.raises(ValueError, match=r"out: expected 8 MB of disk space for '.*a.npy', got File"):
+        with pytest.raises(
+            ValueError, match=r"out: expected 8 MB of disk space for '.*a.npy', got File"
+        ):
             Store(tmp_path / "large", ["a"], 10_000, 100, 1)
         small = Store(tmp_path / "small", ["a", "b"], 6, 3, 1)
         small.put(0, solved(0))
