@@ -255,5 +255,6 @@ def no_compiler() -> CompileError:
     wanted = os.environ.get("CC")
     found = f"$CC is {wanted!r}, which is not found" if wanted else "found none"
     return CompileError(
-        f"compile: expected a C compiler ($CC, gcc, clang or cc), {found}; use backend='vm'"
+        f"compile: expected a C compiler ($CC, gcc, clang or cc), {found}; install one, or pass "
+        "backend='vm' to simulations"
     )
