@@ -112,7 +112,7 @@ class Machine:
         """The modes from here on, of contacts without velocity by trying all of them."""
         J, n = np.array(self.along), self.size
         slip = J @ x[n:]
-        still = [i for i, s in enumerate(slip) if abs(s) < 1e-9 and modes[i] * s <= 0.0]
+        still = [i for i, s in enumerate(slip) if abs(s) < 1e-9]  # rounding of a stop at a node
         best: tuple[float, list[int]] | None = None
         for choice in product((0, 1, -1), repeat=len(still)):
             trial = list(modes)

@@ -37,10 +37,11 @@ CLOSE: dict[str, Option] = {"constr_mult_init_max": 1e8}
 """Options for a start near the solution: estimated multipliers are kept even if they are large.
 Ipopt sets those above 1e3 to zero, and then diverges from the solution on another mesh:
 cart-pendulum, twice as many intervals, 9 iterations instead of more than 100."""
-FINER: dict[str, Option] = CLOSE | {"perturb_always_cd": "yes"}
+FINER: dict[str, Option] = CLOSE | {"perturb_always_cd": "yes", "mumps_permuting_scaling": 0}
 """The same for a finer mesh. Where stiction is at its level, the rows of short intervals are nearly
-dependent. Unless Ipopt always regularises them, MUMPS delays pivots until its fronts are dense:
-for an arm with 700 intervals, more than 30 s for one factorisation instead of 0.1 s."""
+dependent. Unless Ipopt always regularises them, and MUMPS orders the matrix without permuting it
+first, pivots are delayed until fronts are dense: for arms with 700 intervals, 30 to 150 s for one
+factorisation instead of 0.1 s."""
 KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
