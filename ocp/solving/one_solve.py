@@ -179,9 +179,7 @@ def _distances(into: Transcription, begin: Points) -> dict[str, float]:
     alike = {
         unit: max(gone[name] for name in gone if units[name] == unit) for unit in units.values()
     }
-    return {
-        name: size or alike[units[name]] or STILL * nominals[name] for name, size in gone.items()
-    }
+    return {n: size or alike[units[n]] or STILL * nominals[n] for n, size in gone.items()}
 
 
 def _reach(box: Box, nominal: float) -> float:

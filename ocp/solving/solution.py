@@ -240,9 +240,9 @@ class Solution:
     def save(self, path: str | Path) -> None:
         """Write everything to one file, which `ocp.load` reads exactly.
 
-        A loaded solution has its signals, modes and re-simulated motions; it can be plotted, written,
-        verified again, and used as `guess` on any mesh or model. Functions such as costs are stored
-        as the expressions they returned.
+        A loaded solution has its signals, modes and re-simulated motions; it can be plotted,
+        written, verified again, and used as `guess` on any mesh or model. Functions such as
+        costs are stored as the expressions they returned.
 
         Raises:
             ValueError: the file cannot be written.
@@ -362,7 +362,7 @@ def plot_solutions(
         path: image file; its extension selects the format.
 
     Raises:
-        ValueError: no solution, an unknown signal, or an extension that Matplotlib does not support.
+        ValueError: no solution, an unknown signal, or an unsupported extension of the file.
     """
     from ocp.solving.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
 

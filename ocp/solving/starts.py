@@ -85,10 +85,10 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None
 
     States follow straight lines through the middles of their conditions at the start, at via points
     and at the end, over all phases in which they are continuous. A state that is the rate of
-    another one (x' = v) takes the slope of that one: with v = 0, where a friction law is steepest, Ipopt
-    needs ten times the iterations or fails. States with a condition only through an output stay
-    constant. Algebraic variables keep their start value; inputs are zero, or in the middle of their
-    bounds if zero is outside.
+    another one (x' = v) takes the slope of that one: with v = 0, where a friction law is steepest,
+    Ipopt needs ten times the iterations or fails. States with a condition only through an output
+    stay constant. Algebraic variables keep their start value; inputs are zero, or in the middle of
+    their bounds if zero is outside.
 
     Raises:
         ValueError: unknown name, or values that are not finite or not one per time.
