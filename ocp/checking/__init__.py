@@ -1,1 +1,1 @@
-"""What the model really does under an optimised control, and a mesh that follows from it."""
+"""Verification of an optimised control by re-simulation, and mesh refinement."""

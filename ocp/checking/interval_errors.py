@@ -1,4 +1,4 @@
-"""The errors of each interval: of its own, and what it costs to hold the inputs over it."""
+"""Errors of each interval: its local error, and the cost of holding the inputs over it."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -22,16 +22,16 @@ RTOL = 1e-6
 
 
 def local_errors(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Array, ...]:
-    """How far the model, started at each node, is from the next one; of each arc, shape (N,).
+    """Return the local error of each interval, for each arc of shape (N,).
 
         e_k = max_i |flow(x_k, u_k)_i - x_(k+1),i| / size_i
 
-    All intervals are members of one ensemble: 25 ms for 100 of them. An interval over which the
-    model cannot be simulated has the error inf.
+    The model starts at each node; all intervals are simulated as one ensemble: 25 ms for 100 of
+    them. An interval over which the model cannot be simulated has the error inf.
 
     Args:
-        arcs: what was optimised.
-        rtol: of the simulation, in each step.
+        arcs: optimised arcs.
+        rtol: relative tolerance of the simulation.
     """
     return tuple(
         np.max(np.abs(_ends(arc, rtol) - arc.nodes[:, 1:]) / arc.sizes[:, None], axis=0, initial=0)
@@ -48,9 +48,9 @@ def cut_meshes(
     order: int,
     most: int,
 ) -> list[Array] | None:
-    """`meshes` with the intervals cut that err by more than `allowed`; None where none does.
+    """Return `meshes` with inaccurate intervals divided; None if no error exceeds `allowed`.
 
-    Into (error / allowed)^(1/order) parts, 2 to `most` of them. Scenarios share their meshes.
+    Such intervals get (error / allowed)^(1/order) parts, 2 to `most`. Scenarios share their meshes.
     """
     if max((float(e.max()) for e in errors), default=0.0) <= allowed:
         return None
@@ -64,7 +64,7 @@ def cut_meshes(
 
 
 def _ends(arc: Arc, rtol: float) -> Array:
-    """Where the model is at the end of each interval, started at its first node, (nx, N)."""
+    """Return the states at the end of each interval, simulated from its first node, (nx, N)."""
     model, N = arc.span.model, arc.intervals
     local = _local(model)
     p: dict[str, Any] = {name: np.full(N, x) for name, x in arc.parameters().items()}
@@ -78,7 +78,7 @@ def _ends(arc: Arc, rtol: float) -> Array:
         p=p,
         u={v.name: row for v, row in zip(model.u, arc.u, strict=True)},
         rtol=rtol,
-        backend="vm",  # a compiler needs longer than all passes together
+        backend="vm",  # compilation takes longer than all passes together
         executor="serial",
     )
     ends = np.array([run[v.name][:, 0] for v in model.x]).reshape(len(model.x), N)
@@ -86,10 +86,10 @@ def _ends(arc: Arc, rtol: float) -> Array:
 
 
 def _local(model: Model) -> Model:
-    """`model` with time since the start of each member, where its equations know time at all.
+    """Return `model` with time relative to the start of each member, if its equations need time.
 
-    Of a mechanism only the explicit equations are left: its constraints are not kept over an
-    interval, whose drift is below all errors that are looked for.
+    For a mechanism only the explicit equations are used: its constraints are not enforced over an
+    interval, whose drift is below all relevant errors.
     """
     kept = model.memory.get("ocp local")
     if kept is None:
@@ -123,28 +123,29 @@ def _from_zero(model: Model) -> Model:
 
 
 def zoh_losses(transcription: Transcription, w: Array, lam_g: Array) -> tuple[Array, ...]:
-    """Estimate of how much lower J would be with inputs free to vary in each interval, (N,) a span.
+    """Estimate the reduction of J with inputs free to vary in each interval, (N,) for each phase.
 
-    With costates lam the minimum principle asks of the input at every time what an input that is
+    With costates lam the minimum principle requires of the input at every time what a held input
+    satisfies only on average. The loss is, to second order in the length h,
     held can give on the average only. What is lost is, to second order in the length h,
 
         E_k = sum_j w_j (H(u_k) - min_u H(u)),   H(u) = H + H_u (u - u_k) + H_uu (u - u_k)^2 / 2
 
     over the collocation points, with H_u and H_uu from the multipliers of the equations at each of
-    them. The input stays in its bounds and between its values in the neighbouring intervals: on a
-    singular arc (H_u = H_uu = 0) and at a switch (H_uu = 0) that is how far it will go. For a
-    smooth input E_k = H_uu (u' h)^2 h / 24; at a switch it falls as h^2, too, in one interval.
+    them. The input stays in its bounds and between its values in the neighbouring intervals; on a
+    singular arc (H_u = H_uu = 0) and at a switch (H_uu = 0) this limits it. For a smooth input
+    E_k = H_uu (u' h)^2 h / 24; at a switch it also falls as h^2, in one interval.
 
     Args:
-        transcription: what was solved.
+        transcription: the solved transcription.
         w, lam_g: unknowns and multipliers of the rows at a solution.
 
     Returns:
-        Of each span, in units of J; zeros where it has no collocation points (shooting) or no
-        inputs. Inputs that scenarios share are counted with the first of them.
+        For each phase, in units of J; zeros without collocation points (shooting) or without
+        inputs. Inputs shared by scenarios are counted with the first scenario.
 
-    Limits: an estimate where multipliers are those of a solution; of inputs in active path
-        conditions too large by a factor of up to 4.
+    Limits: the estimate assumes multipliers of a solution; for inputs in active path conditions it
+    is too large by a factor of up to 4.
     """
     losses: list[Array] = []
     layout = transcription.layout
@@ -166,7 +167,7 @@ def zoh_losses(transcription: Transcription, w: Array, lam_g: Array) -> tuple[Ar
 def _sharing(
     spans: tuple[SpanLayout, ...], columns: NDArray[np.int64]
 ) -> Iterator[tuple[int, int]]:
-    """(span, input) of all that stand in the same unknowns."""
+    """Yield (span, input) of all inputs with the same unknowns."""
     for number, own in enumerate(spans):
         for i, other in enumerate(own.u):
             if np.array_equal(other, columns):
@@ -174,7 +175,7 @@ def _sharing(
 
 
 def _drop(H_u: Array, H_uu: Array, low: Array, high: Array) -> Array:
-    """By how much H falls below its value at 0 in [low, high], summed over the points, (N,)."""
+    """Return the decrease of H from its value at 0 in [low, high], summed over the points, (N,)."""
     low, high = low[:, None], high[:, None]
     downhill = np.where(H_u > 0, low, high)
     curved = H_uu > 0
@@ -187,7 +188,7 @@ def _drop(H_u: Array, H_uu: Array, low: Array, high: Array) -> Array:
 def _reach(
     transcription: Transcription, w: Array, columns: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """How far an input may go from its value in each interval, scaled, (N,) each."""
+    """Return the permitted range of an input around its value in each interval, scaled."""
     u, program = w[columns], transcription.program
     lower, upper = program.lower_w[columns], program.upper_w[columns]
     if u.size < 2:
@@ -201,7 +202,7 @@ def _reach(
 def _slopes(
     transcription: Transcription, w: Array, lam_g: Array, number: int
 ) -> tuple[Array, Array]:
-    """H_u and H_uu of each input at the collocation points of a span, (nu, N, d) each."""
+    """Return H_u and H_uu of each input at the collocation points of a phase, (nu, N, d) each."""
     own = transcription.layout.spans[number]
     nu, N, d = *own.u.shape, own.degree
     skeleton = transcription.skeleton
@@ -234,20 +235,20 @@ def _slopes(
 
 
 def _of_points(piece: Piece, count: int) -> bool:
-    """Whether these are the equations at the collocation points; constraints of loops are not."""
+    """Return True for equations at the collocation points, False for loop constraints."""
     equations = any(name.startswith("the equation of") for name in piece.names)
     return piece.block is not None and piece.places == count and equations
 
 
 def _mapped(function: ca.Function, places: int, arguments: list[ca.DM]) -> list[Array]:
-    """The outputs of a function of the block at all places."""
+    """Return the outputs of a function of the block at all places."""
     return [np.array(part) for part in function.map(places).call(arguments)]
 
 
 def _entries(
     entries: Entries, varying: Array, columns: NDArray[np.int64]
 ) -> Iterator[tuple[int, int, Array]]:
-    """(row, which of the columns, values at all places) of the entries in some columns."""
+    """Yield (row, index into the columns, values at all places) of the entries in some columns."""
     values = np.empty((entries.rows.size, varying.shape[1]))
     values[entries.varying] = varying
     values[entries.still] = entries.constant[:, None]
@@ -256,14 +257,14 @@ def _entries(
 
 
 def _local_unknowns(selection: Selection, n: int, w: Array) -> Array:
-    """Local unknowns at all places, (n, places)."""
+    """Return the local unknowns at all places, (n, places)."""
     v = np.zeros((n, selection.columns.shape[0]))
     np.add.at(v, selection.local, (selection.weights * w[selection.columns]).T)
     return v
 
 
 def _weight(transcription: Transcription, lam_g: Array, number: int) -> float:
-    """Of the cost of a span in J: of the mean of scenarios, or the multiplier of the largest."""
+    """Return the weight of a phase's cost in J: of the mean, or the multiplier of the largest."""
     problem = transcription.problem
     phases = len(problem.chain)
     if problem.kind == "mean":

@@ -1,6 +1,6 @@
-"""One problem on meshes that follow from their errors, until all intervals are right.
+"""Mesh refinement: repeated solves on meshes derived from error estimates.
 
-A mesh is made finer where it has to be, and stays as coarse as it may be elsewhere.
+A mesh is refined where necessary, and stays as coarse as possible elsewhere.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -30,37 +30,37 @@ from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 GROWTH = 3.0
-"""A mesh grows by no more than this factor at once: errors are estimates."""
+"""Largest growth of a mesh at once: errors are estimates."""
 LEAST_PARTS = 0.5
-"""At most two intervals of the same density become one at once."""
+"""Fewest parts of an interval: at most two intervals of the same density are merged at once."""
 MOST_PARTS = 16.0
-"""An interval is split in at most so many parts at once."""
+"""Most parts into which an interval is divided at once."""
 STEEPEST = 2.0
-"""Neighbouring intervals differ in length by no more than about this factor."""
+"""Approximate largest ratio of the lengths of neighbouring intervals."""
 SAME_NUMBER = 0.4
-"""A mesh that needs no more intervals than it has keeps them down to this share: nothing that
-depends on their number is made again."""
+"""A mesh that needs no more intervals keeps its number down to this share, which avoids rebuilding
+everything that depends on the number."""
 Limit = Callable[[Prepared], Prepared]
 LATER = 1e-2
-"""Barrier parameter of Ipopt at the start of all passes but the first, which start close by."""
+"""Initial barrier parameter of Ipopt for all passes but the first, which start near a solution."""
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 CAP = 150
-"""Iterations on a mesh that will be refined: it is there to say where, and needs no more."""
+"""Largest number of iterations on a mesh that only shows where to refine."""
 FULL = 0.9
-"""Share of the largest mesh from which on it counts as that."""
+"""Share of the largest mesh above which a mesh counts as full."""
 LEAST_TRUST = 0.2
-"""Where path conditions are active, estimates of losses are too large by a few times."""
+"""Least trust in loss estimates, which active path conditions make too large."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class MeshErrors:
-    """What the intervals of one span get wrong.
+    """Errors of the intervals of one phase.
 
     Attributes:
         local: relative local error of each interval, shape (N,).
         losses: cost lost in each of them by holding the inputs (see `zoh_losses`).
-        outside: which of them leave a bound between the nodes.
+        outside: mask of intervals that violate a bound between the nodes.
     """
 
     local: Array
@@ -81,26 +81,25 @@ def refined(
     most: int = 1000,
     for_loss: float = inf,
 ) -> tuple[Array, ...]:
-    """New meshes on which local errors are below `local`, and the lost cost below `loss`.
+    """Return new meshes with local errors below `local` and a lost cost below `loss`.
 
-    Interval k needs n_k parts. A local error e falls as n^-(p+1) with the order p where the motion
-    is smooth, which is trusted for longer intervals only; where it is too large the motion is not,
-    and half of that is. Losses E_k fall as n^-2, so that their sum is `loss` with the fewest
-    intervals for
+    Interval k needs n_k parts. A local error e falls as n^-(p+1) with the order p for a smooth
+    motion, which is assumed only for longer intervals; where the error is too large the order is
+    halved. Losses E_k fall as n^-2, so their sum is `loss` with the fewest intervals for
 
         n_k = E_k^(1/3) sqrt(sum E^(1/3) / loss)
 
-    The larger of both, at least two parts where a bound is left between nodes, is spread evenly:
-    nodes move, and where their number may stay as it is it does.
+    The larger of both, at least two parts where a bound is violated between nodes, is distributed
+    evenly: nodes move, and their number is kept if possible.
 
     Args:
-        meshes: fractions that bound the intervals of each span.
-        errors: what they get wrong.
-        keep: fractions of each span that stay nodes.
-        local, loss: what is allowed; `loss` for all spans together, in units of J.
+        meshes: fractions that bound the intervals of each phase.
+        errors: their errors.
+        keep: fractions of each phase that stay nodes.
+        local, loss: tolerances; `loss` for all phases together, in units of J.
         order: of the scheme.
-        most: intervals of all spans together.
-        for_loss: intervals that are made for the sake of losses alone.
+        most: largest number of intervals of all phases together.
+        for_loss: largest number of intervals for losses alone.
     """
     roots = [np.cbrt(e.losses) for e in errors]
     total = sum(float(root.sum()) for root in roots)
@@ -123,7 +122,7 @@ def refined(
 
 
 def _graded(parts: Array, lengths: Array) -> Array:
-    """More parts beside short intervals, so that lengths change gradually."""
+    """Return more parts next to short intervals, so that lengths change gradually."""
     density = parts / lengths
     for k in range(1, density.size):
         density[k] = max(density[k], density[k - 1] / STEEPEST)
@@ -133,7 +132,7 @@ def _graded(parts: Array, lengths: Array) -> Array:
 
 
 def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
-    """Nodes at equal amounts of `parts`, with whole numbers between the fractions to keep."""
+    """Return nodes at equal amounts of `parts`, with integer counts between kept fractions."""
     done = np.concatenate([[0.0], np.cumsum(parts)])
     at = np.interp(keep, mesh, done)
     wanted = np.diff(at)
@@ -157,17 +156,17 @@ def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
 @final
 @dataclass(frozen=True)
 class Goals:
-    """When a mesh is fine enough.
+    """Criteria for a sufficiently fine mesh.
 
     Attributes:
         local: largest relative local error of an interval.
         loss: cost lost by holding the inputs, relative to |J|.
-        outside: how far a bound may be left between nodes, relative to its magnitude.
-        passes: solves at most.
-        most: intervals at most, of all phases together.
-        nonzeros: of Jacobian and Hessian of the program, up to which a mesh is made finer for the
+        outside: violation of a bound between nodes, relative to its magnitude.
+        passes: largest number of solves.
+        most: largest number of intervals, of all phases together.
+        nonzeros: of Jacobian and Hessian of the program, up to which a mesh is refined for the
             sake of the cost alone: 1000 intervals of a small model, 70 of an arm with six joints.
-        patient: whether a mesh on which the solver runs out of iterations is made finer, too.
+        patient: whether a mesh is also refined if the solver reached its iteration limit.
     """
 
     local: float
@@ -180,10 +179,10 @@ class Goals:
 
     @staticmethod
     def of(tolerance: float) -> "Goals":
-        """What a verification within `tolerance` asks for: four digits of J at 1e-3.
+        """Return the goals for a verification within `tolerance`: four digits of J at 1e-3.
 
-        Local errors add up over the motion, by experience to no more than ten of the largest. A
-        cost that is off is no miss, but it is what was to be minimised.
+        Local errors accumulate over the motion, by experience to at most ten times the largest. An
+        inaccurate cost is not a miss, but it is the quantity to be minimised.
         """
         return Goals(0.1 * tolerance, 0.02 * tolerance, 0.2 * tolerance)
 
@@ -199,27 +198,27 @@ def refined_solve(
     goals: Goals | None = None,
     limit: Limit = lambda prepared: prepared,
 ) -> Solution:
-    """Solve, and solve again from there on meshes that follow from the errors that are left.
+    """Solve repeatedly, each time on meshes derived from the remaining errors.
 
     A mesh is fine enough when the local error of every interval, the cost lost by holding the
-    inputs and the bounds between nodes reach the `goals`. Nodes move to where they are needed; as
-    long as their number stays the same, nothing is built again.
+    inputs and the violations between nodes reach the `goals`. Nodes move to where they are needed;
+    as long as their number stays the same, nothing is rebuilt.
 
     Args:
-        problem: what to solve.
-        meshes: to start with, `make_meshes(problem, 50)`.
+        problem: the problem to solve.
+        meshes: initial meshes, `make_meshes(problem, 50)`.
         scheme: `Radau(3)` if none.
         solver: `Ipopt()` if none.
         guess: see `ocp.solving.starts`.
         progress: called with a `Progress` after each iteration.
-        goals: those of a verification within 1e-3 if none.
-        limit: what a solver is put through before each solve, such as a limit of time.
+        goals: default: for a verification within 1e-3.
+        limit: function applied to the solver before each solve, such as a time limit.
 
     Returns:
-        The last solution that the solver calls solved, with the statistics of all passes; the first
-        one where that already fails, and with status INTERRUPTED or TIME_LIMIT the one before. A
-        mesh that did not become fine enough is no failure: what comes of it is said by the
-        verification.
+        The last solution that the solver reports as solved, with the statistics of all passes; the
+        first one if that already fails, and with status INTERRUPTED or TIME_LIMIT the previous
+        one. A mesh that did not become fine enough is not a failure: the verification evaluates
+        the result.
     """
     goals = Goals.of(TOLERANCE) if goals is None else goals
     solver = Ipopt() if solver is None else solver
@@ -258,27 +257,27 @@ def refined_solve(
         new = on(new.meshes if fine else finer, new, number, capped)
         statistics = statistics.then(new.statistics)
         if new.status in STOPPED:
-            said = f"{new.message} What there is is the solution on the mesh before."
+            said = f"{new.message} The result is the solution on the previous mesh."
             found = replace(found, status=new.status, message=said, cause=new.cause)
         found = new if new.ok else found
     return replace(found, statistics=statistics)
 
 
 def _told(solution: Solution, state: "Excess") -> Solution:
-    """With what it costs to hold the inputs, where that is more than was allowed."""
+    """Return `solution` with a message on the cost of holding the inputs, if it is too large."""
     if state.loss <= state.allowed:
         return solution
     share = state.loss / abs(solution.cost)
-    said = f"Inputs that vary within the intervals would cost about {100 * share:.1g} % less."
+    said = f"Inputs that vary in the intervals would lower the cost by about {100 * share:.1g} %."
     return replace(solution, message=f"{solution.message} {said}")
 
 
 def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solver:
-    """The solver of a pass that starts close by; what the user says wins."""
+    """Return the solver of a later pass; the user's options take precedence."""
     if number == 1 or not isinstance(solver, Ipopt):
         return solver
     later: dict[str, float] = {"max_iter": CAP} if capped else {}
-    if problem.kind != "worst":  # whose multipliers must settle
+    if problem.kind != "worst":  # its multipliers must converge
         later["mu_init"] = LATER
     return solver.with_options(**{k: v for k, v in later.items() if k not in solver.options})
 
@@ -286,14 +285,14 @@ def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solve
 @final
 @dataclass(frozen=True)
 class Excess:
-    """How far a mesh was from its goals.
+    """Distance of a mesh from its goals.
 
     Attributes:
         local: largest local error in multiples of its goal.
-        lost: estimated cost lost by holding the inputs; `allowed` of it is.
+        lost: estimated cost lost by holding the inputs; `allowed` is its goal.
         cost: J.
-        trust: share of an estimated loss that refinement really gains.
-        stuck: whether the last refinement has gained little.
+        trust: share of an estimated loss that refinement actually gains.
+        stuck: whether the last refinement gained little.
     """
 
     local: float = np.inf
@@ -305,16 +304,16 @@ class Excess:
 
     @property
     def loss(self) -> float:
-        """What holding the inputs is likely to cost."""
+        """Likely cost of holding the inputs."""
         return self.trust * self.lost
 
     @property
     def whole(self) -> float:
-        """In multiples of the goals."""
+        """Largest excess, in multiples of the goals."""
         return max(self.local, self.loss / self.allowed if self.allowed > 0 else 0.0)
 
     def then(self, local: float, lost: float, cost: float, allowed: float) -> "Excess":
-        """After another pass; what it gained says how far its estimates are to be trusted."""
+        """Return the excess after another pass; its gain determines the trust in the estimates."""
         trust = self.trust
         if max(self.local, local) <= 1.0 and np.isfinite(self.lost) and self.lost > 2 * lost:
             gained = (self.cost - cost) / (self.lost - lost)
@@ -326,7 +325,7 @@ class Excess:
 def finer_meshes(
     made: Discretisation, solution: Solution, goals: Goals, before: Excess | None = None
 ) -> tuple[tuple[Array, ...], Excess]:
-    """Meshes for what is not right yet, none if all is; and how far it is from being right."""
+    """Return refined meshes, empty if the goals are reached, and the excess over the goals."""
     problem, phases = made.problem, len(made.problem.chain)
     arcs = arcs_of(problem, solution.meshes, solution.points)
     local = local_errors(arcs, min(1e-6, 0.1 * goals.local))
@@ -369,7 +368,7 @@ def finer_meshes(
 
 
 def _outside(arcs: Sequence[Arc], goals: Goals) -> tuple[NDArray[np.bool_], ...]:
-    """Intervals between whose nodes a bound is left."""
+    """Return masks of the intervals that violate a bound between their nodes."""
     found = [np.zeros(arc.intervals, dtype=bool) for arc in arcs]
     for run in near_runs(arcs, 10 * goals.local):
         found[run.arc.number] |= left_between(run, goals.outside)

@@ -1,6 +1,6 @@
-"""The models under an optimised control: one run from the start to the end.
+"""Re-simulation of the models under an optimised control, from start to end.
 
-An `Arc` is the optimised motion of one span as numbers that a simulation takes.
+An `Arc` is the optimised motion of one phase as numbers for a simulation.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 REST = 1e-3
-"""A state that moves less than this many times its nominal value is as good as at rest."""
+"""Motion of a state below this multiple of its nominal value is treated as zero."""
 RTOL = 1e-9
 """Relative tolerance of the re-simulation."""
 GAUSS_POINTS, GAUSS_WEIGHTS = legendre.leggauss(4)
@@ -31,17 +31,17 @@ GAUSS_POINTS, GAUSS_WEIGHTS = legendre.leggauss(4)
 @final
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """The optimised motion of one span.
+    """The optimised motion of one phase.
 
     Attributes:
-        number: of the span in its problem.
-        span: what was asked for.
+        number: index of the phase in its problem.
+        span: its conditions.
         begin: its start since that of the problem [s].
         T: duration [s].
         mesh: fractions of T that bound the intervals, shape (N + 1,).
         nodes: states there, shape (nx, N + 1).
         u: inputs, held on each interval, shape (nu, N).
-        p: parameters of the model, chosen ones as they were chosen, shape (n_p,).
+        p: parameters of the model, with chosen values, shape (n_p,).
     """
 
     number: int
@@ -55,34 +55,34 @@ class Arc:
 
     @property
     def end(self) -> float:
-        """Its last time [s]."""
+        """Last time [s]."""
         return self.begin + self.T
 
     @property
     def intervals(self) -> int:
-        """Their number N."""
+        """Number N of intervals."""
         return self.mesh.size - 1
 
     @cached_property
     def times(self) -> Array:
-        """When the nodes are [s], shape (N + 1,)."""
+        """Times of the nodes [s], shape (N + 1,)."""
         times = self.begin + self.T * self.mesh
         times[-1] = self.end
         return times
 
     @cached_property
     def sizes(self) -> Array:
-        """Largest magnitude of each state on its way, at least `REST` nominal, shape (nx,)."""
+        """Largest magnitude of each state in the arc, at least `REST` nominal, shape (nx,)."""
         largest = np.abs(self.nodes).max(axis=1, initial=0.0)
         return np.maximum(largest, REST * self.span.model.nominal("x"))
 
     def state(self, node: int) -> dict[str, float]:
-        """States at a node by name."""
+        """Return states at a node by name."""
         values = self.nodes[:, node].tolist()
         return {v.name: x for v, x in zip(self.span.model.x, values, strict=True)}
 
     def parameters(self) -> dict[str, float]:
-        """Parameters by name; one that a solver has put a rounding error outside stands inside."""
+        """Return parameters by name, clipped to their bounds against rounding errors."""
         return {
             v.name: min(max(float(x), v.lower), v.upper)
             for v, x in zip(self.span.model.p, self.p, strict=True)
@@ -90,7 +90,7 @@ class Arc:
 
 
 def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[Arc, ...]:
-    """The arcs of what a solver found, in the order of `problem.spans`."""
+    """Return the arcs of a solver's result, in the order of `problem.spans`."""
     found: list[Arc] = []
     for number, (span, mesh, own) in enumerate(
         zip(problem.spans, meshes, points.spans, strict=True)
@@ -113,7 +113,7 @@ def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[
 
 
 def _chosen(span: Span, chosen: Mapping[str, float]) -> Array:
-    """Parameters of the model, with those that were chosen."""
+    """Return parameters of the model, with the chosen ones."""
     taken = {name: chosen[name] for name in span.chosen if name in chosen}
     return np.array(
         [taken.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)], dtype=float
@@ -126,9 +126,9 @@ class Run:
     """The simulated motion of an arc, or of a part of it.
 
     Attributes:
-        arc: what was optimised.
-        trajectory: what the model does; it may have failed on its way.
-        end: up to where it counts [s].
+        arc: the optimised arc.
+        trajectory: motion of the model; the simulation may have failed before the end.
+        end: end of the part in use [s].
     """
 
     arc: Arc
@@ -137,34 +137,34 @@ class Run:
 
     @property
     def begin(self) -> float:
-        """Its first time [s]."""
+        """First time [s]."""
         return self.trajectory.span[0]
 
     @property
     def ok(self) -> bool:
-        """Whether it came to its end."""
+        """True if it reached its end."""
         return self.trajectory.status.ok and self.trajectory.span[1] >= self.end
 
     @property
     def at_start(self) -> bool:
-        """Whether it begins where its arc does."""
+        """True if it begins at the start of its arc."""
         return self.begin == self.arc.times[0]
 
     @property
     def at_end(self) -> bool:
-        """Whether it ends where its arc does."""
+        """True if it ends at the end of its arc."""
         return self.end == self.arc.times[-1]
 
     @property
     def looks(self) -> Array:
-        """Times that show all of it [s]: every step, and both sides of every node."""
+        """Times for evaluation [s]: every step, and both sides of every node."""
         inside = self.arc.times[(self.arc.times > self.begin) & (self.arc.times <= self.end)]
         every = np.concatenate([self.trajectory.looks, np.nextafter(inside, -np.inf), inside])
         last = min(self.end, self.trajectory.span[1])
         return np.unique(every[(every >= self.begin) & (every <= last)])
 
     def of(self, column: ca.SX, times: Array | float) -> Array:
-        """Values of a column of expressions in the symbols of the model, shape (rows, n)."""
+        """Return values of a column of expressions in the symbols of the model, shape (rows, n)."""
         at = np.atleast_1d(times)
         rows = column.numel()
         if not rows:
@@ -172,7 +172,7 @@ class Run:
         return np.reshape(self.trajectory.of(ca.densify(column), at), (rows, at.size))
 
     def integral(self, expression: ca.SX) -> float:
-        """Of an expression over the run, by Gauss quadrature over every accepted step."""
+        """Integrate an expression over the run, by Gauss quadrature over every accepted step."""
         if ca.SX(expression).is_zero():
             return 0.0
         steps = self.trajectory.step_times
@@ -188,13 +188,13 @@ def resimulated(
     rtol: float = RTOL,
     follow: Callable[[Arc, Mapping[str, float]], Run | None] | None = None,
 ) -> tuple[Run, ...]:
-    """Runs of the models under the controls that were optimised, held on each interval.
+    """Simulate the models under the optimised controls, held on each interval.
 
-    A phase starts where the one before it really ended, as its links say; states without a link
-    start where the optimiser put them. Behind a run that fails the rest of its scenario is left
-    out: there is no place where it could start.
+    A phase starts at the simulated end of the previous one, according to its links; states without
+    a link start at their optimised values. After a run that fails the rest of its scenario is
+    left out, because it has no start.
 
-    `follow` makes the run of an arc from its start, or none; by default the user's model does.
+    `follow` makes the run of an arc from its start, or None; by default with the user's model.
     """
     runs: list[Run] = []
     for arc in arcs:
@@ -208,7 +208,7 @@ def resimulated(
 
 
 def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> Run:
-    """The motion from a node to the end of the arc."""
+    """Simulate from a node to the end of the arc."""
     times = arc.times[node:]
     u = {
         v.name: Hold(times[:-1], row[node:]) for v, row in zip(arc.span.model.u, arc.u, strict=True)
@@ -228,12 +228,12 @@ def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL
 
 
 def _behind(run: Run, arc: Arc) -> bool:
-    """Whether `run` is not that of the phase before `arc`: its own was left out."""
+    """Return True if `run` does not belong to the phase before `arc`, which was left out."""
     return (run.arc.span.scenario, run.arc.span.phase) != (arc.span.scenario, arc.span.phase - 1)
 
 
 def start_after(arc: Arc, before: Run | None) -> dict[str, float]:
-    """Where the model starts."""
+    """Return the start of the model."""
     start = arc.state(0)
     if before is not None and arc.span.links:
         ends = before.of(stacked(link.expression for link in arc.span.links), before.end)

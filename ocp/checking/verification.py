@@ -1,4 +1,4 @@
-"""What a re-simulation says about a solution: by how much it misses what, and when."""
+"""Result of a re-simulation: the deviation from each condition, and when."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -18,17 +18,17 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class Miss:
-    """One thing that was asked for, and what the re-simulated motion makes of it.
+    """A condition, and its value in the re-simulated motion.
 
     Attributes:
-        what: "start", "end", "via", "joint", "period": something to meet; "bound" or "path":
-            something to keep, where it is kept worst; "motion": a state at the end of a phase
+        what: "start", "end", "via", "joint", "period": a value to meet; "bound" or "path": a range,
+            at its worst violation; "motion": a state at the end of a phase
             against its optimised value; "cost"; "local error": of the worst interval.
         name: of the signal, or of the condition.
-        time: when [s].
-        value: what it is there.
-        wanted: the nearest value that would do.
-        size: magnitude that the difference is relative to.
+        time: time [s].
+        value: its value there.
+        wanted: the nearest admissible value.
+        size: reference magnitude of the difference.
         unit: of the values.
     """
 
@@ -42,49 +42,49 @@ class Miss:
 
     @property
     def miss(self) -> float:
-        """The difference; zero where all is well."""
+        """Difference of `value` and `wanted`."""
         return self.value - self.wanted
 
     @property
     def relative(self) -> float:
-        """The difference in multiples of `size`; inf for what is no number."""
+        """Difference in multiples of `size`; inf for NaN."""
         found = abs(self.miss) / self.size if self.size > 0 else abs(self.miss)
         return found if isfinite(found) else float("inf")
 
     @property
     def sentence(self) -> str:
-        """What is missed, when and by how much."""
+        """Message: what is missed, when and by how much."""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         if self.what == "local error":
-            return f"the interval at {self.time:.4g} s errs by {self.relative:.2g} by itself"
+            return f"the interval at {self.time:.4g} s has a local error of {self.relative:.2g}"
         if self.what == "cost":
             return f"the cost is {self.value:.6g}, not {self.wanted:.6g}"
         amount = f"{abs(self.miss):.3g}{unit}"
         if self.what == "motion":
             return f"{self.name} is {amount} away from its optimised value at {self.time:.4g} s"
         if self.what in ("bound", "path"):
-            return f"{self.name} is left by {amount} at {self.time:.4g} s"
+            return f"{self.name} is violated by {amount} at {self.time:.4g} s"
         return f"{self.name} misses {self.wanted:.4g}{unit} at {self.time:.4g} s by {amount}"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """A solution against a tight simulation of the user's model under its control.
+    """Comparison of a solution with a tight simulation of the user's model under its control.
 
     Attributes:
-        tolerance: relative miss that is allowed.
+        tolerance: largest permitted relative miss.
         rtol: of the simulation.
-        checked: everything that was looked at, the worst first.
-        local_errors: of each span, of each interval, shape (N,).
-        trajectories: the simulated motion of each span, in order.
-        cost: J of the simulated motion; NaN where it did not come to its end.
-        failed: why a simulation did not come to its end; empty if all did.
+        checked: all checked conditions, the worst first.
+        local_errors: of each interval, for each phase of shape (N,).
+        trajectories: the simulated motion of each phase, in order.
+        cost: J of the simulated motion; NaN if it did not reach its end.
+        failed: message of a simulation that did not reach its end; empty if all did.
         failure: its status.
-        restarted: for a motion on which errors grow until a simulation from the start says
-            nothing: the same from node to node in `restarts`.
-        restarts: times of a solution that was started again at its own nodes [s].
-        growth: by what factor local errors have grown at the end; NaN where nobody looked.
+        restarted: for a motion with error growth that makes a simulation from the start
+            meaningless: the same from node to node in `restarts`.
+        restarts: times of restarts at the nodes of the solution [s].
+        growth: growth factor of local errors up to the end; NaN if not evaluated.
     """
 
     tolerance: float
@@ -102,39 +102,39 @@ class Verification:
     __repr__ = brief
 
     def check_fields(self) -> None:
-        """Refuse local errors that are not one number an interval; for files."""
+        """Raise an error for local errors without one number per interval; for files."""
         agree("Verification", all(errors.ndim == 1 for errors in self.local_errors))
 
     @property
     def misses(self) -> tuple[Miss, ...]:
-        """What misses by more than the tolerance, the worst first."""
+        """Conditions that miss by more than the tolerance, the worst first."""
         return tuple(miss for miss in self.checked if not miss.relative <= self.tolerance)
 
     @property
     def ok(self) -> bool:
-        """Whether the model under this control does all that was asked for."""
+        """True if the model under this control meets all conditions."""
         return not self.failed and not self.misses
 
     @property
     def worst(self) -> Miss | None:
-        """What is missed most; None where nothing was asked for."""
+        """The largest miss; None without conditions."""
         return self.checked[0] if self.checked else None
 
     @property
     def largest(self) -> float:
-        """The largest relative miss; inf where the simulation did not come to its end."""
+        """The largest relative miss; inf if the simulation did not reach its end."""
         if self.failed:
             return float("inf")
         return self.checked[0].relative if self.checked else 0.0
 
     @property
     def unstable(self) -> bool:
-        """Whether it fails only because errors grow: from node to node all is well."""
+        """True if it fails only because of error growth; all is met from node to node."""
         return not self.ok and self.restarted is not None and self.restarted.ok
 
     @property
     def status(self) -> Status:
-        """How a solution ends that the solver calls solved."""
+        """Status of a solution that the solver reports as solved."""
         if self.ok:
             return Status.SUCCESS
         if self.unstable:
@@ -146,25 +146,25 @@ class Verification:
 
     @property
     def sentence(self) -> str:
-        """What is wrong, when, by how much, and what to try; empty where all is well."""
+        """Message: what is missed, when, by how much, and what to try; empty if nothing is."""
         if self.ok:
             return ""
         if self.failed:
             return f"Its control could not be re-simulated: {self.failed}"
-        told = "; ".join(miss.sentence for miss in self.misses[:3])
+        missed = "; ".join(miss.sentence for miss in self.misses[:3])
         more = len(self.misses) - 3
-        told += f"; and {more} more" if more > 0 else ""
+        missed += f"; and {more} more" if more > 0 else ""
         if self.unstable:
             return (
-                f"{self.status.value} Errors grow by a factor of {self.growth:.1g}, so that under "
-                f"the control alone {told}. Started again at {_times(self.restarts)} it keeps to "
-                f"everything within {_relative(self.restarted)}."
+                f"{self.status.value} Errors grow by a factor of {self.growth:.1g}, so under "
+                f"the control alone {missed}. Restarted at {_times(self.restarts)} it meets "
+                f"all conditions within {_relative(self.restarted)}."
             )
-        return f"{self.status.value} In the simulation {told}."
+        return f"{self.status.value} In the simulation {missed}."
 
     @property
     def table(self) -> str:
-        """All that was looked at, a line each."""
+        """Table of all checked conditions."""
         head = f"{'what':<12}{'name':<28}{'t [s]':>9}{'value':>13}{'wanted':>13}{'relative':>10}"
         rows = [
             f"{m.what:<12}{m.name:<28}{m.time:>9.4g}{m.value:>13.6g}{m.wanted:>13.6g}"
@@ -175,11 +175,11 @@ class Verification:
 
     def __str__(self) -> str:
         verdict = "verified" if self.ok else "not verified"
-        said = f"{verdict} within {self.tolerance:g}: largest miss {self.largest:.1e}"
-        return "\n".join([said, *([self.sentence] if self.sentence else []), self.table])
+        text = f"{verdict} within {self.tolerance:g}: largest miss {self.largest:.1e}"
+        return "\n".join([text, *([self.sentence] if self.sentence else []), self.table])
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data; a number that is not finite is None."""
+        """Return everything as plain data, with None for non-finite numbers."""
         return {
             "ok": self.ok,
             "tolerance": self.tolerance,

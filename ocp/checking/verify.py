@@ -1,4 +1,4 @@
-"""Whether the user's model, under the control that was optimised, does what was requested.
+"""Verification of the user's model under the optimised control.
 
 Conditions are evaluated on simulated runs: at nodes, and everywhere between.
 """
@@ -25,17 +25,17 @@ from symfric.foundation.variable import stacked
 
 Array = NDArray[np.float64]
 CLOSER, PARTS = 2, 16
-"""How often the neighbourhood of the worst time is looked at again, and in how many parts."""
+"""Refinements of the worst time, and parts of its neighbourhood in each."""
 PLACES = {0.0: "start", 1.0: "end"}
 TOLERANCE = 1e-3
-"""Relative miss that is allowed unless somebody says otherwise."""
+"""Default of the largest permitted relative miss."""
 SMALL = 0.1
-"""Where local errors are below this many tolerances and the end is missed, errors have grown."""
+"""Local errors below this many tolerances indicate error growth if the end is missed."""
 MOST_RESTARTS = 60
 
 
 def at_nodes(run: Run) -> Iterator[Miss]:
-    """States and rows at the start, the via points and the end of a span."""
+    """Yield the misses of states and rows at the start, the via points and the end of a phase."""
     arc, span = run.arc, run.arc.span
     for fraction, boxes in span.nodes.items():
         time = _time(arc, fraction)
@@ -50,7 +50,7 @@ def at_nodes(run: Run) -> Iterator[Miss]:
 
 
 def _rows_at(run: Run, what: str, fraction: float, time: float) -> Iterator[Miss]:
-    """Rows there; inputs and algebraic variables in them are those of the interval before."""
+    """Yield the misses of rows; inputs and algebraic variables are from the interval before."""
     rows = run.arc.span.rows_at.get(fraction, ())
     before = time if fraction == 0.0 else max(np.nextafter(time, -np.inf), run.begin)
     values = run.of(stacked(row.expression for row in rows), before)[:, 0]
@@ -59,16 +59,16 @@ def _rows_at(run: Run, what: str, fraction: float, time: float) -> Iterator[Miss
 
 
 def against_optimised(run: Run) -> Iterator[Miss]:
-    """States at the end of the run against where the optimiser had them, if no value was asked."""
+    """Yield the misses of states at the end against their optimised values, if not prescribed."""
     arc = run.arc
     node = int(np.argmin(np.abs(arc.times - run.end)))
     model = arc.span.model
-    asked = arc.span.nodes[1.0] if run.at_end else {}
+    prescribed = arc.span.nodes[1.0] if run.at_end else {}
     values = run.of(model.vector("x"), run.end)[:, 0]
     for v, value, wanted, size in zip(
         model.x, values.tolist(), arc.nodes[:, node].tolist(), arc.sizes.tolist(), strict=True
     ):
-        if not fixed(asked.get(v.name, FREE)):
+        if not fixed(prescribed.get(v.name, FREE)):
             yield Miss(
                 what="motion",
                 name=v.name,
@@ -81,7 +81,7 @@ def against_optimised(run: Run) -> Iterator[Miss]:
 
 
 def between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
-    """Bounds and path conditions where the runs of one arc keep them worst, over all steps."""
+    """Yield the worst violations of bounds and path conditions by the runs of one arc."""
     for kept in _kept(runs[0].arc):
         size, worst = _magnitude(kept.box, np.zeros(0)), (-np.inf, 0.0, 0.0)
         for run in runs:
@@ -95,7 +95,7 @@ def between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
 
 
 def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
-    """In which intervals a bound or path condition is left by more than `tolerance`, (N,)."""
+    """Return a mask of intervals with a bound or path violation above `tolerance`, (N,)."""
     found = np.zeros(run.arc.intervals, dtype=bool)
     looks = run.looks
     interval = np.searchsorted(run.arc.times, looks, side="right") - 1
@@ -107,7 +107,7 @@ def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
 
 
 def joined(before: Run, after: Run) -> Iterator[Miss]:
-    """Conditions between the end of a span and the start of the next one."""
+    """Yield the misses of conditions between the end of a phase and the start of the next one."""
     if not after.arc.span.joins:
         return
     arguments = [*_signals(before, before.end), *_signals(after, after.begin)]
@@ -119,14 +119,14 @@ def joined(before: Run, after: Run) -> Iterator[Miss]:
 
 
 def _signals(run: Run, time: float) -> list[Array]:
-    """[t, x, z, u, p] at one time."""
+    """Return [t, x, z, u, p] at one time."""
     model = run.arc.span.model
     values = [run.of(model.vector(letter), time)[:, 0] for letter in "xzu"]
     return [np.array([time]), *values, run.arc.p]
 
 
 def periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
-    """States that end as they start."""
+    """Yield the misses of periodic states."""
     for name in problem.periodic:
         model = first.arc.span.model
         v = next(v for v in model.x if v.name == name)
@@ -147,7 +147,7 @@ def periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
 @final
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """Something that holds over a whole span."""
+    """A condition over a whole phase."""
 
     kind: str
     name: str
@@ -157,7 +157,7 @@ class _Kept:
 
 
 def _kept(arc: Arc) -> list[_Kept]:
-    """Bounds of states and algebraic variables, and path conditions."""
+    """Return bounds of states and algebraic variables, and path conditions."""
     span = arc.span
     known = [v for v in (*span.model.x, *span.model.z) if span.box(v.name) != FREE]
     bounds = [_Kept("bound", v.name, v.symbol, span.box(v.name), v.unit) for v in known]
@@ -166,7 +166,7 @@ def _kept(arc: Arc) -> list[_Kept]:
 
 
 def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, float]:
-    """Time and value where a range is left farthest, refined between the `looks`."""
+    """Return time and value of the worst violation of a range, refined between the `looks`."""
     j = int(np.argmax(_outside(values, kept.box)))
     best = (float(_outside(values[j : j + 1], kept.box)[0]), float(looks[j]), float(values[j]))
     low, high = looks[max(j - 1, 0)], looks[min(j + 1, looks.size - 1)]
@@ -181,13 +181,13 @@ def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, f
 
 
 def _magnitude(box: Box, values: Array) -> float:
-    """Of a condition: of its bounds and of its values."""
+    """Return the magnitude of a condition, from its bounds and values."""
     bounds = [abs(b) for b in box if isfinite(b)]
     return max([*bounds, float(np.abs(values).max(initial=0.0))])
 
 
 def _outside(values: Array, box: Box) -> Array:
-    """How far values are outside of a range; negative inside; inf for what is no number."""
+    """Return the distance of values from a range; negative inside; inf for NaN."""
     outside = np.maximum(values - box[1], box[0] - values)
     return np.where(np.isnan(outside), np.inf, outside)
 
@@ -204,33 +204,33 @@ def _row_size(row: Row, value: float) -> float:
 
 
 def _time(arc: Arc, fraction: float) -> float:
-    """When the node at a fraction is [s]."""
+    """Return the time of the node at a fraction [s]."""
     return float(arc.times[int(np.argmin(np.abs(arc.mesh - fraction)))])
 
 
 def verify(solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL) -> Verification:
-    """Simulate the user's model under the control of `solution`, and look at all it was to do.
+    """Simulate the user's model under the control of `solution`, and check all conditions.
 
     One run from the start through all phases, joined by their links, with the inputs held on each
-    interval (of an input with bounded rate, the rate is held). Looked at are the start, via points
+    interval (for an input with bounded rate, the rate is held). Checked are the start, via points
     and the end, joints and periodicity, bounds and path conditions over all steps of the simulation
     and not only at points of the mesh, states at the end of each phase against their optimised
     values, the cost by quadrature of the simulated motion, and the local error of each interval.
 
-    A motion that is unstable by itself cannot be simulated from its start over many times the
-    inverse of its rate of growth, in any arithmetic: errors of 1e-16 grow to be all there is. Where
-    the intervals by themselves are right and the end is missed all the same, the simulation is
-    started again at the nodes where it has departed, and what it says is told beside, under
-    `restarted`; but the control alone does not do what was asked for, so that it is not verified.
+    An unstable motion cannot be simulated from its start over many times the inverse of its growth
+    rate, in any arithmetic: errors of 1e-16 grow until they dominate. If the single intervals are
+    accurate but the end is missed, the simulation is restarted at the nodes where it has departed,
+    and its result is added as `restarted`; but the control alone does not meet the conditions, so
+    the solution is not verified.
 
     Args:
         solution: of any solver.
-        tolerance: relative to the largest magnitude of a state on its way (at least a thousandth
-            of its nominal value), of a condition to that of its bounds and its values.
+        tolerance: relative to the largest magnitude of a state in its phase (at least a thousandth
+            of its nominal value), or of the bounds and values of a condition.
         rtol: of the simulation.
 
     Raises:
-        ValueError: no solution, or a tolerance that is not above zero.
+        ValueError: not a solution, or a tolerance that is not above zero.
     """
     checks.kind("verify", solution, Solution, "a solution, such as solve(...)")
     tolerance = checks.number("verify: tolerance", tolerance, above=0.0)
@@ -239,7 +239,7 @@ def verify(solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL)
 
 
 def verified(solution: Solution, tolerance: float = TOLERANCE) -> Solution:
-    """`solution` with its verification; one that misses is no success, whatever the solver says."""
+    """Return `solution` with its verification, whose status replaces a success if it fails."""
     verification = verify(solution, tolerance)
     checked = replace(solution, verification=verification)
     if verification.ok or not solution.status.ok:
@@ -258,7 +258,7 @@ def verified_arcs(
     tolerance: float = TOLERANCE,
     rtol: float = RTOL,
 ) -> Verification:
-    """The verification of arcs that were optimised at `cost`."""
+    """Verify arcs that were optimised at `cost`."""
     errors = local_errors(arcs, min(1e-6, 1e-2 * tolerance))
     found = _judged(problem, arcs, resimulated(arcs, rtol), errors, cost, tolerance, rtol)
     local = max((float(e.max()) for e in errors), default=0.0)
@@ -281,7 +281,7 @@ def _judged(
     tolerance: float,
     rtol: float,
 ) -> Verification:
-    """What runs of the arcs, in the order of time, say."""
+    """Return the verification from runs of the arcs, in the order of time."""
     bad = next((run for run in runs if not run.ok), None)
     value = float("nan") if bad else cost_of(problem, runs)
     checked = [*looked(problem, runs), *map(_local, arcs, errors)]
@@ -300,7 +300,7 @@ def _judged(
 
 
 def looked(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
-    """Everything that runs were to do; with `optimised` their ends against those of the solver."""
+    """Yield the misses of all conditions; with `optimised` also of the optimised ends."""
     for _, of_arc in groupby(runs, lambda run: run.arc.number):
         yield from between_nodes(list(of_arc))
     for run in runs:
@@ -319,14 +319,14 @@ def looked(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> 
 
 
 def _local(arc: Arc, errors: Array) -> Miss:
-    """The interval with the largest local error."""
+    """Return the interval with the largest local error as a miss."""
     k = int(np.argmax(errors))
     name = arc.span.name
     return Miss("local error", name, float(arc.times[k]), float(errors[k]), 0.0, 1.0)
 
 
 def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
-    """J of the simulated motion: of its scenarios the mean, the sum or the worst."""
+    """Return J of the simulated motion: the mean, the sum or the largest of its scenarios."""
     shares: dict[int, float] = {}
     for run in runs:
         span = run.arc.span
@@ -341,7 +341,7 @@ def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
 
 
 def _size(runs: Sequence[Run], cost: float) -> float:
-    """What a difference of the cost is relative to: J, or what it is the difference of."""
+    """Return the reference magnitude of the cost: J, or its largest part."""
     parts = [abs(cost)]
     for run in runs:
         running = run.arc.span.running
@@ -350,17 +350,17 @@ def _size(runs: Sequence[Run], cost: float) -> float:
 
 
 def near_runs(arcs: Sequence[Arc], tolerance: float) -> tuple[Run, ...]:
-    """Runs from optimised nodes that stay near the optimised motion; none where that fails."""
+    """Return runs from optimised nodes that stay near the optimised motion; empty on failure."""
     return _restarted(arcs, tolerance, RTOL)[0]
 
 
 def _restarted(
     arcs: Sequence[Arc], tolerance: float, rtol: float
 ) -> tuple[tuple[Run, ...], tuple[float, ...]]:
-    """Runs that start again at the optimised nodes wherever they have departed from them.
+    """Simulate with restarts at the optimised nodes wherever the motion has departed.
 
     Returns:
-        The runs and the times of restarts; no restarts where not even single intervals agree.
+        The runs and the times of restarts; both empty if not even single intervals agree.
     """
     runs: list[Run] = []
     restarts: list[float] = []
@@ -379,7 +379,7 @@ def _restarted(
 
 
 def _departs(run: Run, node: int, tolerance: float) -> int:
-    """The last node up to which the run is near all optimised ones."""
+    """Return the last node up to which the run is near all optimised ones."""
     arc = run.arc
     reached = arc.times[node:] <= run.trajectory.span[1]
     times = arc.times[node:][reached]

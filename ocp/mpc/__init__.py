@@ -1,4 +1,4 @@
-"""Receding horizons: quadratic programs on implicit steps, as C, and in closed loop."""
+"""Model predictive control: quadratic programs on implicit steps, C code, and closed loops."""
 
 from typing import TYPE_CHECKING
 

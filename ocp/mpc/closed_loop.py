@@ -1,9 +1,9 @@
-"""A controller on a plant with equations of its own, and a second opinion on its plans.
+"""A controller on a simulated plant, and an independent check of its plans.
 
-The second opinion is the conditions of optimality by derivatives of CasADi: nothing in it is shared
-with the solver but the expressions of the horizon. The program over all states and inputs is
-written down whole, differentiated as one expression, and the multipliers of the equations are those
-that make the gradient in the states zero (a linear system).
+The check evaluates the conditions of optimality by derivatives of CasADi: it shares only the
+expressions of the horizon with the solver. The program over all states and inputs is formulated as
+a whole, differentiated as one expression, and the multipliers of the equations are those that make
+the gradient in the states zero (a linear system).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 @final
 class Optimality:
-    """Residuals of plans of a design."""
+    """Independent residuals of plans of a design."""
 
     def __init__(self, design: Design) -> None:
         h = design.horizon
@@ -75,7 +75,7 @@ class Optimality:
         self._size = w.numel()
 
     def residual(self, plan: Plan, data: CycleData) -> float:
-        """As `ocp.mpc.source` defines it."""
+        """Return the residual as defined in `ocp.mpc.source`."""
         h, prices = self._design.horizon, self._design.prices
         gradient, slopes, c, v = evaluate_all(
             self._whole, plan.X, plan.U, data.R, data.t, data.p, data.b, plan.z
@@ -101,9 +101,9 @@ Reference = float | Callable[[Array], ArrayLike]
 COLUMNS = (
     "residual", "seconds", "cpu", "iterations", "program_iterations", "violation",
 )  # fmt: skip
-"""Values of each action that a loop keeps."""
+"""Values of each action that a loop stores."""
 SLACK = 1e-3
-"""By what share a residual may differ from the second opinion on it: rounding."""
+"""Relative difference between a residual and its check that is rounding error."""
 
 
 @final
@@ -120,11 +120,11 @@ class ClosedLoop:
         controls: input -> value held over the interval after each cycle.
         references: name -> value at each cycle.
         residual: of each cycle, as the controller reports it.
-        checked: the same by a second opinion (`optimality`); NaN without it.
-        seconds, cpu: that each cycle took on the clock, and of the processor [s]; the first counts
-            other programs on a busy machine, too.
+        checked: the same by the independent check (`Optimality`); NaN without it.
+        seconds, cpu: wall time and processor time of each cycle [s]; the wall time includes other
+            programs on a busy machine.
         iterations, program_iterations: quadratic programs, and of the interior point.
-        violation: largest of a soft bound in the plan, in units of its signal.
+        violation: largest violation of a soft bound in the plan, in units of its signal.
         status: of each cycle, numbers of `CycleStatus`.
         tolerance: of the residual.
     """
@@ -170,23 +170,23 @@ class ClosedLoop:
 
     @property
     def unconverged(self) -> int:
-        """Cycles that say themselves that they did not converge."""
+        """Number of cycles with a status other than CONVERGED."""
         return int(np.count_nonzero(self.status != CycleStatus.CONVERGED))
 
     @property
     def unreported(self) -> int:
-        """Cycles that say they converged, and by their own residual or the second opinion did not.
+        """Number of cycles reported as converged that were not, by their residual or the check.
 
-        There should be none.
+        It should be zero.
         """
-        said = self.status == CycleStatus.CONVERGED
+        reported = self.status == CycleStatus.CONVERGED
         allowed = self.tolerance * (1.0 + SLACK)
         wrong = ~(self.residual <= self.tolerance) | (self.checked > allowed)
-        return int(np.count_nonzero(said & wrong))
+        return int(np.count_nonzero(reported & wrong))
 
     def table(self) -> str:
-        """A few lines of text."""
-        said = self.residual[np.isfinite(self.residual)]
+        """Return a summary of a few lines."""
+        finite = self.residual[np.isfinite(self.residual)]
         cycles = self.seconds.size
         return "\n".join(
             (
@@ -196,15 +196,15 @@ class ClosedLoop:
                 f"  iterations      median {np.median(self.iterations):g}, most "
                 f"{self.iterations.max(initial=0)}",
                 f"  residual        median {np.median(self.residual):.1e}, worst "
-                f"{said.max(initial=0.0):.1e}, tolerance {self.tolerance:.0e}",
-                f"  not converged   {self.unconverged} of {cycles}, said so",
+                f"{finite.max(initial=0.0):.1e}, tolerance {self.tolerance:.0e}",
+                f"  not converged   {self.unconverged} of {cycles}, as reported",
                 f"  unreported      {self.unreported}",
             )
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The table as plain data."""
-        said = self.residual[np.isfinite(self.residual)]
+        """Return the table as plain data."""
+        finite = self.residual[np.isfinite(self.residual)]
         return {
             "controller": self.controller,
             "plant": self.plant,
@@ -213,13 +213,13 @@ class ClosedLoop:
             "worst_s": self.worst,
             "worst_cpu_s": self.worst_cpu,
             "most_iterations": int(self.iterations.max(initial=0)),
-            "worst_residual": float(said.max(initial=0.0)),
+            "worst_residual": float(finite.max(initial=0.0)),
             "not_converged": self.unconverged,
             "unreported": self.unreported,
         }
 
     def to_csv(self, path: str | Path) -> None:
-        """Write a row a cycle: time, signals, controls, references, and how the cycle went."""
+        """Write a row per cycle: time, signals, controls, references, residual and status."""
         columns: dict[str, Array] = {"t [s]": self.t}
         signals = {name: values[:-1] for name, values in self.signals.items()}
         for name, values in (signals | dict(self.controls)).items():
@@ -230,7 +230,7 @@ class ClosedLoop:
         write_table(path, columns, np.column_stack(list(columns.values())).tolist())
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
-        """Signals, controls and cycle times over time, a panel each; shaded: not converged.
+        """Plot signals, controls and cycle times over time, a panel each; shaded: not converged.
 
         Args:
             names: signals and controls to show, by default all.
@@ -242,13 +242,13 @@ class ClosedLoop:
 def plot_loops(
     loops: Mapping[str, ClosedLoop], names: Sequence[str] = (), path: str | Path | None = None
 ) -> "Figure":
-    """Signals and controls of closed loops over time, a panel each, and the time of their cycles.
+    """Plot signals and controls of closed loops over time, a panel each, and their cycle times.
 
     Shaded cycles did not converge, by their own status.
 
     Args:
         loops: legend entry -> loop.
-        names: signals and controls to show; all those that the loops share if none is given.
+        names: signals and controls to show; by default all that the loops share.
         path: image file.
     """
     first = next(iter(loops.values()))
@@ -296,7 +296,7 @@ def run_closed_loop(
     seed: int,
     check: bool,
 ) -> ClosedLoop:
-    """See `Controller.simulate`."""
+    """Simulate a closed loop; see `Controller.simulate`."""
     where = "simulate"
     check_model(where, plant)
     h = design.horizon
@@ -344,7 +344,7 @@ def _values(reference: Reference, times: Array) -> Array:
 @final
 @dataclass(frozen=True, eq=False)
 class _Log:
-    """Values of a closed loop so far: signals, actions, second opinions, references."""
+    """Values of a closed loop so far: signals, actions, checks, references."""
 
     signals: dict[str, list[float]]
     actions: list[Action] = field(default_factory=list[Action])
@@ -352,7 +352,7 @@ class _Log:
     wanted: list[dict[str, float]] = field(default_factory=list[dict[str, float]])
 
     def loop(self, design: Design, plant: Model) -> ClosedLoop:
-        """All of it as arrays."""
+        """Return everything as arrays."""
         step, cycles = design.horizon.step, len(self.actions)
         names, references = [c.name for c in design.controls], self.wanted[0]
 

@@ -1,4 +1,4 @@
-"""Model predictive controllers made of problems, and their C in files."""
+"""Model predictive controllers derived from problems, and their generated C files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
     "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos", "memcpy", "memmove",
     "memset", "_GLOBAL_OFFSET_TABLE_",
 }  # fmt: skip
-"""Symbols that the object file may need: math.h, and copies that the compiler itself makes."""
+"""Symbols that the object file may need: math.h, and copies inserted by the compiler."""
 
 TINY = float(np.finfo(float).tiny)
 
@@ -44,13 +44,13 @@ class ControllerCheck:
     """Result of checking generated C.
 
     Attributes:
-        status: "verified", or the reason in a sentence.
-        cycles: that were judged.
-        warnings: what the compiler warned of.
-        foreign: what the object file needs besides functions of math.h; None without `nm`.
+        status: "verified", or the reason.
+        cycles: number of checked cycles.
+        warnings: of the compiler.
+        foreign: symbols that the object file needs besides math.h; None without `nm`.
         difference: largest relative difference of a control from its plan, and of a residual, as
-            far as it is above the tolerance, from the second opinion; rounding is allowed.
-        bytes: size of the struct that holds plan and work space.
+            far as above the tolerance, from the independent check; rounding is allowed.
+        bytes: size of the struct with plan and work space.
     """
 
     status: str
@@ -62,17 +62,17 @@ class ControllerCheck:
 
     @property
     def ok(self) -> bool:
-        """No warnings, nothing foreign, plans as optimal as reported."""
+        """True if there are no warnings, no foreign symbols, and plans as optimal as reported."""
         return self.status == "verified"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class GeneratedController:
-    """Files that `Controller.to_c` wrote.
+    """Files written by `Controller.to_c`.
 
     Attributes:
-        folder: where the files are.
+        folder: folder of the files.
         files: header and source.
         design: of the controller.
     """
@@ -82,11 +82,11 @@ class GeneratedController:
     design: Design
 
     def verify(self, cycles: int = 100) -> ControllerCheck:
-        """Compile the files and judge what they compute by a second opinion; see `ControllerCheck`.
+        """Compile the files and check their results independently; see `ControllerCheck`.
 
         The loop is closed through the controller's own model, with noise, references that jump,
-        far states, and measured numbers that are not finite. The second opinion on each residual is
-        that of `Controller.simulate`: derivatives by CasADi of the whole program.
+        distant states, and non-finite measurements. The independent residual is that of
+        `Controller.simulate`: derivatives by CasADi of the whole program.
         """
         compiler, design = find_compiler(), self.design
         if compiler is None:
@@ -110,7 +110,7 @@ class GeneratedController:
 
 
 def _difference(design: Design, session: Session, cycles: int) -> float:
-    """Largest relative difference over a loop that is hard on the controller."""
+    """Return the largest relative difference over a demanding loop."""
     h, random, opinion = design.horizon, np.random.default_rng(0), Optimality(design)
     own = list(design.measured)
     nominal, settings = h.model.nominal("x")[own], design.settings
@@ -139,19 +139,19 @@ def _difference(design: Design, session: Session, cycles: int) -> float:
 
 
 OWN = ("residual", "violation", "iterations", "program_iterations", "status", "converged")
-"""Members of what the C hands out, besides the controls."""
+"""Members of the output struct in C, besides the controls."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A model predictive controller; made by `controller_of` or `problem.to_mpc`.
+    """A model predictive controller; created by `controller_of` or `problem.to_mpc`.
 
-    Every `step` seconds the states are measured, the problem is solved over the next T seconds from
-    there, and the inputs of the first interval are applied.
+    Every `step` seconds the states are measured, the problem is solved over the next T seconds
+    from there, and the inputs of the first interval are applied.
 
     Attributes:
-        design: its horizon, and how it is solved.
+        design: its horizon and settings.
     """
 
     design: Design
@@ -172,24 +172,24 @@ class Controller:
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """Names of the states that are measured."""
+        """Names of the measured states."""
         return self.design.measured_names
 
     @property
     def references(self) -> tuple[str, ...]:
-        """Names of what it follows."""
+        """Names of its references."""
         return self.design.horizon.references
 
     @property
     def bounds(self) -> dict[str, float]:
-        """Names of all bounds in C, and their numbers."""
+        """Names of all bounds in C, and their values."""
         return dict(zip(self.design.bound_names, self.design.bounds.tolist(), strict=True))
 
     def start(self, backend: str = "auto") -> Session:
-        """The controller at work, without a plan yet.
+        """Return a running controller, without a plan.
 
         Args:
-            backend: "auto" or "compiled", which mean the same: the C of `to_c` on this machine.
+            backend: "auto" or "compiled", with the same meaning: the C of `to_c` on this machine.
 
         Raises:
             CompileError: there is no compiler (install gcc or clang, or set $CC), or it failed.
@@ -216,20 +216,20 @@ class Controller:
         check: bool = True,
         backend: str = "auto",
     ) -> ClosedLoop:
-        """The controller on a plant, whose equations may be others: simulated within tolerances.
+        """Simulate the controller on a plant, whose equations may differ from its model.
 
-        The plant has the inputs that are controlled and the signals that are measured by the same
-        names; its other inputs keep the values of the model.
+        The plant has the controlled inputs and the measured signals by the same names; its other
+        inputs keep the values of the model.
 
         Args:
             plant: the model of the plant, with events or without.
             t_end: [s], rounded to whole cycles.
-            references: name -> number, or function of times [s], which the controller knows ahead.
+            references: name -> number, or function of times [s], known to the controller in advance.
             x0, plant_p: start values and parameters of the plant, by name.
             p: parameters of the controller's model, by name.
             noise: standard deviation of measured states, by name.
             seed: of the noise.
-            check: whether an independent residual is computed for each cycle, at some
+            check: whether an independent residual is computed for each cycle, which takes some
                 milliseconds each.
             backend: as in `start`.
 
@@ -246,9 +246,9 @@ class Controller:
     def to_c(self, folder: str | Path) -> GeneratedController:
         """Write the controller as C99: `NAME.h` and `NAME.c`.
 
-        The C allocates nothing, needs math.h alone, and has no data but constants: memory is in the
-        caller's struct. Every loop is bounded, so a cycle has a longest time. Each cycle reports
-        the residual of what it hands out. `start` runs the same C.
+        The C allocates nothing, needs only math.h, and has no data but constants: memory is in the
+        caller's struct. Every loop is bounded, so the time of a cycle is bounded. Each cycle
+        reports the residual of its output. `start` runs the same C.
 
         Raises:
             ValueError: no folder, or an operation that C99 lacks.
@@ -272,41 +272,41 @@ def controller_of(
     penalty: float = 1e3,
     name: str | None = None,
 ) -> Controller:
-    """A model predictive controller of a problem of one phase, whose duration T is the horizon.
+    """Derive a model predictive controller from a problem of one phase, whose duration T is the horizon.
 
         min  sum_k h [sum_i w_i r_i^2 + L] + E(x_N)   s.t.  x_(k+1) = F(x_k, u_k),  bounds
 
-    by sequential quadratic programs (`ocp.mpc.source`) from the shifted plan of the last cycle,
+    by sequential quadratic programs (`ocp.mpc.source`) from the shifted plan of the previous cycle,
     over N = T / step intervals with inputs held. Costs are `track`, `effort`, and convex quadratic
-    `integral` and `at_end`; what `track("x", "goal", 900.0)` refers to by name is a reference of
-    the controller, whose default stands in the `p` of the problem. The start of the phase is not
+    `integral` and `at_end`; a name such as "goal" in `track("x", "goal", 900.0)` is a reference of
+    the controller, with its default in the `p` of the problem. The start of the phase is not
     used: the state is measured. Bounds on inputs are hard; those on states and outputs, path
     conditions and the end of the phase are soft, with an exact penalty.
 
     Args:
-        problem: what to minimise.
+        problem: the problem to minimise.
         step: time between cycles [s].
         method, steps: of `flow`, for an interval. The steps should resolve the transition velocity
-            of friction: where v changes by much more than v_t in one, iterations converge slowly or
-            not, as the residual shows. With bristles "backward_euler".
-        measured: names of measured states, by default all; the others, such as bristles, are those
-            of the plan. Inputs with a rate (`rates`) are never measured.
+            of friction: if v changes by much more than v_t in one step, iterations converge slowly or
+            not at all, as the residual shows. With bristles "backward_euler".
+        measured: names of measured states, by default all; the others, such as bristles, are taken
+            from the plan. Inputs with a rate (`rates`) are never measured.
         tolerance: residual (see `ocp.mpc.source`) at which a plan is optimal.
-        iterations: quadratic programs in a cycle at most; 1 is the real-time iteration.
-        penalty: price of violating a soft bound by its unit, per largest curvature of the cost.
-        name: C identifier; by default that of the model with "_mpc".
+        iterations: largest number of quadratic programs in a cycle; 1 is the real-time iteration.
+        penalty: penalty of violating a soft bound by its unit, per largest curvature of the cost.
+        name: C identifier; by default the name of the model with "_mpc".
 
     Raises:
-        ValueError: what a controller cannot take: several phases, scenarios, chosen parameters, a
+        ValueError: unsupported features: several phases, scenarios, chosen parameters, a
             free duration, via points, algebraic variables, events, time in the equations, a cost
-            without curvature; names that C cannot have.
+            without curvature; names that are not C identifiers.
 
     Limits: inputs are constant over an interval; unmeasured states are not estimated, only
-    predicted; far from the optimum iterations may run out, as the status reports. Friction
-    that is very sharp hides the way out of rest: a plan that stays there is optimal to first order,
-    and is what comes out, converged. Let the controller believe in a v_t of about a hundredth of
-    the velocities (on a drive that moves at 1 m/s, 1e-2 m/s leaves rest and 1e-3 m/s does not); the
-    friction of the plant may be as sharp as it likes.
+    predicted; far from the optimum iterations may run out, as the status reports. Very sharp
+    friction hides the way out of stick: a plan that sticks is optimal to first order, and is the
+    converged result. Use a v_t of about a hundredth of the velocities in the controller (on a drive
+    that moves at 1 m/s, 1e-2 m/s leaves stick and 1e-3 m/s does not); the friction of the plant may
+    be arbitrarily sharp.
     """
     where = f"to_mpc '{problem.name}'"
     horizon = horizon_of(problem, step, method=method, steps=steps)
@@ -338,7 +338,7 @@ def controller_of(
 
 
 def _rows(horizon: Horizon, name: str) -> tuple[int | None, int | None]:
-    """Numbers of the bounds of a state or input."""
+    """Return the indices of the bounds of a state or input."""
     names = [limit.name for limit in horizon.limits]
     sides = (f"{side} bound on {name}" for side in ("lower", "upper"))
     lower, upper = (names.index(side) if side in names else None for side in sides)
@@ -346,7 +346,7 @@ def _rows(horizon: Horizon, name: str) -> tuple[int | None, int | None]:
 
 
 def _boxes(horizon: Horizon) -> tuple[Array, Array]:
-    """Lower and upper bounds of the inputs."""
+    """Return lower and upper bounds of the inputs."""
     pairs = [_rows(horizon, v.name) for v in horizon.model.u]
     lower = [-np.inf if low is None else horizon.limits[low].bound for low, _ in pairs]
     upper = [np.inf if high is None else horizon.limits[high].bound for _, high in pairs]
@@ -369,7 +369,7 @@ def _controls(own: Model, horizon: Horizon) -> tuple[Control, ...]:
 
 
 def _check_names(where: str, design: Design) -> None:
-    """Names become members of structs: identifiers of C, each once in its struct."""
+    """Raise ValueError unless names are C identifiers, unique in their structs."""
     h = design.horizon
     constants = [v.name for v in h.model.p if v.name not in h.references]
     structs = (

@@ -1,4 +1,4 @@
-"""All that makes a controller: its horizon, how it is solved, what goes in and what comes out."""
+"""Definition of a controller: its horizon, settings, measurements and controls."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -25,14 +25,14 @@ class CycleStatus(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """Meaning, and what to try."""
+        """Meaning of the status, and what to try."""
         return {
             0: "converged",
             1: "not converged: the residual is above the tolerance after the last iteration; allow "
-            "more of them, or let steps resolve the transition velocity",
-            2: "bad input: a number is not finite; the plan of the last cycle goes on",
-            3: "failed: numbers were not finite; the plan of the last cycle goes on, the next one "
-            "starts afresh",
+            "more of them, or use steps that resolve the transition velocity",
+            2: "bad input: a number is not finite; the plan of the previous cycle continues",
+            3: "failed: numbers were not finite; the plan of the previous cycle continues, the "
+            "next one restarts",
         }[int(self)]
 
 
@@ -43,9 +43,9 @@ class Settings:
 
     Attributes:
         tolerance: residual at which a plan is optimal.
-        iterations: quadratic programs at most; 1 is the real-time iteration.
-        program: iterations of the interior point in each at most.
-        halvings: of a step, at most.
+        iterations: largest number of quadratic programs; 1 is the real-time iteration.
+        program: largest number of interior-point iterations in each.
+        halvings: largest number of step halvings.
     """
 
     tolerance: float = 1e-3
@@ -84,7 +84,7 @@ class CycleData:
 @final
 @dataclass(frozen=True, eq=False)
 class Prices:
-    """rho and sigma of all rows, zeros in hard ones, and which are soft."""
+    """rho and sigma of all rows, zero in hard ones, and a mask of soft ones."""
 
     rho: Array
     sigma: Array
@@ -98,8 +98,8 @@ class Control:
 
     Attributes:
         name, unit: of the input.
-        place: number of the input, or of the state where `rated`.
-        lower, upper: numbers of its bounds among those of the horizon; None where there is none.
+        place: index of the input, or of the state if `rated`.
+        lower, upper: indices of its bounds in the horizon; None if there is none.
     """
 
     name: str
@@ -110,7 +110,7 @@ class Control:
     upper: int | None
 
     def of(self, X: Array, U: Array, b: Array) -> float:
-        """Its value in a plan, within its bounds."""
+        """Return its value in a plan, within its bounds."""
         value = 0.5 * (X[0, self.place] + X[1, self.place]) if self.rated else U[0, self.place]
         if self.lower is not None and value < b[self.lower]:
             value = b[self.lower]
@@ -122,17 +122,17 @@ class Control:
 @final
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A controller, apart from what it remembers.
+    """A controller, without its internal state.
 
     Attributes:
         name: C identifier.
-        horizon: what is minimised.
+        horizon: the minimised problem.
         settings: limits of the work.
-        measured: numbers of the states that are measured; the others are those of the plan.
-        controls: what comes out.
+        measured: indices of the measured states; the others are taken from the plan.
+        controls: its outputs.
         x0, u0: states and inputs of the first plan.
         p0, r0: default parameters and references.
-        penalty: price of violating a soft bound by its unit, per largest curvature of the cost.
+        penalty: penalty of violating a soft bound by its unit, per largest curvature of the cost.
     """
 
     name: str
@@ -174,7 +174,7 @@ class Design:
 
     @cached_property
     def bound_names(self) -> tuple[str, ...]:
-        """C names of the bounds, each once."""
+        """Unique C names of the bounds."""
         h, found = self.horizon, list[str]()
         for limit in (*h.limits, *h.end_limits):
             side, _, rest = limit.name.partition(" ")

@@ -1,11 +1,11 @@
-"""The horizon of a controller: one interval as expressions, from a problem of one phase.
+"""The horizon of a controller: an interval as expressions, from a problem of one phase.
 
     x_(k+1) = F(x_k, u_k),   cost = sum_k h [sum_i w_i r_i^2 + L] + E(x_N),   v >= 0
 
-Terms with inputs in them are taken at (x_k, u_k), those of states alone at x_(k+1): what has been
-measured cannot be changed. Each bound is a row v >= 0 in units of its signal. Bounds on inputs
+Terms with inputs are evaluated at (x_k, u_k), terms of states alone at x_(k+1): the measured state
+cannot be changed. Each bound is a row v >= 0 in units of its signal. Bounds on inputs
 alone are hard; all others are soft, with the penalty rho s + sigma s^2 / 2 on a violation s, exact
-where rho is larger than the multiplier: so every quadratic program has a solution.
+if rho is larger than the multiplier: so every quadratic program has a solution.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 MOST_STEPS = 10_000
 FLAT = 1e-6
-"""Curvature of the cost in an input that has none of its own, relative to the largest one."""
+"""Curvature added for an input without one in the cost, relative to the largest one."""
 
 
 @final
@@ -38,9 +38,9 @@ class Limit:
     """A bound as a row v = sign (e - bound) / unit >= 0.
 
     Attributes:
-        name: what it is about, with "lower" or "upper" in front.
-        bound: its number; a parameter at run time.
-        soft: whether it may be violated at a price.
+        name: its subject, with "lower" or "upper" in front.
+        bound: its value; a parameter at run time.
+        soft: whether it may be violated with a penalty.
     """
 
     name: str
@@ -64,22 +64,22 @@ class Costs:
 @final
 @dataclass(frozen=True, eq=False)
 class Horizon:
-    """An interval and the end of the horizon in symbols of their own.
+    """An interval and the end of the horizon in separate symbols.
 
     Attributes:
-        model: whose equations the controller believes.
+        model: of the controller.
         count: number of intervals N.
         step: their length h [s].
         references: names of the parameters that may differ from interval to interval.
         x, u, after: states at the beginning, inputs, states at the end, SX columns.
         t, r, r_after, p, b: time at the beginning, references at beginning and end, the other
             parameters, bounds of `limits` and `end_limits`.
-        advance: one of the `substeps` of an interval, (x, u, r, p) -> x; F are all of them.
+        advance: one of the `substeps` of an interval, (x, u, r, p) -> x; F consists of all of them.
         early, late: cost in (x, u), and in `after`; `end` in `x`: at the end of the horizon.
-        limits: rows of an interval; those of states alone are about `after`.
-        end_limits: rows about `x` at the end of the horizon.
-        curvature: smallest own curvature of the cost in an input, per nominal^2: what residuals
-            are measured with.
+        limits: rows of an interval; rows of states alone use `after`.
+        end_limits: rows in `x` at the end of the horizon.
+        curvature: smallest own curvature of the cost in an input, per nominal^2: the unit of
+            residuals.
         weight: largest curvature of an interval, per nominal^2.
     """
 
@@ -113,7 +113,7 @@ class Horizon:
 
 @final
 class Places:
-    """Expressions in the symbols of a model, taken at the beginning or the end of an interval."""
+    """Expressions in the symbols of a model, evaluated at the start or the end of an interval."""
 
     def __init__(self, model: Model, references: Sequence[str], step: float) -> None:
         self.x, self.u, self.after = (
@@ -126,17 +126,17 @@ class Places:
         self._model, self._step = model, step
 
     def parameters(self, r: ca.SX) -> ca.SX:
-        """All parameters in the order of the model."""
+        """Return all parameters in the order of the model."""
         given = {name: r[i] for i, name in enumerate(self.references)}
         rest = iter(ca.vertsplit(self.p) if self.p.numel() else [])
         return stacked(given[v.name] if v.name in given else next(rest) for v in self._model.p)
 
     def early(self, expression: ca.SX) -> ca.SX:
-        """At the beginning, with the inputs of the interval."""
+        """Evaluate at the beginning, with the inputs of the interval."""
         return self._taken(expression, self.t, self.x, self.u, self.parameters(self.r))
 
     def late(self, expression: ca.SX) -> ca.SX:
-        """At the end of the interval; for expressions without inputs."""
+        """Evaluate at the end of the interval; for expressions without inputs."""
         t = self.t + self._step
         return self._taken(expression, t, self.after, self.u, self.parameters(self.r_after))
 
@@ -147,7 +147,7 @@ class Places:
 
 
 def squares(terms: Iterable[tuple[float, ca.SX]], v: ca.SX) -> Costs:
-    """Sum of weight r^2: value, gradient, and Hessian without the curvature of r."""
+    """Return the sum of weight r^2: value, gradient, and Hessian without the curvature of r."""
     value, gradient = ca.SX(0), ca.SX(v.numel(), 1)
     hessian = ca.SX(v.numel(), v.numel())
     for weight, r in terms:
@@ -159,10 +159,10 @@ def squares(terms: Iterable[tuple[float, ca.SX]], v: ca.SX) -> Costs:
 
 
 def quadratic(where: str, expression: ca.SX, v: ca.SX) -> Costs:
-    """A convex quadratic expression.
+    """Return the costs of a convex quadratic expression.
 
     Raises:
-        ValueError: its Hessian depends on something or has a negative eigenvalue.
+        ValueError: its Hessian is not constant or has a negative eigenvalue.
     """
     hessian, gradient = ca.hessian(expression, v)
     hessian = ca.simplify(hessian)
@@ -178,7 +178,7 @@ def quadratic(where: str, expression: ca.SX, v: ca.SX) -> Costs:
 
 
 def total(costs: Iterable[Costs], n: int) -> Costs:
-    """Their sum in the same n symbols."""
+    """Return the sum of costs in the same n symbols."""
     found = Costs(ca.SX(0), ca.SX(n, 1), ca.SX(n, n))
     for c in costs:
         found = Costs(found.value + c.value, found.gradient + c.gradient, found.hessian + c.hessian)
@@ -186,7 +186,7 @@ def total(costs: Iterable[Costs], n: int) -> Costs:
 
 
 def sides(row: Row, unit: float, *, soft: bool) -> list[Limit]:
-    """The finite bounds of a row."""
+    """Return the finite bounds of a row."""
     ends = (("lower", 1.0, row.lower), ("upper", -1.0, row.upper))
     return [
         Limit(f"{name} {row.name}", row.expression, sign, bound, unit, soft)
@@ -196,7 +196,7 @@ def sides(row: Row, unit: float, *, soft: bool) -> list[Limit]:
 
 
 def box_rows(span: Span, fraction: float | None = None) -> list[tuple[Row, float]]:
-    """(row, unit) of the bounds of states and inputs, or of states at a fraction of T."""
+    """Return (row, unit) of the bounds of states and inputs, or of states at a fraction of T."""
     found: list[tuple[Row, float]] = []
     model = span.model
     boxes: Mapping[str, tuple[float, float]] = (
@@ -205,7 +205,7 @@ def box_rows(span: Span, fraction: float | None = None) -> list[tuple[Row, float
     for v in (*model.x, *model.u):
         low, high = boxes.get(v.name, (-np.inf, np.inf))
         if fraction is not None and (low, high) == span.boxes.get(v.name):
-            continue  # kept on the whole horizon
+            continue  # enforced on the whole horizon
         half = 0.5 * (high - low)
         unit = half if isfinite(half) and half > 0.0 else v.nominal
         if low > -np.inf or high < np.inf:
@@ -214,15 +214,15 @@ def box_rows(span: Span, fraction: float | None = None) -> list[tuple[Row, float
 
 
 def horizon_of(problem: Problem, step: float, *, method: str, steps: int) -> Horizon:
-    """The horizon of a problem of one phase.
+    """Return the horizon of a problem of one phase.
 
     Args:
-        problem: with a fixed duration T, a whole number of times `step`.
+        problem: with a fixed duration T, an integer multiple of `step`.
         step: [s].
         method, steps: of `flow`, for one interval.
 
     Raises:
-        ValueError: all that a controller cannot take, at once.
+        ValueError: all unsupported features, at once.
     """
     step = checks.number("to_mpc: step", step, unit="s", above=0.0)
     steps = checks.count("to_mpc: steps", steps)
@@ -278,7 +278,7 @@ def _split(
     squared: list[tuple[float, ca.SX]],
     others: list[tuple[float, ca.SX]],
 ) -> tuple[Costs, Costs]:
-    """Costs of an interval: those with inputs in them at its begin, the others at its end."""
+    """Return the costs of an interval: terms with inputs at its begin, the others at its end."""
 
     def share(moving: bool, place: Callable[[ca.SX], ca.SX], v: ca.SX) -> Costs:
         mine = [(w, place(e)) for w, e in squared if ca.depends_on(e, inputs) == moving]
@@ -289,9 +289,9 @@ def _split(
 
 
 def _advance(at: Places, model: Model, method: str, h: float) -> ca.Function:
-    """(x, u, r, p) -> x after a step of h [s] of `flow`, as an SX Function.
+    """Return (x, u, r, p) -> x after a step of h [s] of `flow`, as an SX Function.
 
-    Accelerations of a mechanism are written out, and are no unknowns whose start must be found.
+    Accelerations of a mechanism are explicit, not unknowns that need a start.
 
     Raises:
         ValueError: see `flow`.
@@ -305,16 +305,18 @@ def _advance(at: Places, model: Model, method: str, h: float) -> ca.Function:
 
 
 def _span(problem: Problem, step: float) -> tuple[Span, int]:
-    """The only span of the problem, and its number of intervals."""
+    """Return the only phase of the problem, and its number of intervals."""
     spans = problem.spans
     span = spans[0]
     model, problems = span.model, list[str]()
     if len(spans) > 1:
-        problems.append(f"expected one phase and no scenarios, got {len(spans)} spans")
+        problems.append(
+            f"expected one phase and no scenarios, got {len(spans)} phases in all scenarios"
+        )
     if span.chosen:
         problems.append(f"expected no chosen parameters, got {', '.join(span.chosen)}")
     if problem.periodic:
-        problems.append("expected nothing periodic, which has no meaning from a measured state")
+        problems.append("expected no periodic states, which are meaningless from a measured state")
     if set(span.nodes) | set(span.rows_at) > {0.0, 1.0}:
         problems.append("expected no via points: the horizon moves; use a reference over time")
     held = sorted({n for at in span.inputs_at.values() for n in at if at[n] != span.boxes.get(n)})
@@ -348,12 +350,12 @@ def _span(problem: Problem, step: float) -> tuple[Span, int]:
 
 
 def _costs(problem: Problem) -> list[Cost]:
-    """The costs that make up the only span's share."""
+    """Return the costs of the only phase."""
     return [cost for cost in (problem.cost, problem.chain[0].cost) if cost is not None]
 
 
 def _others(problem: Problem, span: Span) -> list[tuple[float, ca.SX]]:
-    """Terms of the running cost that are no squares."""
+    """Return terms of the running cost that are not squares."""
     rest = span.running - sum((w * e**2 for w, e in span.squares), ca.SX(0))
     if not any(cost.running for cost in _costs(problem)):
         return []
@@ -363,7 +365,7 @@ def _others(problem: Problem, span: Span) -> list[tuple[float, ca.SX]]:
 def _curvatures(
     at: Places, model: Model, early: Costs, late: Costs, end: Costs
 ) -> tuple[float, float]:
-    """Smallest own curvature in an input, and largest of all, per nominal^2 at the start."""
+    """Return the smallest own curvature in an input, and the largest of all, per nominal^2."""
     nominal = np.concatenate([model.nominal("x"), model.nominal("u"), *2 * [model.nominal("x")]])
     diagonal = ca.vertcat(*(ca.diag(c.hessian) for c in (early, late, end)))
     symbols = [at.x, at.u, at.after, at.r, at.r_after, at.p, at.t]
@@ -380,7 +382,7 @@ def _curvatures(
 
 
 def _limits(span: Span, fraction: float | None = None) -> list[Limit]:
-    """Bounds over an interval, hard where they are on inputs alone; or at a fraction of T, soft."""
+    """Return bounds over an interval, hard for inputs alone; or at a fraction of T, soft."""
     further = span.path if fraction is None else span.rows_at.get(fraction, ())
     symbols = {v.symbol.__hash__() for v in span.model.u}
     found: list[Limit] = []
@@ -391,7 +393,7 @@ def _limits(span: Span, fraction: float | None = None) -> list[Limit]:
 
 
 def _placed(limit: Limit, at: Places, inputs: ca.SX | None) -> Limit:
-    """The limit at the place of the interval where it holds."""
+    """Return the limit at its place in the interval."""
     moving = inputs is None or ca.depends_on(limit.expression, inputs)
     placed = (at.early if moving else at.late)(limit.expression)
     return Limit(limit.name, placed, limit.sign, limit.bound, limit.unit, limit.soft)

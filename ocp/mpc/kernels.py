@@ -5,9 +5,9 @@ The quadratic program of an iteration, with d the change of the states and c = F
     min  sum_k g_k'(d_k, du_k) + 1/2 (d_k, du_k)'H_k(d_k, du_k) + the same of d_(k+1)
     s.t. d_(k+1) = A_k d_k + B_k du_k + c_k,   d_0 = 0,   v + D (d_k, du_k, d_(k+1)) >= 0
 
-is solved by Riccati's recursion, to which an interior point adds weights w and slopes e of the
-rows, H + D'w D and g + D'e. The loops over the intervals in C (`ocp.mpc.source`) call these
-functions. What is constant in A, B, H and D is folded into the code.
+is solved by a Riccati recursion, to which an interior-point method adds weights w and slopes e of
+the rows, H + D'w D and g + D'e. The loops over the intervals in C (`ocp.mpc.source`) call these
+functions. Constants in A, B, H and D are folded into the code.
 
 Source: Rao, Wright and Rawlings, Application of interior-point methods to model predictive control,
     JOTA 99(3), 1998.
@@ -25,14 +25,14 @@ from symfric.foundation.variable import stacked
 
 @final
 class Packed:
-    """Matrices as one column of the entries that vary."""
+    """Matrices stored as one column of their varying entries."""
 
     def __init__(self) -> None:
         self.entries: list[ca.SX] = []
         self._parts: dict[str, tuple[ca.SX, list[int]]] = {}
 
     def add(self, name: str, matrix: ca.SX, *, all_of_it: bool = False) -> None:
-        """Append a matrix: its structural entries, constants left out unless `all_of_it`."""
+        """Append a matrix: its structural entries, without constants unless `all_of_it`."""
         matrix = ca.densify(ca.SX(matrix)) if all_of_it else ca.sparsify(ca.SX(matrix))
         places: list[int] = []
         entries: list[Any] = matrix.nonzeros()
@@ -44,11 +44,11 @@ class Packed:
         self._parts[name] = matrix, places
 
     def column(self) -> ca.SX:
-        """All that varies, (n, 1)."""
+        """Return all varying entries, (n, 1)."""
         return stacked(self.entries)
 
     def part(self, name: str, column: ca.SX) -> ca.SX:
-        """The matrix `name` with its entries taken from `column`."""
+        """Return the matrix `name` with entries from `column`."""
         matrix, places = self._parts[name]
         values = [
             entry if place < 0 else column[place]
@@ -60,7 +60,7 @@ class Packed:
 @final
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """All Functions; those of the end are None without cost and conditions there.
+    """Functions of an interval and of the end, which are None without cost and conditions there.
 
     Attributes:
         advance: (x, u, r, p) -> x after a substep.
@@ -68,10 +68,10 @@ class Kernels:
             derivative with respect to (x, u) at the beginning of the interval.
         bend: (lam, E, x, S, u, r, p) -> (lam, E) before a substep: multipliers of its end become
             those of its beginning, and the curvature of lam' x after it joins E.
-        linear: (x, u, after, r, r_after, p, t, b, to, S) -> L = (c, v, all that varies in the
+        linear: (x, u, after, r, r_after, p, t, b, to, S) -> L = (c, v, all varying entries of the
             program), where to = F(x, u).
         value: the same arguments but S -> (c, v, cost).
-        matrix: (P, L, w) -> (P, G): one step of Riccati's recursion; G is what the others need.
+        matrix: (P, L, w) -> (P, G): one step of the Riccati recursion; G is data for the others.
         vector: (q, L, G, e) -> (q, k): the linear part of the cost-to-go and of the control.
         forward: (d, L, G, k) -> (d, M = (du, change of v, slope and curvature of the cost)).
         adjoint: (lam, L, m) -> (lam, S = (gradient in u, multipliers of the equations)), with
@@ -101,12 +101,12 @@ class Kernels:
 
     @property
     def all(self) -> list[ca.Function]:
-        """Those that there are."""
+        """List of the existing Functions."""
         return [f for f in vars(self).values() if isinstance(f, ca.Function)]
 
 
 def kernels(horizon: Horizon) -> Kernels:
-    """The Functions of a horizon."""
+    """Return the Functions of a horizon."""
     functions, start = _interval(horizon)
     whole = [*functions, *_end(horizon)]
     names = [field.name for field in fields(Kernels)]
@@ -115,13 +115,13 @@ def kernels(horizon: Horizon) -> Kernels:
 
 
 def upper(matrix: ca.SX) -> ca.SX:
-    """The upper triangle of a symmetric matrix as a dense column."""
+    """Return the upper triangle of a symmetric matrix as a dense column."""
     n = matrix.shape[0]
     return stacked(matrix[i, j] for j in range(n) for i in range(j + 1))
 
 
 def symmetric(column: ca.SX, n: int) -> ca.SX:
-    """The symmetric (n, n) matrix of an upper triangle."""
+    """Return the symmetric (n, n) matrix of an upper triangle."""
     found = ca.SX(ca.Sparsity.dense(n, n))
     for j in range(n):
         for i in range(j + 1):
@@ -130,7 +130,7 @@ def symmetric(column: ca.SX, n: int) -> ca.SX:
 
 
 def factored(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """L and 1/D of L D L' = matrix, which is positive definite; without pivoting."""
+    """Return L and 1/D of L D L' = matrix, for a positive definite matrix; without pivoting."""
     n = matrix.shape[0]
     lower, inverse = ca.SX.eye(n), ca.SX(n, 1)
     for j in range(n):
@@ -143,7 +143,7 @@ def factored(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def solved(lower: ca.SX, inverse: ca.SX, right: ca.SX) -> ca.SX:
-    """(L D L')^-1 right."""
+    """Return (L D L')^-1 right."""
     n = lower.shape[0]
     rows = [right[i, :] for i in range(n)]
     for i in range(n):
@@ -166,7 +166,7 @@ def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -
 
 
 def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
-    """The Functions of an interval, and S at its beginning."""
+    """Return the Functions of an interval, and S at its beginning."""
     h = horizon
     nx, nu = h.x.numel(), h.u.numel()
     arguments = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
@@ -201,7 +201,7 @@ def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
 
 
 def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
-    """`matrix`, `vector`, `forward` and `adjoint`, for what was packed."""
+    """Return `matrix`, `vector`, `forward` and `adjoint` for packed matrices."""
     L = ca.SX.sym("L", len(pack.entries))
     F, g, H, D, g_late, H_late, D_late = (
         pack.part(name, L)
@@ -246,7 +246,7 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
 
 
 def _tangent(horizon: Horizon) -> tuple[ca.Function, ca.SX]:
-    """The kernel `tangent`, and the derivative of F as a matrix of symbols."""
+    """Return the kernel `tangent`, and the derivative of F as a matrix of symbols."""
     h, nx, nu = horizon, horizon.x.numel(), horizon.u.numel()
     moved = h.advance(h.x, h.u, h.r, h.p)
     by_x, by_u = ca.jacobian(moved, h.x), ca.jacobian(moved, h.u)
@@ -267,7 +267,7 @@ def _tangent(horizon: Horizon) -> tuple[ca.Function, ca.SX]:
 
 
 def _bend(horizon: Horizon, slopes: ca.SX) -> ca.Function:
-    """The kernel `bend`."""
+    """Return the kernel `bend`."""
     h, nx, nu = horizon, horizon.x.numel(), horizon.u.numel()
     n = nx + nu
     lam, E = ca.SX.sym("lam", nx), ca.SX.sym("E", n * (n + 1) // 2)
@@ -275,8 +275,8 @@ def _bend(horizon: Horizon, slopes: ca.SX) -> ca.Function:
     weighted = ca.dot(lam, h.advance(h.x, h.u, h.r, h.p))
     here = ca.vertcat(h.x, h.u)
     curvature, gradient = ca.hessian(weighted, here)
-    way = ca.vertcat(slopes, ca.horzcat(ca.SX(nu, nx), ca.SX.eye(nu)))
-    found = E + upper(way.T @ curvature @ way)
+    chain = ca.vertcat(slopes, ca.horzcat(ca.SX(nu, nx), ca.SX.eye(nu)))
+    found = E + upper(chain.T @ curvature @ chain)
     return _function("bend", [lam, E, h.x, S, h.u, h.r, h.p], [gradient[:nx], found])
 
 

@@ -1,4 +1,4 @@
-"""A controller at work: cycles of its compiled C."""
+"""A running controller: cycles of its compiled C."""
 
 import ctypes
 from collections.abc import Mapping
@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 
 BACKENDS = ("auto", "compiled")
 SCALAR = (*FLAGS, "-fno-tree-vectorize")
-"""Between calls of libm, which has tanh in SSE, a few vector instructions of AVX would make a cycle
-seven times longer (measured: 1.1 -> 7.9 ms)."""
+"""Compiler flags. Between calls of libm, whose tanh uses SSE, a few AVX vector instructions would
+make a cycle seven times longer (measured: 1.1 -> 7.9 ms)."""
 
 WRAPPER = Path(__file__).with_name("wrapper.c").read_text(encoding="utf-8")
 """C between ctypes and a controller, called NAME in it."""
@@ -34,13 +34,13 @@ class Action:
 
     Attributes:
         controls: input -> value over the next interval.
-        residual: of the conditions of optimality, of the plan that the controls are from, see
+        residual: of the conditions of optimality for the plan of these controls, see
             `ocp.mpc.source`.
-        violation: largest of a soft bound, in units of its signal.
+        violation: largest violation of a soft bound, in units of its signal.
         iterations: quadratic programs.
         program_iterations: of the interior point, over all of them.
-        status: how it ended.
-        seconds, cpu: time it took on the clock, and of the processor [s].
+        status: of the cycle.
+        seconds, cpu: wall time and processor time [s].
     """
 
     controls: Mapping[str, float]
@@ -60,10 +60,10 @@ class Action:
 
 @final
 class Session:
-    """A controller that remembers its plan; made by `Controller.start`."""
+    """A controller with its current plan; created by `Controller.start`."""
 
     def __init__(self, design: Design, head: str = "", body: str = "") -> None:
-        """Compile the C of `design`, made here or given as header and source.
+        """Compile the C of `design`, generated here or given as header and source.
 
         Raises:
             CompileError: there is no compiler, or it failed.
@@ -80,7 +80,7 @@ class Session:
         names = ("sf_cycle", "sf_init", "sf_bytes", "sf_plan")
         self._library = opened(library(text, *names, flags=SCALAR), names)
         self.bytes: int = int(self._library.sf_bytes())
-        """Size of the struct that holds plan and work space."""
+        """Size of the struct with plan and work space."""
         self._self = np.zeros(self.bytes // 8 + 1)
         self._timed = timed(design)
         self._cycle = self._library.sf_cycle
@@ -100,10 +100,10 @@ class Session:
         tolerance: float | None = None,
         iterations: int | None = None,
     ) -> Action:
-        """One cycle: what to do until the next one.
+        """Compute the controls until the next cycle.
 
-        Measured numbers that are not finite are no error here: the plan of the last cycle goes on,
-        and the status says so, as in C.
+        Non-finite measurements are not an error here: the plan of the previous cycle continues,
+        and the status reports it, as in C.
 
         Args:
             x: measured states by name or in their order.
@@ -111,10 +111,10 @@ class Session:
             t: time now [s], for costs and bounds that depend on it.
             p: parameters of the model by name.
             bounds: other bounds by their names in C, such as "force_upper".
-            tolerance, iterations: in place of those of the controller.
+            tolerance, iterations: instead of those of the controller.
 
         Raises:
-            ValueError: unknown names, other shapes.
+            ValueError: unknown names, wrong shapes.
         """
         settings = self._design.settings
         return self.cycle(
@@ -127,7 +127,7 @@ class Session:
         )
 
     def cycle(self, measured: Array, data: CycleData, tolerance: float, iterations: int) -> Action:
-        """One cycle from arrays; see `step`."""
+        """Compute one cycle from arrays; see `step`."""
         columns = [measured, data.R.T.ravel()]
         if self._timed:
             columns.append(data.t[:1])
@@ -154,7 +154,7 @@ class Session:
         )
 
     def forget(self) -> None:
-        """Start afresh, from a plan that stays where the model starts."""
+        """Restart from a plan that stays at the start of the model."""
         self._library.sf_init(ctypes.c_void_p(address(self._self)))
 
     @property
@@ -191,7 +191,7 @@ class Session:
         p: Mapping[str, float] | None,
         bounds: Mapping[str, float] | None,
     ) -> CycleData:
-        """Arguments of `step` over the whole horizon."""
+        """Return the arguments of `step` over the whole horizon."""
         design = self._design
         h = design.horizon
         R = np.tile(design.r0, (h.count + 1, 1))

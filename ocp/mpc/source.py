@@ -1,25 +1,25 @@
-"""Header and source of a controller in C99, which is the one implementation of the solver.
+"""Header and source of a controller in C99, the only implementation of the solver.
 
-Sequential quadratic programs over the horizon, and how far their result is from optimal:
+Sequential quadratic programs over the horizon, with the residual of optimality:
 
     1. linearise at the plan (X, U); residual <= tolerance: done
     2. change and multipliers by the quadratic program
     3. a step of 1, 1/2, 1/4, ... of it by the merit  cost + prices + nu |defects|_1
 
-The Hessian is that of Gauss and Newton in the first two iterations of a cycle. Near rest, friction
-bends more than the cost does, and these converge slowly; from the third one on the curvature of the
-equations, weighted with their multipliers, is taken along wherever Riccati's recursion then finds
-no negative pivot.
+The Hessian is Gauss-Newton in the first two iterations of a cycle. Near stick, friction has more
+curvature than the cost, and these converge slowly; from the third iteration on the curvature of the
+equations, weighted with their multipliers, is added wherever the Riccati recursion then finds no
+negative pivot.
 
-The residual is that of the conditions of Karush, Kuhn and Tucker at the plan that is handed out,
-whose multipliers of the equations make the gradients in the states zero: the largest of
+The residual is that of the Karush-Kuhn-Tucker conditions at the returned plan, with the multipliers
+of the equations that make the gradients in the states zero: the largest of
 
  * gradients in the inputs, per nominal and own curvature of the cost in an input: an input would
    move by no more than that share of its nominal;
  * defects of the equations per nominal of the state;
  * violations of rows in units of their signals; products of rows and multipliers, by the larger
-   of multiplier and that curvature. A soft row may be violated instead where its multiplier is the
-   price: what it is off, relative to the price, times the violation.
+   of multiplier and that curvature. A soft row may be violated instead if its multiplier is the
+   price: then their difference, relative to the price, times the violation.
 
 The quadratic program is solved by a primal-dual interior point. A hard row keeps v >= 0; a soft one
 may be violated by s >= 0 at the price rho s + sigma s^2 / 2:
@@ -32,11 +32,11 @@ Newton's method with t, s and y eliminated leaves a weight w and a slope e for e
     o = mu / z - v - s + f a,   a = rho + sigma s - z - mu / s,   f = 1 / (sigma + y / s)
 
 with f = 0 in a hard row, for the recursion over the intervals. Mehrotra's predictor and corrector
-share its matrices. A program whose free minimum keeps all rows needs none of this.
+share its matrices. A program whose free minimum satisfies all rows needs none of this.
 
 Names begin with that of the controller: `NAME_t` holds plan and work space, `NAME_param_t` model
-parameters, bounds, tolerance and iterations, with `NAME_default`; `NAME_in_t` what is measured and
-wanted; `NAME_out_t` controls and how the cycle went; `NAME_init`, `NAME_step`.
+parameters, bounds, tolerance and iterations, with `NAME_default`; `NAME_in_t` measurements and
+references; `NAME_out_t` controls and results of the cycle; `NAME_init`, `NAME_step`.
 
 Sources: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36) (weight of the merit);
     Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim. 2(4),
@@ -67,9 +67,9 @@ PLAIN = 2
 """Iterations without curvature of the equations, which has no meaning yet far from the optimum."""
 ARMIJO = 1e-4
 ROUNDING = 1e-12
-"""Of the merit, relative: what a step may lose by it."""
+"""Relative rounding error of the merit that a step may lose."""
 BACK = 0.995
-"""Share of the way to the boundary."""
+"""Share of the step to the boundary."""
 CLOSE = 1e-7
 """mu, in units of the curvature, at which a program is solved."""
 AWAY = 0.1
@@ -77,7 +77,7 @@ AWAY = 0.1
 
 
 def header(design: Design) -> str:
-    """Text of the header file."""
+    """Return the text of the header file."""
     name, h = design.name, design.horizon
     guard = f"{name.upper()}_H"
     statuses = "".join(f"#define {name}_{s.name} {int(s)}\n" for s in CycleStatus)
@@ -122,7 +122,7 @@ void {name}_step({name}_t *self, const {name}_param_t *param, const {name}_in_t 
 
 
 def _structs(design: Design) -> str:
-    """Structs of inputs and outputs."""
+    """Return the structs of inputs and outputs."""
     name, h = design.name, design.horizon
     parameters = [(v.name, f"{v.doc} [{v.unit}]") for v in _constants(design)]
     parameters += [(bound, "bound") for bound in design.bound_names]
@@ -156,7 +156,7 @@ typedef struct {{
 
 
 def source(design: Design) -> str:
-    """Text of the source file.
+    """Return the text of the source file.
 
     Raises:
         ValueError: an operation without counterpart in C99.
@@ -192,7 +192,7 @@ def _banner(file: str) -> str:
 
 
 def sizes(design: Design) -> dict[str, int]:
-    """Macro -> number, for the loops."""
+    """Return macro -> number, for the loops."""
     h, k = design.horizon, design.kernels
     end = k.end_linear
     return {
@@ -234,7 +234,7 @@ def _members(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def _array(what: str, *shape: int) -> str:
-    """A member; no size is zero in C."""
+    """Return a member; no size is zero in C."""
     return f"    double {what}{''.join(f'[{max(size, 1)}]' for size in shape)};\n"
 
 
@@ -244,7 +244,7 @@ def _move(parts: dict[str, int]) -> str:
 
 
 def _memory(name: str, parts: dict[str, int]) -> str:
-    """Members of the plan and the work space."""
+    """Return the members of the plan and the work space."""
     n, every = parts["N"], max(parts["ALL"], 1)
 
     states, inputs = (n + 1, parts["NX"]), (n, parts["NU"])
@@ -309,7 +309,7 @@ def _constants_of(design: Design) -> str:
 
 
 def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
-    """A static C function (arguments, results), and what it calls."""
+    """Return a static C function (arguments, results), and the functions it calls."""
     whole = graph(function)
     count, results = function.n_in(), function.n_out()
     names = [[f"a{i}_{j}" for j in range(function.size1_in(i))] for i in range(count)]
@@ -327,7 +327,7 @@ def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
 
 
 def _user_functions(design: Design) -> str:
-    """Functions with names of the user; no macro stands before them."""
+    """Return functions with names of the user, placed before all macros."""
     name, h = design.name, design.horizon
     p = [f"m->p[{i}] = param->{v.name};" for i, v in enumerate(_constants(design))]
     b = [f"m->b[{i}] = param->{bound};" for i, bound in enumerate(design.bound_names)]
@@ -361,7 +361,7 @@ static void show(const {name}_t *m, {name}_out_t *out)
 
 
 def timed(design: Design) -> bool:
-    """True if a cost or a bound depends on time."""
+    """Return True if a cost or a bound depends on time."""
     h = design.horizon
     values = [h.early.value, h.late.value, h.end.value]
     values += [limit.expression for limit in (*h.limits, *h.end_limits)]

@@ -1,1 +1,1 @@
-"""Solvers, one solve of a problem on meshes, where it starts, and its solution by name."""
+"""Solvers, single solves on meshes, starting points, and solutions by name."""

@@ -1,4 +1,4 @@
-"""Ipopt, fatrop and SQP with exact derivatives, and what their answers mean."""
+"""Ipopt, fatrop and SQP with exact derivatives, and the meaning of their return codes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,9 @@ MULTIPLIERS = ["x", "p", "lam_f", "lam_g"]
 
 
 def symmetric(triangle: ca.MX) -> ca.MX:
-    """The symmetric matrix of an upper triangle, by a gather of its nonzeros.
+    """Return the symmetric matrix of an upper triangle, by a gather of its nonzeros.
 
-    Nothing is computed: every nonzero of the result is one of the triangle.
+    No arithmetic: every nonzero of the result is one of the triangle.
     """
     sparsity = triangle.sparsity()
     numbered = ca.DM(sparsity, np.arange(1.0, sparsity.nnz() + 1))
@@ -40,7 +40,7 @@ def _symbols(program: Program) -> list[ca.MX]:
 
 
 def lagrangian(program: Program) -> ca.Function:
-    """(x, p, lam_f, lam_g) -> gradient and whole Hessian of lam_f f + lam_g' g, for fatrop."""
+    """Return (x, p, lam_f, lam_g) -> gradient and Hessian of lam_f f + lam_g' g, for fatrop."""
     x, p, lam_f, lam_g = _symbols(program)
     slope = lam_f * program.gradient(x, p)[1] + program.jacobian(x, p)[1].T @ lam_g
     hessian = symmetric(program.hessian(x, p, lam_f, lam_g))
@@ -54,9 +54,9 @@ def lagrangian(program: Program) -> ca.Function:
 
 
 def gradients(program: Program) -> ca.Function:
-    """(x, p, lam_f, lam_g) -> f, g and the gradients of lam_f f + lam_g' g in x and in p.
+    """Return (x, p, lam_f, lam_g) -> f, g, gradients of lam_f f + lam_g' g in x and in p.
 
-    Those in p are zero: they are not used, but CasADi needs them.
+    The gradient in p is zero: it is not used, but CasADi requires it.
     """
     x, p, lam_f, lam_g = _symbols(program)
     f, slope = program.gradient(x, p)
@@ -68,7 +68,7 @@ def gradients(program: Program) -> ca.Function:
 
 
 def both(program: Program) -> ca.Function:
-    """(x, p) -> f, its gradient, g and its Jacobian, for SQP."""
+    """Return (x, p) -> f, its gradient, g and its Jacobian, for SQP."""
     x, p = _symbols(program)[:2]
     outputs = [*program.gradient(x, p), *program.jacobian(x, p)]
     outputs[1] = ca.densify(outputs[1])
@@ -80,19 +80,19 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FLOOR = 1e-8
-"""Smallest eigenvalue of a block as a share of its largest."""
+"""Smallest eigenvalue of a block, over its largest."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Size:
-    """All blocks of the same size n: where they take their entries from and put them.
+    """All blocks of the same size n, with the sources and targets of their entries.
 
     Attributes:
-        source: number of the triangle's nonzero of each entry, the number of nonzeros for none,
+        source: index of the triangle's nonzero of each entry, the number of nonzeros for none,
             shape (blocks, n, n).
-        share: factor of each entry; what is common to several blocks is split between them.
-        target: number of the result's nonzero of each entry.
+        share: factor of each entry; entries common to several blocks are split between them.
+        target: index of the result's nonzero of each entry.
     """
 
     source: Indices
@@ -121,7 +121,7 @@ class Convexified(Shaped):
 
 
 def _clipped(blocks: Array) -> Array:
-    """V max(L, 0) V' of each symmetric block (k, n, n)."""
+    """Return V max(L, 0) V' of each symmetric block (k, n, n)."""
     if not np.isfinite(blocks).all():
         return blocks
     values, vectors = np.linalg.eigh(blocks)
@@ -130,7 +130,7 @@ def _clipped(blocks: Array) -> Array:
 
 
 def _plan(triangle: ca.Sparsity, hubs: NDArray[np.bool_]) -> tuple[list[_Size], ca.Sparsity]:
-    """The blocks of a symmetric matrix whose upper triangle is given, and the pattern they fill."""
+    """Return the blocks of a symmetric matrix from its upper triangle, and their pattern."""
     n = triangle.size1()
     rows, columns = (np.array(part, np.int64) for part in triangle.get_triplet())
     number = {
@@ -166,7 +166,7 @@ def _plan(triangle: ca.Sparsity, hubs: NDArray[np.bool_]) -> tuple[list[_Size], 
 
 
 def _groups(rows: Indices, columns: Indices, hubs: NDArray[np.bool_], n: int) -> list[Indices]:
-    """Unknowns that are coupled with each other, hubs and unknowns without an entry apart."""
+    """Return groups of coupled unknowns, without hubs and unknowns without an entry."""
     inside = ~hubs[rows] & ~hubs[columns]
     touched = np.unique(np.concatenate([rows, columns]))
     graph = ca.Sparsity.triplet(n, n, rows[inside].tolist(), columns[inside].tolist())
@@ -209,7 +209,7 @@ ANSWERS: dict[str, dict[str, Status]] = {
         "User_Requested_Stop": Status.INTERRUPTED,
     },
 }
-"""Solver -> its answer -> how the solve ended; every other answer is SOLVER_FAILED."""
+"""Solver -> its return code -> status; every other code is SOLVER_FAILED."""
 
 QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes"}
 WARM: dict[str, Option] = {
@@ -221,7 +221,7 @@ WARM: dict[str, Option] = {
     "warm_start_slack_bound_frac": 1e-9,
     "warm_start_mult_bound_push": 1e-9,
 }
-"""Options of Ipopt for a start that comes with multipliers; the user's own win."""
+"""Options of Ipopt for a start with multipliers; the user's options take precedence."""
 SQP: dict[str, Option] = {
     "print_header": False,
     "print_iteration": False,
@@ -236,7 +236,7 @@ QP: dict[str, dict[str, Option]] = {
 
 @dataclass(frozen=True, eq=False, init=False)
 class _Method(ABC):
-    """A solver with its own options by name."""
+    """A solver with options by name."""
 
     options: Mapping[str, Option]
     max_time: float | None
@@ -253,27 +253,27 @@ class _Method(ABC):
         object.__setattr__(self, "max_time", max_time)
 
     def with_options(self, **options: Option) -> Self:
-        """The same with further options, or other values of some."""
+        """Return the solver with additional or changed options."""
         return type(self)(max_time=self.max_time, **(dict(self.options) | options))
 
     def prepared(self, program: Program) -> Prepared:
-        """Ready to solve `program`.
+        """Return the solver prepared for `program`.
 
         Raises:
-            ValueError: an option that the solver does not know (at the first run).
+            ValueError: an unknown option (at the first run).
         """
         name, build = type(self).__name__, partial(self._build, program)
         return Prepared(program, name, self.options, build, self._read, self.max_time)
 
     @abstractmethod
     def _build(self, program: Program, warm: bool) -> Built:
-        """CasADi's solver; `warm` where the start comes with multipliers."""
+        """Return CasADi's solver; `warm` for a start with multipliers."""
 
     def _made(self, program: Program, **common: Any) -> Any:
         return made(type(self).__name__, self.plugin, program, self.options, common)
 
     def _read(self, stats: Mapping[str, Any]) -> tuple[str, Status]:
-        """The solver's answer and its meaning."""
+        """Return the solver's return code and its status."""
         answer = str(stats["return_status"])
         return answer, ANSWERS[type(self).__name__].get(answer, Status.SOLVER_FAILED)
 
@@ -281,13 +281,13 @@ class _Method(ABC):
 @final
 @dataclass(frozen=True, eq=False, init=False)
 class Ipopt(_Method):
-    """Ipopt, an interior-point method, with its own options: `Ipopt(max_iter=500, print_level=5)`.
+    """Ipopt, an interior-point method, with options by name: `Ipopt(max_iter=500, print_level=5)`.
 
-    True and False stand for its "yes" and "no".
+    True and False are passed as "yes" and "no".
 
     Attributes:
         options: see Ipopt's documentation.
-        max_time: wall time [s] after which a solve ends with what it has, or None.
+        max_time: wall time [s] after which a solve ends with its best iterate, or None.
 
     Source: Waechter and Biegler, Mathematical Programming 106(1), 2006, 25-57.
     """
@@ -309,41 +309,41 @@ class Ipopt(_Method):
 @final
 @dataclass(frozen=True, eq=False, init=False)
 class Fatrop(_Method):
-    """Fatrop with its own options by name: `Fatrop(max_iter=500, mu_init=0.1)`.
+    """Fatrop with options by name: `Fatrop(max_iter=500, mu_init=0.1)`.
 
-    An interior-point method that factorises stage by stage. It needs stages: unknowns that couple
-    only neighbouring intervals. A free duration, a parameter chosen with the trajectory, scenarios
-    and conditions between the two ends couple all of them; such a program is refused with the
-    reason, and Ipopt solves it.
+    An interior-point method that factorises stage by stage. It requires stages: unknowns that
+    couple only neighbouring intervals. A free duration, a parameter chosen with the trajectory,
+    scenarios and conditions between the two ends couple all of them; such a program is refused
+    with the reason, and Ipopt solves it.
 
     Attributes:
         options: see fatrop's documentation.
-        max_time: wall time [s] after which a solve ends with what it has, or None.
+        max_time: wall time [s] after which a solve ends with its best iterate, or None.
 
-    Limits: multipliers of a start are not used, and best iterates of solves that were stopped come
-    without them. CasADi 3.8 takes a time that grows with N^2 to hand over the stages: 0.5 s at
-    N = 200, 16 s at N = 1000. Values that are no numbers are refused here, as fatrop ignores them.
+    Limits: multipliers of a start are not used, and best iterates of stopped solves have none.
+    CasADi 3.8 needs a time proportional to N^2 to pass the stages: 0.5 s at N = 200, 16 s at
+    N = 1000. Non-numeric values are refused here, as fatrop ignores them.
     Source: Vanroye et al., FATROP, IROS 2023.
     """
 
     plugin = "fatrop"
 
     def __init__(self, *, max_time: float | None = None, **options: Option) -> None:
-        for name, value in options.items():  # fatrop itself would silently take no notice
+        for name, value in options.items():  # fatrop itself ignores them silently
             checks.number(f"Fatrop: option {name}", float(value) if value in (0, 1) else value)
         super().__init__(max_time=max_time, **options)
 
     def prepared(self, program: Program) -> Prepared:
-        """Ready to solve `program`.
+        """Return the solver prepared for `program`.
 
         Raises:
-            ValueError: a program without stages, or an option that fatrop does not know (the
+            ValueError: a program without stages, or an unknown option (the
                 latter at the first run).
         """
         if program.stages is None:
             raise ValueError(
                 f"Fatrop: expected a program of stages, got one with {program.unstaged}; "
-                "take Ipopt()"
+                "use Ipopt()"
             )
         return super().prepared(program)
 
@@ -371,18 +371,18 @@ class Fatrop(_Method):
 @final
 @dataclass(frozen=True, eq=False, init=False)
 class Sqp(_Method):
-    """`sqpmethod` with its own options by name: `Sqp(max_iter=500, qpsol="qrqp")`.
+    """`sqpmethod` with options by name: `Sqp(max_iter=500, qpsol="qrqp")`.
 
     Sequential quadratic programming. Its quadratic programs are solved by the interior-point method
-    `piqp` if `qpsol` names no other. Its Hessian is the exact one without negative eigenvalues
+    `piqp` unless `qpsol` names another. Its Hessian is the exact one without negative eigenvalues
     (`ocp.solving.methods`).
 
     Attributes:
         options: see CasADi's documentation of sqpmethod.
-        max_time: wall time [s] after which a solve ends with what it has, or None.
+        max_time: wall time [s] after which a solve ends with its best iterate, or None.
 
-    Limits: convergence is linear where the exact Hessian is indefinite, and there is no way back
-    from linearised constraints that contradict each other. Good for starts close by; on moves
+    Limits: convergence is linear where the exact Hessian is indefinite, and the method does not
+    recover from contradictory linearised constraints. Suited to starts near a solution; on moves
     against friction Ipopt takes fewer iterations.
     """
 

@@ -1,4 +1,4 @@
-"""Motions of one scenario by name: signals over time, and values that a warm start needs."""
+"""Motions of one scenario by name: signals over time, and values for a warm start."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ from symfric.foundation.storable import agree
 Array = NDArray[np.float64]
 
 SAME = 1e-6
-"""Multiples of the nominal value by which a state may differ at a joint that is continuous."""
+"""Multiples of the nominal value by which a state may differ at a continuous joint."""
 
 
 @final
@@ -51,17 +51,17 @@ class Motion:
     `motion["v"]` is a signal at the times `motion.t`.
 
     Attributes:
-        name: of the scenario, empty where there is only one motion.
-        t: times [s], shape (n,): nodes of the mesh and collocation points. Where a state jumps
-            from one phase to the next, the time of the joint is there twice.
+        name: of the scenario, empty if there is only one motion.
+        t: times [s], shape (n,): nodes of the mesh and collocation points. If a state jumps
+            from one phase to the next, the time of the joint appears twice.
         signals: name -> values, shape (n,): states, algebraic variables, inputs, outputs; NaN in
             phases that do not have them. An input is the value from this time on.
         units: name -> unit.
-        nodes: which of the times are nodes of the mesh.
+        nodes: mask of times that are nodes of the mesh.
         t_control: start of each interval [s], shape (N,).
         controls: input -> value held from there to the next one, shape (N,).
-        phases: when each of them is.
-        spans: their numbers among the spans of the problem.
+        phases: begin and duration of each.
+        spans: their indices among the phases of the problem, over all scenarios.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Motion:
     spans: tuple[int, ...]
 
     def check_fields(self) -> None:
-        """Refuse signals that do not belong to the times; for files."""
+        """Raise an error for signals that do not match the times; for files."""
         agree(
             "Motion",
             self.t.ndim == self.t_control.ndim == 1,
@@ -104,7 +104,7 @@ class Motion:
 @final
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Signals of one span."""
+    """Signals of one phase."""
 
     t: Array
     nodes: NDArray[np.bool_]
@@ -122,14 +122,14 @@ def motion_of(
     scheme: Coefficients,
     chosen: Mapping[str, float],
 ) -> Motion:
-    """The motion of one scenario.
+    """Return the motion of one scenario.
 
     Args:
         name: of the scenario.
         spans: its spans with their numbers, in order.
         points, meshes: of each of these spans.
-        scheme: where the collocation points are.
-        chosen: values of the parameters that were chosen.
+        scheme: the collocation points.
+        chosen: values of the chosen parameters.
     """
     pieces: list[_Piece] = []
     phases: list[Stretch] = []
@@ -189,7 +189,7 @@ def _piece(
     begin: float,
     jumps: bool,
 ) -> _Piece:
-    """Signals at the nodes and collocation points of one span."""
+    """Return signals at the nodes and collocation points of one phase."""
     model, N = span.model, mesh.size - 1
     inside = scheme.nodes[1:-1] if scheme.degree and scheme.meets_end else scheme.nodes[1:]
     shown = inside.size
@@ -198,7 +198,7 @@ def _piece(
     d = scheme.degree
 
     def joined(nodes: Array, inner: Array) -> Array:
-        """Columns in the order of time."""
+        """Return columns in the order of time."""
         blocks = inner.reshape(nodes.shape[0], N, d)[:, :, :shown]
         held = np.concatenate([nodes[:, :-1, None], blocks], axis=2)
         return np.column_stack([held.reshape(nodes.shape[0], N * (shown + 1)), nodes[:, -1]])
@@ -221,9 +221,9 @@ def _piece(
 
 
 def _at_nodes(z: Array, intervals: int, scheme: Coefficients) -> Array:
-    """Algebraic variables at the nodes: at the end of the interval before, first value at 0.
+    """Return algebraic variables at the nodes: at the end of the previous interval, first at 0.
 
-    Shooting does not know them: NaN.
+    NaN for shooting, which does not compute them.
     """
     if not scheme.degree:
         return np.full((z.shape[0], intervals + 1), np.nan)
@@ -237,13 +237,13 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class StoredSpan:
-    """One phase of one scenario.
+    """A phase of a scenario.
 
     Attributes:
         scenario, phase: their numbers.
         T: duration [s].
         mesh: fractions of T that bound the intervals, shape (N + 1,).
-        nodes: where the collocation points of an interval are, start included, shape (d + 1,).
+        nodes: collocation points of an interval, start included, shape (d + 1,).
         x: state -> values at the start and the collocation points of each interval, shape
             (N, d + 1).
         x_end: state -> value at the end.
@@ -262,7 +262,7 @@ class StoredSpan:
     u: Mapping[str, Array]
 
     def at(self, name: str, fractions: Array) -> Array | None:
-        """A signal at fractions of T; None where there is none of this name.
+        """Return a signal at fractions of T; None without a signal of this name.
 
         A state is the polynomial of its interval, an algebraic variable is interpolated between
         the collocation points, an input is held.
@@ -284,7 +284,7 @@ class StoredSpan:
         k = self._interval(fractions)
         ends = np.append(self.x[name][1:, 0], self.x_end[name])
         s = (fractions - self.mesh[k]) / np.diff(self.mesh)[k]
-        if self.nodes.size == 1:  # shooting: nothing is known inside of an interval
+        if self.nodes.size == 1:  # shooting: values inside an interval are unknown
             return (1 - s) * self.x[name][k, 0] + s * ends[k]
         weights = np.ones((self.nodes.size, s.size))
         for i, node in enumerate(self.nodes):
@@ -302,9 +302,9 @@ class Stored:
 
     Attributes:
         name: of the problem.
-        status, message, cost: how it ended.
-        structure: of the nonlinear program; where it and all meshes are the same, the multipliers
-            of `iterate` are used, too.
+        status, message, cost: of the end.
+        structure: of the nonlinear program; if it and all meshes are the same, the multipliers of
+            `iterate` are also used.
         spans: one for each phase and scenario.
         chosen: values of chosen parameters.
         iterate: unknowns and multipliers, scaled.
@@ -324,7 +324,7 @@ class Stored:
 
 
 def along(spans: Sequence[StoredSpan], name: str, fractions: Array) -> Array | None:
-    """A signal at fractions of the whole duration of some phases; None where one lacks it."""
+    """Return a signal at fractions of the total duration of phases; None if one lacks it."""
     ends = np.cumsum([span.T for span in spans])
     times = fractions * ends[-1]
     which = np.minimum(np.searchsorted(ends, times, side="right"), len(spans) - 1)
@@ -342,7 +342,7 @@ def along(spans: Sequence[StoredSpan], name: str, fractions: Array) -> Array | N
 def stored_spans(
     problem: Problem, scheme: Scheme, meshes: Sequence[Array], points: Points
 ) -> tuple[StoredSpan, ...]:
-    """The spans of a solution by name."""
+    """Return the phases of a solution by name."""
     nodes = scheme.coefficients().nodes
     found: list[StoredSpan] = []
     for span, mesh, values in zip(problem.spans, meshes, points.spans, strict=True):
@@ -368,7 +368,7 @@ def stored_spans(
 
 
 def structure_of(problem: Problem, scheme: Scheme) -> str:
-    """A text that is the same for programs with the same unknowns and rows on the same mesh."""
+    """Return a text that is equal for programs with equal unknowns and rows on equal meshes."""
     spans = [
         [
             span.scenario,

@@ -1,7 +1,7 @@
-"""One solve: a problem on meshes, a solver and a start make a solution, as it is.
+"""A single solve: a problem on meshes, a solver and a start give a solution.
 
-Nothing is refined, sharpened or verified here; `ocp.solve` does these by calling this. Random
-starts near a given one keep its ends, and take other ways between them.
+Nothing is refined, sharpened or verified here; `ocp.solve` does that with this module. Random
+starts near a given one keep its ends, and vary the path between them.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -33,27 +33,27 @@ from symfric.model.contact import Contact
 
 Array = NDArray[np.float64]
 WAVES = 4
-"""Half waves of which a perturbation is made."""
+"""Number of half waves in a perturbation."""
 Wave = Callable[[Array], Array]
 HALF_WAVES = np.arange(1, 4)
-"""Numbers of half waves over the whole motion of which a deviation is made."""
+"""Numbers of half waves over the whole motion in a deviation."""
 STILL = 0.3
-"""Share of the nominal value by which a state deviates that stays where it is in the given start
-and has no other of its unit to take the size from."""
+"""Deviation, over the nominal value, of a state that is constant in the given start and has no
+other state of its unit to define its size."""
 
 
 def perturbed(into: Transcription, points: Points, scale: float, seed: int) -> Points:
-    """`points` with a random smooth deviation, the same one on every mesh.
+    """Return `points` with a random smooth deviation, the same one on every mesh.
 
     Each signal is moved by a sum of half waves whose standard deviation is `scale` times its
-    magnitude: half the width of its bounds where these are finite, else its largest value or its
+    magnitude: half the width of its bounds if these are finite, else its largest value or its
     nominal one. Free durations and chosen parameters are multiplied by exp(scale r / 2), r normal.
-    Values that are asked for stay: solvers put them back to their bounds.
+    Prescribed values stay: solvers project them onto their bounds.
 
     Args:
-        into: what the points belong to.
-        points: what to start from, `initial_points(into)`.
-        scale: 0.1 is close by, 1 anywhere within the bounds.
+        into: transcription of the points.
+        points: initial points, `initial_points(into)`.
+        scale: 0.1 is a small deviation, 1 fills the bounds.
         seed: of NumPy's default generator.
     """
     checks.number("perturbed: scale", scale, lower=0.0)
@@ -96,7 +96,7 @@ def _within(value: float, box: Free) -> float:
 
 
 def _wave(random: np.random.Generator, size: float) -> Wave:
-    """A random sum of half waves over [0, 1] with standard deviation `size`."""
+    """Return a random sum of half waves over [0, 1] with standard deviation `size`."""
     a = random.standard_normal((2, WAVES)) * size / np.sqrt(WAVES)
 
     def at(fractions: Array) -> Array:
@@ -112,7 +112,7 @@ def _rows(waves: Sequence[Wave], fractions: Array) -> Array:
 
 
 def _size(box: Box, nominal: float, row: Array) -> float:
-    """The magnitude of a signal."""
+    """Return the magnitude of a signal."""
     low, high = box
     if isfinite(low) and isfinite(high):
         return 0.5 * (high - low)
@@ -122,14 +122,14 @@ def _size(box: Box, nominal: float, row: Array) -> float:
 def starts_around(
     into: Transcription, begin: Points, seeds: Iterable[int], spread: float
 ) -> tuple[Points, ...]:
-    """`begin` for the seed 0, a random smooth deviation from it for any other.
+    """Return `begin` for the seed 0, and a random smooth deviation from it for any other.
 
-    A state deviates by half waves over the whole motion, `spread` times the distance it goes in
-    `begin`, less in short waves; the rate of another state (x' = v) by the rate of its deviation,
-    so that both belong together. Inputs deviate by `spread` times a quarter of their range.
+    A state deviates by half waves over the whole motion, `spread` times its range in
+    `begin`, less in short waves; the rate of another state (x' = v) by the rate of that deviation,
+    so that both are consistent. Inputs deviate by `spread` times a quarter of their range.
 
     Args:
-        into: what the points belong to.
+        into: transcription of the points.
         begin: the first start.
         seeds: of NumPy's default generator.
         spread: of the deviations; 0.5 leads to most local optima of a swing-up.
@@ -167,7 +167,7 @@ def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Poi
 
 
 def _distances(into: Transcription, begin: Points) -> dict[str, float]:
-    """State -> how far it goes in `begin`, over all spans."""
+    """Return state -> its range in `begin`, over all phases."""
     ranges: dict[str, list[float]] = {}
     units: dict[str, str] = {}
     nominals: dict[str, float] = {}
@@ -179,27 +179,27 @@ def _distances(into: Transcription, begin: Points) -> dict[str, float]:
     alike = {
         unit: max(gone[name] for name in gone if units[name] == unit) for unit in units.values()
     }
-    return {name: way or alike[units[name]] or STILL * nominals[name] for name, way in gone.items()}
+    return {n: size or alike[units[n]] or STILL * nominals[n] for n, size in gone.items()}
 
 
 def _reach(box: Box, nominal: float) -> float:
-    """How far an input deviates."""
+    """Return the size of the deviation of an input."""
     low, high = box
     return 0.25 * (high - low) if isfinite(low) and isfinite(high) else nominal
 
 
 NARROW = 0.02
-"""A width below this share of the largest sliding velocity is one that Newton steps jump over."""
+"""Smoothing width, over the largest sliding velocity, that Newton steps may jump over."""
 NAMED = 3
-"""Contacts that a sentence names."""
+"""Largest number of contacts in a message."""
 Solver = Ipopt | Fatrop | Sqp
 
 
 def narrow_widths(transcription: Transcription, points: Points) -> str:
-    """A sentence that names contacts with narrow widths; empty if there are none.
+    """Return a message on contacts with narrow smoothing widths, or "".
 
-    Named are contacts that come to rest or turn round on the way, or whose widths smooth something
-    else than their sliding velocity.
+    It names contacts that stick or reverse, or whose widths smooth another quantity than their
+    sliding velocity.
     """
     found: dict[str, str] = {}
     for span, at in zip(transcription.problem.spans, points.spans, strict=True):
@@ -214,7 +214,7 @@ def narrow_widths(transcription: Transcription, points: Points) -> str:
 
 
 def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
-    """Widths of a contact that are small against how it moves, each with its number."""
+    """Yield the widths of a contact that are small against its motion, each with its value."""
     slip = along_points(span, at, contact.slip)[0]
     fastest = float(np.abs(slip).max(initial=0.0))
     turns = slip.size > 0 and bool(slip.min() <= 0.0 <= slip.max())
@@ -231,13 +231,13 @@ def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
 
 
 def _width_number(value: Any, span: Span) -> float:
-    """The number of a parameter of a law, which may be one of the model."""
+    """Return the value of a parameter of a law, which may be one of the model."""
     function = ca.Function("number", [span.model.vector("p")], [ca.SX(value)])
     return float(function(span.p))
 
 
 def along_points(span: Span, at: SpanPoints, column: ca.SX) -> Array:
-    """Values at the collocation points, or at the nodes where there are none, (rows, points)."""
+    """Return values at the collocation points, or at the nodes without any, (rows, points)."""
     inner = at.inner.shape[1]
     x, n = (at.inner, inner) if inner else (at.nodes[:, :-1], at.u.shape[1])
     u = np.repeat(at.u, n // at.u.shape[1], axis=1)
@@ -255,10 +255,10 @@ def solve_once(
     guess: Start = None,
     progress: Report | None = None,
 ) -> Solution:
-    """Solve `problem` on one mesh; a solve that fails is a solution whose status says so.
+    """Solve `problem` on one mesh; a failure is reported by the status of the solution.
 
     Args:
-        problem: what to solve.
+        problem: the problem to solve.
         intervals: number of equal intervals of each phase, fractions of T, or one of these for
             each phase.
         scheme: `Radau(3)` if none.
@@ -289,15 +289,15 @@ def solve_on(
     values: ArrayLike | None = None,
     warm: bool | None = None,
 ) -> Solution:
-    """Solve a program that is there already, which may be done many times.
+    """Solve an existing program, possibly many times.
 
     Args:
         transcription: the problem on meshes.
-        prepared: a solver that holds `transcription.program`, or that of another transcription by
-            the same `Discretisation` on as many intervals.
+        prepared: a solver for `transcription.program`, or for another transcription by the same
+            `Discretisation` with the same number of intervals.
         guess, progress: as in `solve_once`.
-        values: numbers of the parameters, `transcription.values(...)`; its own if none.
-        warm: use the multipliers of the guess; None does where it has some that fit.
+        values: numbers of the parameters, `transcription.values(...)`; None: its own.
+        warm: use the multipliers of the guess; None: if it has matching ones.
     """
     start, fits = start_of(transcription, guess)
     numbers = transcription.program.values if values is None else values
@@ -312,7 +312,7 @@ def solve_on(
 
 
 def solution_of(transcription: Transcription, outcome: Outcome) -> Solution:
-    """The outcome of a solver by name."""
+    """Return the outcome of a solver as a solution."""
     problem = transcription.problem
     points = transcription.unpack(outcome.iterate.w)
     return Solution(
@@ -332,15 +332,15 @@ def solution_of(transcription: Transcription, outcome: Outcome) -> Solution:
 
 
 def _message(transcription: Transcription, outcome: Outcome, points: Points) -> str:
-    """The sentence of the solver, and the friction that may have stopped it."""
-    said = f"ocp '{transcription.problem.name}': {outcome.sentence}"
+    """Return the message of the solver, and a note on friction that may have stopped it."""
+    text = f"ocp '{transcription.problem.name}': {outcome.sentence}"
     stuck = outcome.status in (Status.MAX_ITERATIONS, Status.NO_STEP) or outcome.cycles
     kinks = narrow_widths(transcription, points) if stuck and not outcome.status.ok else ""
-    return f"{said} {kinks}".rstrip()
+    return f"{text} {kinks}".rstrip()
 
 
 def motions_of(transcription: Transcription, points: Points) -> tuple[Motion, ...]:
-    """What moves, for each scenario."""
+    """Return the motion of each scenario."""
     problem, phases = transcription.problem, len(transcription.problem.chain)
     names = problem.scenario_names or ("",)
     scheme = transcription.scheme.coefficients()

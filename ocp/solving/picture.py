@@ -1,4 +1,4 @@
-"""Pictures of optimal motions: optimised points against the simulated model."""
+"""Figures of optimal motions: optimised points against the simulated model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,26 +22,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHADES = {"slip+": colour(6), "stick": "0.45", "slip-": colour(1)}
-"""Kind of mode -> colour of its background."""
+"""Type of mode -> colour of its background."""
 WANTED = "0.35"
 """Colour of bounds, and of values to meet."""
 
 Modes = Sequence[tuple[str, float, float]]
 """(kind, begin [s], end [s]) of the modes of a contact."""
 CIRCLES = 60
-"""Nodes of a motion that are drawn, about: of more they would be a thick line."""
+"""Approximate number of nodes drawn for a motion."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A motion to draw.
+    """A motion in a plot.
 
     Attributes:
         label: legend entry.
-        motion: optimised.
-        runs: its re-simulated spans; none where it was not verified.
-        ending: durations, cost and how it ended, in words.
+        motion: the optimised motion.
+        runs: its re-simulated phases; empty if not verified.
+        ending: text of durations, cost and status.
     """
 
     label: str
@@ -57,14 +57,14 @@ def plot_motions(
     modes: Mapping[str, Modes] = MappingProxyType({}),
     path: str | Path | None = None,
 ) -> Figure:
-    """Signals of motions over time, a panel each; see `ocp.plot_solutions`.
+    """Plot signals of motions over time, a panel each; see `ocp.plot_solutions`.
 
     Args:
         drawn: the motions; all have the phases and units of the first one.
         names: signals to show.
         spans: phases of the first motion, whose bounds, ends and via points are drawn.
         modes: contact -> its modes.
-        path: image file, its format taken from the ending.
+        path: image file; its extension selects the format.
     """
     first = drawn[0].motion
     figure, axes = panels(len(names))
@@ -85,7 +85,7 @@ def plot_motions(
 
 
 def _explain(axis: "Axes", drawn: Sequence[Drawn], modes: Mapping[str, Modes]) -> None:
-    """Title or legend: labels, and how the motions ended."""
+    """Add the title or legend: labels, and the status of the motions."""
     entries = [f"{one.label}: {one.ending}" for one in drawn]
     handles: list[Artist] = []
     if len(entries) > 1:
@@ -124,7 +124,7 @@ def _signal(axis: "Axes", one: Drawn, name: str, look: Line) -> None:
 
 
 def _wanted(axis: "Axes", phase: Stretch, span: Span, name: str) -> None:
-    """Bounds over a phase, and values and ranges at its ends and on the way."""
+    """Draw bounds over a phase, and prescribed values and ranges."""
     rows = {row.name: (row.lower, row.upper) for row in span.path}
     for bound in span.boxes.get(name) or rows.get(f"the bound on {name}") or ():
         if isfinite(bound):
@@ -148,7 +148,7 @@ def _range(axis: "Axes", t: float, box: tuple[float, float]) -> None:
 
 
 def _modes(axis: "Axes", modes: Mapping[str, Modes]) -> None:
-    """A band of background for each contact."""
+    """Draw a background band for each contact."""
     count = len(modes)
     for k, each in enumerate(modes.values()):
         for kind, begin, end in each:

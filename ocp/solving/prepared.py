@@ -1,4 +1,4 @@
-"""A solver that holds a nonlinear program, ready to run from any start and with any parameters."""
+"""A solver prepared for a nonlinear program, for any start and any parameters."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -38,16 +38,16 @@ from symfric.foundation.status import Status
 Array = NDArray[np.float64]
 Option = str | float | int
 LEAST = 1e-3
-"""A solver is given some time at least [s], and stops at once."""
+"""Least time limit of a solver [s]; it then stops at once."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A CasADi solver and the hook through which it is watched.
+    """A CasADi solver and the hook that monitors it.
 
     Attributes:
-        kept: callbacks that CasADi uses and does not keep alive itself.
+        kept: callbacks that CasADi uses but does not keep alive.
     """
 
     function: ca.Function
@@ -61,7 +61,7 @@ HALTED = {
     Halt.TIME: Status.TIME_LIMIT,
     Halt.FAR: Status.UNBOUNDED,
 }
-"""Reason to stop -> end of the solve."""
+"""Reason to stop -> status of the solve."""
 
 LEAN: dict[str, Any] = {
     "print_time": False,
@@ -69,7 +69,7 @@ LEAN: dict[str, Any] = {
     "calc_lam_p": False,
     "no_nlp_grad": True,
 }
-"""Nothing is printed, and no unused derivatives are made."""
+"""Options for no output and no unused derivatives."""
 
 
 def made(
@@ -79,10 +79,10 @@ def made(
     options: Mapping[str, Option],
     common: Mapping[str, Any],
 ) -> ca.Function:
-    """The CasADi solver of `program`; `options` are the user's and win over `common`, ours.
+    """Return the CasADi solver of `program`; the user's `options` override `common`.
 
     Raises:
-        ValueError: options that the solver refuses, with its name and its own words.
+        ValueError: options that the solver refuses, with its name and message.
     """
     prefix = "" if plugin == "sqpmethod" else f"{plugin}."
     own = {f"{prefix}{name}": value for name, value in options.items()}
@@ -95,13 +95,13 @@ def made(
 
 
 def reason_of(error: Exception) -> str:
-    """The last line of an error of CasADi, without the place in its source."""
+    """Return the last line of an error of CasADi, without the place in its source."""
     lines = [line for line in str(error).strip().splitlines() if line.strip()]
     return re.sub(r"^\S*:\d+: ", "", lines[-1]).strip()
 
 
 def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> ValueError:
-    """The error for options that a solver does not take, of many those that the reason names."""
+    """Return the error for refused options, restricted to those in the reason if possible."""
     named = {name: value for name, value in options.items() if name in reason} or dict(options)
     return ValueError(f"{solver}: expected options of {solver}, got {named!r}; {reason}")
 
@@ -112,14 +112,14 @@ class Prepared:
     """A solver and a program; made by `solver.prepared(program)`. One run at a time.
 
     Attributes:
-        program: what is solved.
+        program: the program.
         solver: the name of the solver, for messages.
         options: those of the user.
-        build: makes the CasADi solver and the hook through which it is watched; its argument says
-            whether the start comes with multipliers.
-        read: (statistics of CasADi) -> the solver's answer and what it means.
+        build: function that makes the CasADi solver and its hook; its argument is True if the
+            start has multipliers.
+        read: (statistics of CasADi) -> the solver's return code and its status.
         max_time: wall time [s] after which a run is stopped.
-        told_time: the limit that a message tells, where `max_time` is what is left of it.
+        told_time: the limit in messages, if `max_time` is the rest of it.
     """
 
     program: Program
@@ -139,19 +139,19 @@ class Prepared:
         warm: bool = False,
         at: At = plainly,
     ) -> Outcome:
-        """Solve from `start`; a solve that fails is an outcome, not an exception.
+        """Solve from `start`; a failure is an outcome, not an exception.
 
         Args:
-            start: unknowns and multipliers; the latter matter where `warm`.
+            start: unknowns and multipliers; the latter are used if `warm`.
             values: numbers of the parameters of the program, `program.values` if none.
             progress: called with a `Progress` after each iteration. Ctrl-C stops the solver after
                 the iteration, and so does an exception here; either way the outcome, with status
                 INTERRUPTED, holds the best iterate, and `cause` the exception.
-            warm: start close by, with the multipliers.
-            at: (w, place) -> words for the time of a place, for the sentence.
+            warm: start near a solution, with the multipliers.
+            at: (w, place) -> text for the time of a place, for the message.
 
         Raises:
-            ValueError: options that the solver does not know, or a start of the wrong size.
+            ValueError: unknown options, or a start of the wrong size.
         """
         begin = perf_counter()
         program = self.program
@@ -200,12 +200,12 @@ class Prepared:
     def _called(
         self, solver: Built, watch: Watch, arguments: Mapping[str, Array]
     ) -> tuple[Mapping[str, ca.DM] | None, str, Status]:
-        """Result of the solver, its answer and the meaning of that."""
+        """Return the result of the solver, its return code and its status."""
         solver.hook.watch = watch
         try:
             with interrupts(watch):
                 result = solver.function(**arguments)
-        except RuntimeError as error:  # some look at their options and structure only now
+        except RuntimeError as error:  # some solvers check options and structure only now
             reason = reason_of(error)
             if "option" in reason.lower():
                 raise refused_options(self.solver, self.options, reason) from None
@@ -236,7 +236,7 @@ class Prepared:
         w: Array,
         values: Array,
     ) -> Seen:
-        """The solution, or else the best point that is known."""
+        """Return the solution, or else the best known point."""
         program = self.program
         if status.ok and result is not None:
             names = ("x", "f", "g", "lam_x", "lam_g")
@@ -244,7 +244,7 @@ class Prepared:
             return Seen(x, float(f[0]), g, lam_x, lam_g, worst_of(program, x, g))
         if watch.best is not None:
             return watch.best
-        # Nothing was seen, and after some errors the result is zero: what stands is the start.
+        # No iterate is known, and after some errors the result is zero: use the start.
         f, g = program.gradient(w, values)[0], program.jacobian(w, values)[0].full().ravel()
         lam_w, lam_g = np.zeros(w.size), np.zeros(g.size)
         return Seen(w, float(f), g, lam_w, lam_g, worst_of(program, w, g))
@@ -253,10 +253,10 @@ class Prepared:
 @final
 @dataclass(frozen=True)
 class Clock:
-    """Runs from when it is made.
+    """Timer of a total time limit, started when created.
 
     Attributes:
-        allowed: wall time [s] for all, or None for any.
+        allowed: total wall time [s], or None for no limit.
     """
 
     allowed: float | None = None
@@ -264,18 +264,18 @@ class Clock:
 
     @property
     def left(self) -> float | None:
-        """What is left [s]; None for any."""
+        """Remaining time [s]; None without a limit."""
         if self.allowed is None:
             return None
         return max(LEAST, self.allowed - (perf_counter() - self.started))
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left."""
+        """True if no time remains."""
         return self.left == LEAST
 
     def within(self, prepared: Prepared) -> Prepared:
-        """`prepared` with what is left as its limit, if that is less than its own."""
+        """Return `prepared` with the remaining time as its limit, if that is less than its own."""
         left = self.left
         if left is None or (prepared.max_time is not None and prepared.max_time <= left):
             return prepared
@@ -290,31 +290,31 @@ class Clock:
         stage: str,
         values: ArrayLike | None = None,
     ) -> Outcome:
-        """One solve within what is left, whose progress is that of a `stage`."""
+        """Solve within the remaining time, and report progress as that of a `stage`."""
         return self.within(prepared).run(
             start, values, in_stage(progress, stage), at=transcription.when
         )
 
 
 def _numbers(values: ArrayLike, program: Program) -> Array:
-    """The numbers of the parameters."""
+    """Return the values of the parameters."""
     found = checks.array("values", values)
     if found.size != program.p.numel():
         raise ValueError(
             f"values: expected {program.p.numel()} numbers of parameters, got {found.size}; "
-            "transcription.values(...) makes them"
+            "transcription.values(...) returns them"
         )
     return found
 
 
 def _equations(program: Program) -> int:
-    """Rows and unknowns whose two bounds are the same."""
+    """Return the number of rows and unknowns with two equal bounds."""
     rows = program.lower_g == program.upper_g
     return int(rows.sum() + (program.lower_w == program.upper_w).sum())
 
 
 def _start(start: Iterate, program: Program) -> Array:
-    """The unknowns to start from."""
+    """Return the initial unknowns."""
     n, m = program.w.numel(), program.g.numel()
     sizes = (start.w.size, start.lam_w.size, start.lam_g.size)
     if sizes != (n, n, m):

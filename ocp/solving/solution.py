@@ -1,4 +1,4 @@
-"""The result of an optimal control problem: named signals that plot, write and save themselves."""
+"""Result of an optimal control problem: named signals with plots, tables and files."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -34,7 +34,7 @@ AT_BOUND = 1e-5
 
 
 class Verdict(Protocol):
-    """Verification of a solution (`ocp.checking` makes it)."""
+    """Verification of a solution, made by `ocp.checking`."""
 
     @property
     def ok(self) -> bool:
@@ -48,22 +48,22 @@ class Verdict(Protocol):
 
     @property
     def trajectories(self) -> Sequence[Trajectory]:
-        """The re-simulated motion of each span that was simulated, in order."""
+        """Re-simulated motion of each phase, in order."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return everything as plain data."""
         ...
 
 
 @final
 @dataclass(frozen=True)
 class Mode:
-    """Mode of a contact for a while.
+    """A time interval with a constant contact mode.
 
     Attributes:
         kind: "slip+", "slip-" or "stick".
-        begin, end: when [s].
+        begin, end: its limits [s].
     """
 
     kind: str
@@ -74,21 +74,21 @@ class Mode:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution:
-    """Optimal motion, and what the model really does under its control.
+    """Optimal motion, and its verification under the control.
 
     `solution["v"]` is a signal at the times `solution.t`, nodes of the mesh and collocation points,
-    joined over the phases. With scenarios it is that of the first one;
-    `solution.scenarios["oiled"]["v"]` is that of another.
+    joined over the phases. With scenarios it belongs to the first one;
+    `solution.scenarios["oiled"]["v"]` belongs to another.
 
     Attributes:
-        problem: what was solved; of a stored solution its resolved form, `Posed`.
-        status: how it ended; `message` says it in a sentence.
+        problem: the solved problem; for a stored solution its resolved form, `Posed`.
+        status: of the solution; `message` describes it.
         cost: J.
-        motions: what moves, for each scenario.
-        chosen: values of the parameters that were chosen.
+        motions: motion of each scenario.
+        chosen: values of the chosen parameters.
         statistics: size, iterations, times, of all solves together.
-        scheme, meshes, points, iterate: what a warm start needs.
-        modes: contact -> its modes in order; empty where friction was not solved by modes.
+        scheme, meshes, points, iterate: data for a warm start.
+        modes: contact -> its modes in order; empty if friction was not solved by modes.
         verification: result of the re-simulation, or None without it.
         cause: the exception in `progress` that stopped the solver, if any.
     """
@@ -117,12 +117,12 @@ class Solution:
         )
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
-        """Text and picture for a notebook."""
+        """Return text and figure for a notebook."""
         title = f"Solution of '{self.problem.name}': {self.status.name}"
         return Shown(title, tuple(str(self).splitlines())).html(self.plot())
 
     def __str__(self) -> str:
-        """The result in a few lines."""
+        """Return the result in a few lines."""
         phases = ", ".join(f"{phase.name} {phase.T:.4g} s" for phase in self.phases)
         several = f" ({phases})" if len(self.phases) > 1 else ""
         lines = [self.message, f"J = {self.cost:.6g}, T = {self.T:.6g} s{several}"]
@@ -149,7 +149,7 @@ class Solution:
 
     @property
     def ok(self) -> bool:
-        """True if it can be used as it is."""
+        """True if it is usable."""
         return self.status.ok
 
     @property
@@ -159,17 +159,17 @@ class Solution:
 
     @property
     def miss(self) -> float:
-        """The largest relative miss of the verification; NaN where there is none."""
+        """Largest relative miss of the verification; NaN without one."""
         return float("nan") if self.verification is None else self.verification.largest
 
     @property
     def trajectories(self) -> tuple[Trajectory, ...]:
-        """The re-simulated motion of each span, in order; empty without verification."""
+        """Re-simulated motion of each phase, in order; empty without verification."""
         return () if self.verification is None else tuple(self.verification.trajectories)
 
     @property
     def scenarios(self) -> dict[str, Motion]:
-        """The motions by the names of their scenarios; empty where there is only one."""
+        """The motions by the names of their scenarios; empty if there is only one."""
         return {motion.name: motion for motion in self.motions if motion.name}
 
     @property
@@ -225,7 +225,7 @@ class Solution:
 
     @property
     def stored(self) -> Stored:
-        """Values for a warm start, free of models."""
+        """Values for a warm start, without models."""
         return Stored(
             name=self.problem.name,
             status=self.status.name,
@@ -238,11 +238,11 @@ class Solution:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write all of it to one file, which `ocp.load` reads to the bit.
+        """Write everything to one file, which `ocp.load` reads exactly.
 
-        A loaded solution has its signals, modes and re-simulated motions; it draws and writes
-        itself, is verified again, and starts others on any mesh or model as `guess`. Functions
-        such as costs are kept as the expressions they gave.
+        A loaded solution has its signals, modes and re-simulated motions; it can be plotted,
+        written, verified again, and used as `guess` on any mesh or model. Functions such as
+        costs are stored as the expressions they returned.
 
         Raises:
             ValueError: the file cannot be written.
@@ -250,32 +250,32 @@ class Solution:
         SOLUTION.save(path, self)
 
     def to_pack(self) -> dict[str, Any]:
-        """The fields, of the problem what was resolved."""
+        """Return the fields, with the resolved problem."""
         return packed.state_of(self) | {"problem": posed(self.problem), "cause": None}
 
     def __copy__(self) -> "Solution":
-        """One with the same fields."""
+        """Return a solution with the same fields."""
         return packed.shallow(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what a file does."""
+        """Return the arguments of pickle; a pickle holds the same as a file."""
         return packed.loads, (packed.dumps(self),)
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
-        """One panel per signal over time; optimised points against the re-simulated line.
+        """Plot one panel per signal over time: optimised points and the re-simulated line.
 
         Args:
             names: signals to show; all of them if none is given.
-            path: image file, its format taken from the ending.
+            path: image file; its extension selects the format.
         """
         return plot_solutions({self.problem.name: self}, names, path)
 
     def runs_of(self, motion: Motion) -> list[Trajectory]:
-        """The re-simulated spans of a motion; none where it was not verified."""
+        """Return the re-simulated phases of a motion; empty if not verified."""
         return [run for k, run in enumerate(self.trajectories) if k in motion.spans]
 
     def ending(self, motion: Motion) -> str:
-        """Duration and cost of a motion, and how it ended, in a few words."""
+        """Return duration, cost and status of a motion as text."""
         ended = "" if self.ok else f", {self.status.name.lower().replace('_', ' ')}"
         checked = ", verified" * self.verified
         return f"T = {motion.T:.4g} s, J = {self.cost:.5g}{checked}{ended}"
@@ -283,8 +283,8 @@ class Solution:
     def to_csv(self, path: str | Path) -> None:
         """Write all signals as columns with units in the header, such as `v [m/s]`.
 
-        The inputs hold from each row to the next, so `Hold(t, force)` gives the control again.
-        With scenarios there is one more column in front, their name.
+        The inputs hold from each row to the next, so `Hold(t, force)` restores the control.
+        With scenarios the first column is their name.
         """
         several = len(self.motions) > 1
         header = ["t [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)]
@@ -296,9 +296,9 @@ class Solution:
         write_table(path, [*(["scenario"] * several), *header], rows)
 
     def to_dataframe(self) -> Any:
-        """The signals as a pandas table over t, with scenarios over scenario and t.
+        """Return the signals as a pandas table over t, with scenarios over scenario and t.
 
-        Units stand in its `attrs`; an input is the value from each time on.
+        Its `attrs` hold the units; an input is the value from each time on.
 
         Raises:
             ImportError: no pandas.
@@ -312,7 +312,7 @@ class Solution:
         return frame
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data; a number that is not finite is None."""
+        """Return everything as plain data, with None for non-finite numbers."""
         return {
             "scene": self.problem.name,
             "status": self.status.name,
@@ -349,20 +349,20 @@ def plot_solutions(
     names: Sequence[str] = (),
     path: str | Path | None = None,
 ) -> "Figure":
-    """Signals of one or several optimal motions over time, a panel each.
+    """Plot signals of one or several optimal motions over time, a panel each.
 
-    Circles are the optimised nodes of the mesh, lines the motion that was simulated under the same
-    control (the optimised one where nothing was simulated), steps the inputs. Thin upright lines
-    part the phases. Of a single solution, bounds are dashed, values and ranges to meet are crosses
+    Circles are the optimised nodes of the mesh, lines the simulated motion under the same
+    control (the optimised one without a simulation), steps the inputs. Thin vertical lines
+    separate phases. For a single solution, bounds are dashed, values and ranges to meet are crosses
     and bars, and the modes of its contacts are shaded, a band for each contact.
 
     Args:
-        solutions: legend entry -> solution; each scenario is a motion of its own.
-        names: signals to show; those that all solutions share if none is given.
-        path: image file, its format taken from the ending.
+        solutions: legend entry -> solution; each scenario is a separate motion.
+        names: signals to show; by default those common to all solutions.
+        path: image file; its extension selects the format.
 
     Raises:
-        ValueError: no solution, an unknown signal, or an ending that Matplotlib does not write.
+        ValueError: no solution, an unknown signal, or an unsupported extension of the file.
     """
     from ocp.solving.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
 
@@ -386,13 +386,13 @@ SOLUTION = Format("symfric ocp solution", 3, "ocp.load", "a saved solution", Sol
 
 
 def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Solution:
-    """The solution that `solution.save(path)` wrote: `solve(problem, guess=load(path))`.
+    """Read the solution that `solution.save(path)` wrote: `solve(problem, guess=load(path))`.
 
     Args:
         path: the file.
-        own: your classes in it, such as a law of yours.
+        own: user-defined classes in it, such as a law.
 
     Raises:
-        ValueError: no such file, a foreign, damaged or newer one, or classes that are not known.
+        ValueError: no such file, a foreign, damaged or newer one, or unknown classes.
     """
     return SOLUTION.load(path, own)

@@ -1,4 +1,4 @@
-"""Where the optimiser starts: straight lines between what is asked for, guesses, or a solution."""
+"""Starts of the optimiser: straight lines between prescribed values, guesses, or a solution."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -28,17 +28,17 @@ Start = Mapping[str, Guess] | Solution | Stored | Points | None
 """Guesses by name, a solution of this or of a similar problem, points, or nothing."""
 
 STARTS = 6
-"""Coarse solves of a problem with friction, of which the best goes on."""
+"""Number of coarse solves of a problem with friction, of which the best continues."""
 
 
 def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
-    """The first iterate, and whether it comes with multipliers.
+    """Return the first iterate, and whether it has multipliers.
 
-    It does where `guess` is a solution of a program with the same unknowns and rows on the same
-    meshes; of other solutions the motion is taken over by name.
+    It has them if `guess` is a solution of a program with the same unknowns and rows on the same
+    meshes; from other solutions the motion is transferred by name.
 
     Raises:
-        ValueError: guesses that are none, see `initial_points`.
+        ValueError: invalid guesses, see `initial_points`.
     """
     rows = into.program.g.numel()
     if isinstance(guess, Points):
@@ -63,7 +63,7 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
 
 
 def _check_shapes(into: Transcription, points: Points) -> None:
-    """Points are of one mesh and one set of models."""
+    """Raise ValueError for points of other meshes or models."""
     fitting = initial_points(into)
     names = ("nodes", "inner", "z", "u")
     for number, wanted in enumerate(fitting.spans):
@@ -73,25 +73,25 @@ def _check_shapes(into: Transcription, points: Points) -> None:
             getattr(wanted, name).shape for name in names
         ]:
             raise ValueError(
-                f"guess: expected points of {len(fitting.spans)} spans, that of "
+                f"guess: expected points of {len(fitting.spans)} phases, "
                 f"{into.problem.spans[number].name} with states at the nodes of shape "
-                f"{wanted.nodes.shape}, got points of other meshes or models; give the solution "
-                "itself, which is carried over by name"
+                f"{wanted.nodes.shape}, got points of other meshes or models; pass the solution "
+                "itself, which is transferred by name"
             )
 
 
 def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None) -> Points:
-    """Points to start from: what is `given` by name, straight lines and mid values for the rest.
+    """Return initial points: `given` values by name, straight lines and mid values for the rest.
 
-    States run straight through the middles of what is asked of them at the start, on the way and
-    at the end, over all phases in which they are continuous. A state that is the rate of another
-    one (x' = v) takes the slope of that one: with v = 0, where a friction law is steepest, Ipopt
-    needs ten times the iterations or fails. States of which only an output asks something stay
-    level. Algebraic variables keep their start value; inputs are zero, or in the middle of their
-    bounds where zero is outside.
+    States follow straight lines through the middles of their conditions at the start, at via points
+    and at the end, over all phases in which they are continuous. A state that is the rate of
+    another one (x' = v) takes the slope of that one: with v = 0, where a friction law is steepest,
+    Ipopt needs ten times the iterations or fails. States with a condition only through an output
+    stay constant. Algebraic variables keep their start value; inputs are zero, or in the middle of
+    their bounds if zero is outside.
 
     Raises:
-        ValueError: unknown name, or values that are not finite or not one a time.
+        ValueError: unknown name, or values that are not finite or not one per time.
     """
     problem = into.problem
     known = {
@@ -114,10 +114,10 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None
 
 
 def resample(into: Transcription, stored: Stored) -> Points:
-    """The motion of a solution on other meshes, in other phases, or of a model with these names.
+    """Return the motion of a solution on other meshes, phases or models with equal names.
 
-    With as many phases as the solution, phase goes to phase; with another number, the whole motion
-    is stretched over the whole duration.
+    With the same number of phases, each phase is transferred to its counterpart; otherwise the
+    whole motion is stretched over the whole duration.
     """
     problem = into.problem
     scenarios = {span.scenario for span in stored.spans}
@@ -152,11 +152,11 @@ def resample(into: Transcription, stored: Stored) -> Points:
 
 
 Value = Callable[[int, str, Array], Array | None]
-"""(number of the span, name, fractions of T) -> what the signal starts with there, if known."""
+"""(index of the phase, name, fractions of T) -> initial values of the signal, if known."""
 
 
 def _points(into: Transcription, durations: Sequence[float], value: Value) -> Points:
-    """Points of all spans from known values; straight lines elsewhere."""
+    """Return points of all phases from known values; straight lines elsewhere."""
     problem, phases = into.problem, len(into.problem.chain)
     found: list[SpanPoints] = []
     for first in range(0, len(problem.spans), phases):
@@ -200,7 +200,7 @@ def _given_or(values: Array | None, default: float, count: int) -> Array:
 
 
 class _Lines:
-    """Straight lines through what is asked of the states of one scenario."""
+    """Straight lines through the prescribed states of one scenario."""
 
     def __init__(self, problem: Problem, durations: Sequence[float], first: int) -> None:
         self._spans = {first + k: problem.spans[first + k] for k in range(len(problem.chain))}
@@ -209,11 +209,11 @@ class _Lines:
         self._ends: dict[int, dict[str, float]] = {}
 
     def keep(self, number: int, ends: dict[str, float]) -> None:
-        """Note where the states of a span end: states may jump from there."""
+        """Record the states at the end of a phase, from which states may jump."""
         self._ends[number] = ends
 
     def of(self, number: int, name: str, fractions: Array) -> Array:
-        """A state at fractions of a span."""
+        """Return a state at fractions of a phase."""
         run = [number]
         while (link := self._link(run[0], name)) is not None and _plain(link, self._before(run[0])):
             run.insert(0, run[0] - 1)
@@ -243,7 +243,7 @@ class _Lines:
         return next((link for link in self._spans[number].links if link.state == name), None)
 
     def _landing(self, number: int, link: Link) -> float:
-        """Where a state starts that jumps."""
+        """Return the start of a state that jumps."""
         span = self._before(number)
         function = ca.Function("landing", span.symbols, [link.expression])
         x = [self._ends[number - 1][v.name] for v in span.model.x]
@@ -253,21 +253,21 @@ class _Lines:
 
 
 def _plain(link: Link, before: Span) -> bool:
-    """Whether the state goes on as it was."""
+    """Return True if the state is continuous."""
     return any(
         v.name == link.state and ca.is_equal(link.expression, v.symbol) for v in before.model.x
     )
 
 
 def _asked(span: Span, name: str, fraction: float) -> bool:
-    """Whether a state is asked for something there beside its bounds, or is bounded on one side."""
+    """Return True if a state has a condition there other than its general bounds."""
     box = span.nodes[fraction][name]
     finite = isfinite(box[0]) or isfinite(box[1])
     return finite and (box != span.box(name) or (span.phase == 0 and fraction == 0.0))
 
 
 def _durations(problem: Problem) -> list[float]:
-    """Durations to start from [s]; those whose sum is fixed are stretched to it."""
+    """Return initial durations [s], scaled to a prescribed sum."""
     spans = problem.spans
     found = [span.T.start if isinstance(span.T, Free) else float(span.T) for span in spans]
     for phases, total in problem.durations:
@@ -285,7 +285,7 @@ def _durations(problem: Problem) -> list[float]:
 
 
 def _begin(problem: Problem, durations: Sequence[float], number: int) -> float:
-    """When a span starts [s]."""
+    """Return the start of a phase [s]."""
     first = number - number % len(problem.chain)
     return float(sum(durations[first:number]))
 
@@ -305,7 +305,7 @@ def _evaluate(name: str, guess: Guess, times: Array, T: float) -> Array:
     if values.ndim > 1 or values.size not in sizes:
         raise ValueError(
             f"guess: expected for {name} a number, samples, or a function that returns one value "
-            f"a time, got an array of shape {values.shape}"
+            f"per time, got an array of shape {values.shape}"
         )
     if callable(guess) or values.ndim == 0:
         return np.array(np.broadcast_to(values, times.shape))
@@ -313,7 +313,7 @@ def _evaluate(name: str, guess: Guess, times: Array, T: float) -> Array:
 
 
 def rates_of(model: Model) -> dict[str, str]:
-    """State -> the state whose time derivative it is."""
+    """Return state -> the state whose time derivative it is."""
     ode = model.function("ode")(model.t, *(model.vector(letter) for letter in "xzup"))
     return {
         other.name: v.name
@@ -324,7 +324,7 @@ def rates_of(model: Model) -> dict[str, str]:
 
 
 def _middle(box: Box) -> float:
-    """The middle of a range, or its finite end."""
+    """Return the middle of a range, or its finite end."""
     low, high = box
     if isfinite(low) and isfinite(high):
         return (low + high) / 2
@@ -332,5 +332,5 @@ def _middle(box: Box) -> float:
 
 
 def _rest(box: Box) -> float:
-    """Zero, or the middle of a range that does not hold it."""
+    """Return zero, or the middle of a range that does not contain it."""
     return 0.0 if box[0] <= 0.0 <= box[1] else _middle(box)

@@ -1,4 +1,4 @@
-"""Watch a running solver, keep its best iterate, stop it, and put its end into a sentence."""
+"""Monitoring of a running solver: its best iterate, reasons to stop, and the final message."""
 
 import signal
 import threading
@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 FEASIBLE = 1e-6
 """Largest scaled violation of an iterate that counts as feasible."""
 WINDOW = 30
-"""Iterations in which a Newton method that gets anywhere is seen to do so."""
+"""Number of iterations in which a converging Newton method makes visible progress."""
 FAR = 1e10
-"""Scaled unknowns beyond this are on their way to infinity."""
+"""Scaled unknowns above this count as diverging."""
 RESTING = 1e-6
-"""Steps of scaled unknowns below this are no motion."""
+"""Steps of scaled unknowns below this count as zero."""
 
 
 class Halt(Enum):
@@ -41,7 +41,7 @@ class Halt(Enum):
 @final
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A point that the solver was at; multipliers are zero where it does not tell them."""
+    """An iterate of the solver; multipliers are zero if it does not report them."""
 
     w: Array
     f: float
@@ -56,7 +56,7 @@ class Seen:
         return bool(np.isfinite(self.f) and np.isfinite(self.violation))
 
     def better_than(self, other: "Seen | None") -> bool:
-        """Feasible before not feasible, then the lower cost; among the rest the less violated."""
+        """Return True if better: feasible with the lower cost, or less violated."""
         if other is None or not (self.finite and other.finite):
             return other is None or self.finite
         if max(self.violation, other.violation) <= FEASIBLE:
@@ -66,13 +66,13 @@ class Seen:
 
 @final
 class Watch:
-    """One run of a solver as it is seen from outside.
+    """A monitored run of a solver.
 
     Attributes:
         best, last: iterates; None before the first one.
         trace: cost, violation and largest step of each iterate.
-        counted: iterations as the solver has counted them, when it is back.
-        halt: who stopped it, if anybody did.
+        counted: iterations counted by the solver, after its return.
+        halt: reason of a stop, if any.
         error: an exception in `progress`.
     """
 
@@ -88,12 +88,12 @@ class Watch:
 
     @property
     def iterations(self) -> int:
-        """Iterations seen, the start not counted; a restoration shows its first point twice."""
+        """Observed iterations without the start; a restoration reports its first point twice."""
         seen = max(0, len(self.trace) - 1)
         return seen if self.counted is None else min(seen, self.counted)
 
     def see(self, w: Array, f: float, g: Array, lam_w: Array, lam_g: Array) -> bool:
-        """Take note of an iterate; True asks the solver to stop."""
+        """Record an iterate; return True to stop the solver."""
         violation = worst_of(self._program, w, g)
         step = np.inf if self.last is None else float(np.abs(w - self.last.w).max(initial=0.0))
         self.last = Seen(w, f, g, lam_w, lam_g, violation)
@@ -109,21 +109,21 @@ class Watch:
                 self._progress(Progress(self.iterations, f, violation))
             except KeyboardInterrupt:
                 self.halt = Halt.USER
-            # An exception must cross C++: it is kept here and raised again behind it.
+            # An exception cannot cross C++: it is stored here and raised again afterwards.
             except BaseException as error:  # noqa: BLE001
                 self.error, self.halt = error, Halt.ERROR
         return self.halt is not None
 
     @property
     def cycles(self) -> bool:
-        """True if the last iterations went round (see `goes_round`)."""
+        """True if the last iterations were cyclic (see `goes_round`)."""
         return goes_round(self.trace)
 
 
 def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
-    """True if neither cost nor violation got better in the last iterations, while w kept moving.
+    """Return True if neither cost nor violation improved in the last iterations, while w moved.
 
-    This is what a Newton method does at a kink that is smoothed over less than one step: it jumps
+    A Newton method behaves like this at a kink that is smoothed over less than one step: it jumps
     from one side to the other.
 
     Args:
@@ -176,7 +176,7 @@ class Shaped(ca.Callback):
 
 @final
 class IterationHook(Shaped):
-    """Shows every iterate of a solver that has a callback (Ipopt, SQP) to the current `watch`."""
+    """Callback of a solver (Ipopt, SQP) that reports every iterate to the current `watch`."""
 
     def __init__(self, program: Program) -> None:
         n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
@@ -197,9 +197,9 @@ class IterationHook(Shaped):
 
 @final
 class GradientHook(Shaped):
-    """The gradient of the cost, through which a solver without callback (fatrop) is watched.
+    """Gradient of the cost, used to monitor a solver without callback (fatrop).
 
-    It is evaluated once an iteration, at the new iterate. To stop the solver, it returns NaN.
+    It is evaluated once per iteration, at the new iterate. To stop the solver, it returns NaN.
     """
 
     def __init__(self, program: Program) -> None:
@@ -245,22 +245,22 @@ def interrupts(watch: Watch) -> Generator[None, None, None]:
 Array = NDArray[np.float64]
 
 At = Callable[[Array, Place], str]
-"""(w, place) -> when that is, in words."""
+"""(w, place) -> text for its time."""
 
 OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
 """Ipopt's answer to a program with more equations than unknowns."""
 
 HINTS: dict[str, str] = {
     OVERDETERMINED: (
-        "There are more equations than unknowns; ask for fewer ends and via points, or give more "
+        "There are more equations than unknowns; use fewer end and via conditions, or more "
         "intervals."
     ),
-    "Insufficient_Memory": "The memory is used up; take fewer intervals.",
+    "Insufficient_Memory": "The memory is exhausted; use fewer intervals.",
 }
-"""Answer -> what is wrong, where the status alone does not say it."""
+"""Return code -> message, if the status alone is not specific."""
 
 TRIED = (
-    "It happened at a point that the solver tried, not at an iterate; bound the states to where "
+    "It happened at a point tried by the solver, not at an iterate; bound the states to where "
     "the equations are defined."
 )
 
@@ -276,7 +276,7 @@ def sentence(
     values: Array,
     at: At,
 ) -> str:
-    """End of the solve, worst row at `point`, and what to try."""
+    """Return the message on the end of a solve, the worst row at `point`, and what to try."""
     if status.ok:
         return status.value
     count = watch.iterations
@@ -288,7 +288,7 @@ def sentence(
         named = (not_finite(program, seen.w, values, at) for seen in tried)
         return f"{reason} {next(filter(None, named), TRIED)}"
     if watch.cycles:
-        reason += " The last iterations go round without getting better, as they do at a kink."
+        reason += " The last iterations repeat without improvement, as at a kink."
     return f"{reason} {worst(program, point, at)}"
 
 
@@ -301,8 +301,8 @@ def _reason(watch: Watch, status: Status, answer: str, solver: str, max_time: fl
     if status is Status.TIME_LIMIT:
         limit = "The time limit" if max_time is None else f"The time limit of {max_time:g} s"
         return (
-            f"{limit} ended {solver} after {count} iterations; allow more time or go on from the "
-            "result, which is the best iterate."
+            f"{limit} ended {solver} after {count} iterations; allow more time or continue from "
+            "the result, which is the best iterate."
         )
     if watch.halt is Halt.FAR:
         size = f"{FAR:g} times their typical size"
@@ -311,7 +311,7 @@ def _reason(watch: Watch, status: Status, answer: str, solver: str, max_time: fl
 
 
 def worst(program: Program, point: Seen, at: At) -> str:
-    """The row or the bound that is violated most, or that there is none."""
+    """Return a message on the most violated row or bound, or that there is none."""
     rows = outside(point.g, program.lower_g, program.upper_g)
     bounds = outside(point.w, program.lower_w, program.upper_w)
     far = point.violation
@@ -327,7 +327,7 @@ def worst(program: Program, point: Seen, at: At) -> str:
 
 
 def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
-    """Equation, or derivative of one, that is NaN or infinite at `w`; empty if none is."""
+    """Return a message on a NaN or infinite equation or derivative at `w`; "" if none."""
     cost, slope = program.gradient(w, values)
     g, jacobian = program.jacobian(w, values)
     rows, columns = (np.array(part) for part in jacobian.sparsity().get_triplet())
@@ -350,6 +350,6 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
 
 
 def plainly(w: Array, place: Place) -> str:
-    """Time of a place as a fraction, without known durations."""
+    """Return the time of a place as a fraction, without known durations."""
     del w
     return f"at {place.fraction:.4g} of the duration"

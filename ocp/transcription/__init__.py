@@ -1,1 +1,1 @@
-"""From a problem to a nonlinear program made of blocks, and back to names."""
+"""Transcription of a problem to a nonlinear program made of blocks, and back to names."""

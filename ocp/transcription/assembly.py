@@ -1,7 +1,7 @@
-"""Pieces put together: functions of a program with exact sparse derivatives.
+"""Assembly of pieces: functions of a program with exact sparse derivatives.
 
-Values of all blocks at all places are columns of mapped Functions. Where they go in the rows, the
-gradient, the Jacobian and the Hessian is one constant sparse matrix each, made here with NumPy:
+Values of all blocks at all places are columns of mapped Functions. One constant sparse matrix each,
+computed here with NumPy, distributes them to the rows, the gradient, the Jacobian and the Hessian:
 nothing is differentiated again, and the graph does not grow with the mesh.
 """
 
@@ -19,11 +19,11 @@ from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Sele
 @final
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Place of the shares of one cost.
+    """Target of the shares of one cost.
 
     Attributes:
-        weight: factor in the objective; 0 where a row bounds the cost instead.
-        piece: number of the piece whose only row that is; -1 where there is none.
+        weight: factor in the objective; 0 if a row bounds the cost instead.
+        piece: index of the piece with that single row; -1 if there is none.
     """
 
     weight: float = 1.0
@@ -33,7 +33,7 @@ class Slot:
 @final
 @dataclass(frozen=True, eq=False)
 class Assembled:
-    """Functions of a program (see `Program`); numbers of the rows of each piece, (m, places)."""
+    """Functions of a program (see `Program`), and row indices of each piece, (m, places)."""
 
     f: ca.MX
     g: ca.MX
@@ -44,7 +44,7 @@ class Assembled:
 
 
 def row_numbers(pieces: Sequence[Piece]) -> tuple[Indices, ...]:
-    """Numbers of the rows of all pieces by their `order`, each of shape (m, places)."""
+    """Return the row indices of all pieces by their `order`, each of shape (m, places)."""
     keys = np.concatenate([np.zeros(0, np.int64), *(np.repeat(p.order, p.m) for p in pieces)])
     numbers = np.empty(keys.size, np.int64)
     numbers[np.argsort(keys, kind="stable")] = np.arange(keys.size)
@@ -55,12 +55,12 @@ def row_numbers(pieces: Sequence[Piece]) -> tuple[Indices, ...]:
 def assemble(
     w: ca.MX, p: ca.MX, pieces: Sequence[Piece], slots: Sequence[Slot], c: Array
 ) -> Assembled:
-    """Put pieces together.
+    """Assemble pieces.
 
     Args:
         w, p: unknowns and parameters of the program; `theta` of the pieces is written in p.
         pieces: rows and costs.
-        slots: where the shares of each cost go.
+        slots: targets of the shares of each cost.
         c: linear part of the objective, shape (n,).
     """
     at = row_numbers(pieces)
@@ -110,7 +110,7 @@ EMPTY: Triplets = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
 
 
 def _linear(pieces: Sequence[Piece], at: tuple[Indices, ...]) -> Triplets:
-    """Rows, columns and values of A."""
+    """Return rows, columns and values of A."""
     found = [EMPTY]
     for piece, numbers in zip(pieces, at, strict=True):
         if (A := piece.linear) is not None:
@@ -122,8 +122,10 @@ def _linear(pieces: Sequence[Piece], at: tuple[Indices, ...]) -> Triplets:
 @final
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A piece with a block, at its rows (m, places); its share of the cost goes to the objective
-    with `weight`, and to row `bounded` of the program unless that is -1.
+    """A piece with a block, at its rows (m, places).
+
+    Its share of the cost is added to the objective with `weight`, and to row `bounded` of the
+    program unless that is -1.
     """
 
     piece: Piece
@@ -136,7 +138,7 @@ class _Part:
 
     @cached_property
     def arguments(self) -> list[ca.MX]:
-        """Local unknowns and parameters at all places."""
+        """Return the local unknowns and parameters at all places."""
         places, theta = self.piece.places, self.piece.theta
         if theta.shape[1] != places:
             theta = ca.repmat(theta, 1, places)
@@ -144,7 +146,7 @@ class _Part:
 
     @property
     def local(self) -> ca.MX:
-        """Local unknowns at all places, MX (n, places)."""
+        """Return the local unknowns at all places, MX (n, places)."""
         s, places = self.selection, self.piece.places
         if s.plain:
             return ca.reshape(self.w[s.columns.ravel().tolist()], self.block.n, places)
@@ -154,28 +156,28 @@ class _Part:
         return ca.reshape(ca.densify(ca.mtimes(S, self.w)), self.block.n, places)
 
     def mapped(self, function: ca.Function, *more: ca.MX) -> list[ca.MX]:
-        """The outputs of `function` at all places."""
+        """Return the outputs of `function` at all places."""
         return function.map(self.piece.places).call([*self.arguments, *more])
 
     def rows_alone(self) -> ca.MX:
-        """Values of the rows at all places, and of the cost that is bounded by a row, MX (k, 1)."""
+        """Return the rows at all places, and the cost that is bounded by a row, MX (k, 1)."""
         found = ca.vec(self.mapped(self.block.rows)[0])
         return ca.vertcat(found, self.bounded_cost())
 
     def bounded_cost(self) -> ca.MX:
-        """The share of a cost that a row bounds; no rows where none does."""
+        """Return the share of a cost that a row bounds; without rows if none does."""
         if self.bounded < 0 or self.block.share is None:
             return ca.MX(0, 1)
         return ca.sum2(self.mapped(self.block.share)[0])
 
     @property
     def numbers(self) -> Indices:
-        """Rows of the program that `rows_alone` belongs to."""
+        """Row indices of `rows_alone` in the program."""
         cost = self.bounded >= 0 and self.block.share is not None
         return np.append(self.rows.ravel(order="F"), np.full(int(cost), self.bounded))
 
     def add_slopes(self, gradient: "_Sum", jacobian: "_Sum") -> None:
-        """Derivative of the share of the cost."""
+        """Add the derivative of the share of the cost."""
         (slopes,) = self.mapped(self.block.slopes)
         bounded = float(self.bounded >= 0)
         for matrix, row, weight in ((gradient, 0, self.weight), (jacobian, self.bounded, bounded)):
@@ -184,13 +186,13 @@ class _Part:
                 matrix.add(self.block.of_slopes, rows, self.selection, slopes, weight)
 
     def add_jacobian(self, jacobian: "_Sum") -> ca.MX:
-        """Derivative of the rows; returns their values as `rows_alone`."""
+        """Add the derivative of the rows; return their values as `rows_alone`."""
         rows, entries = self.mapped(self.block.jacobian)
         jacobian.add(self.block.of_jacobian, self.rows, self.selection, entries)
         return ca.vertcat(ca.vec(rows), self.bounded_cost())
 
     def add_hessian(self, hessian: "_Sum", lam_f: ca.MX, lam_g: ca.MX) -> None:
-        """Second derivative of the Lagrangian."""
+        """Add the second derivative of the Lagrangian."""
         places, m = self.piece.places, self.block.m
         sigma = self.weight * lam_f + (lam_g[self.bounded] if self.bounded >= 0 else 0)
         lam = ca.reshape(lam_g[self.rows.ravel(order="F").tolist()], m, places)
@@ -201,7 +203,7 @@ class _Part:
 def _rows(
     parts: Sequence[_Part], values: Sequence[ca.MX], constant: Triplets, w: ca.MX, m: int
 ) -> ca.MX:
-    """G = A w + what the blocks say."""
+    """Return g = A w + the values of the blocks."""
     A = _constant(constant, (m, w.numel()))
     g = ca.densify(ca.mtimes(A, w))
     if not values:
@@ -254,7 +256,7 @@ class _Sum:
         source, left, right = first[a], left[:, a], right[:, b]
         weights = by_left[:, a] * by_right[:, b]
         off = (entries.rows != entries.columns)[source]
-        # An entry off the diagonal of H stands for two: both meet where its unknowns share one.
+        # An off-diagonal entry of H represents two, which coincide if its unknowns share one.
         weights = weights * np.where(off & (left == right), 2.0, 1.0)
         weights = weights * (off | (left <= right))
         upper = np.minimum(left, right), np.maximum(left, right)
@@ -269,7 +271,7 @@ class _Sum:
         weights: Array,
         values: ca.MX,
     ) -> None:
-        """Entry `source` of the block, by terms (places, terms)."""
+        """Store entry `source` of the block, by terms (places, terms)."""
         places, nv = weights.shape[0], entries.varying.size
         position = np.full(entries.rows.size, -1)
         position[entries.varying] = np.arange(nv)
@@ -291,7 +293,7 @@ class _Sum:
         self.count += nv * places
 
     def matrix(self) -> ca.MX:
-        """The matrix, with the entries that may be there."""
+        """Return the matrix with its structural nonzeros."""
         rows, columns, numbers = map(np.concatenate, zip(EMPTY, *self.fixed, strict=True))
         count = rows.size
         rows, columns = np.concatenate([rows, *self.rows]), np.concatenate([columns, *self.columns])
@@ -306,16 +308,16 @@ class _Sum:
 
 
 def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:
-    """Entries start[i] plus sums of weighted `values`, as a column.
+    """Return entries start[i] plus sums of weighted `values`, as a column.
 
-    Most entries are one value or a constant: they are picked, and only the others added up.
+    Most entries are one value or a constant: they are selected, and only the others are summed.
     """
     to, sources, weights = sums
     terms = np.bincount(to, minlength=start.size)
     plain = (terms == 1) & (start == 0.0)
     plain[to[weights != 1.0]] = False
     constants, which = np.unique(start, return_inverse=True)
-    index = np.asarray(which, dtype=np.int64).ravel()  # of entries without values
+    index = np.asarray(which, dtype=np.int64).ravel()  # index of entries without values
     one = plain[to]
     index[to[one]] = constants.size + sources[one]
     added = np.flatnonzero((terms > 0) & ~plain)
@@ -332,7 +334,7 @@ def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:
 
 
 def _terms(selection: Selection, unknowns: Indices) -> tuple[Indices, Indices, Array]:
-    """For entries of the local `unknowns`: entry of each term, its columns and weights in w."""
+    """Return the entry of each term of the local `unknowns`, its columns and weights."""
     first = np.searchsorted(selection.local, unknowns, side="left")
     count = np.searchsorted(selection.local, unknowns, side="right") - first
     entry = np.repeat(np.arange(unknowns.size), count)
@@ -342,7 +344,7 @@ def _terms(selection: Selection, unknowns: Indices) -> tuple[Indices, Indices, A
 
 
 def _pairs(first: Indices, second: Indices, entries: int) -> tuple[Indices, Indices]:
-    """Every term of `first` with every one of `second` that belongs to the same entry."""
+    """Return pairs of all terms of `first` and `second` that belong to the same entry."""
     counts = np.bincount(second, minlength=entries)
     starts = np.cumsum(counts) - counts
     a = np.repeat(np.arange(first.size), counts[first])
@@ -351,7 +353,7 @@ def _pairs(first: Indices, second: Indices, entries: int) -> tuple[Indices, Indi
 
 
 def _constant(triplets: Triplets, shape: tuple[int, int]) -> ca.DM:
-    """A sparse matrix; entries that stand in one place add up."""
+    """Return a sparse matrix; duplicate entries are summed."""
     rows, columns, values = triplets
     keys, number = np.unique(columns * shape[0] + rows, return_inverse=True)
     pattern = _sparsity(keys % shape[0], keys // shape[0], shape)
@@ -359,6 +361,6 @@ def _constant(triplets: Triplets, shape: tuple[int, int]) -> ca.DM:
 
 
 def _sparsity(rows: Indices, columns: Indices, shape: tuple[int, int]) -> ca.Sparsity:
-    """The pattern of entries in columnwise order."""
+    """Return the pattern of entries in column-major order."""
     starts = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=shape[1]))])
     return ca.Sparsity(*shape, starts.tolist(), rows.tolist())

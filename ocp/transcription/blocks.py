@@ -1,9 +1,9 @@
-"""A partially separable program: few functions of few unknowns, at many places.
+"""A partially separable program: a few functions of few unknowns, at many places.
 
     f(w) = c'w + sum_i q(S_i w, theta_i),    g(w) = A w + rows r(S_i w, theta_i)
 
-A `Block` is r and q with exact derivatives, made once and mapped over its places i; the S_i are
-constant and sparse, so that derivatives of the program are sums of the block's at constant places:
+A `Block` is r and q with exact derivatives, built once and mapped over its places i; the S_i are
+constant and sparse, so the derivatives of the program are sums of the block's at constant places:
 
     dg/dw = A + sum_i P_i' (dr/dv) S_i,    H = sum_i S_i' (d^2 (sigma q + lam'r) / dv^2) S_i
 
@@ -24,7 +24,7 @@ from ocp.formulation.phase import Join, Row
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Symbols = Any
-"""SX or MX columns, all of one kind; CasADi's stubs know no name for either."""
+"""SX or MX columns, all of one type; CasADi's stubs have no common type."""
 
 OPTIONS = {"cse": True}
 
@@ -32,11 +32,11 @@ OPTIONS = {"cse": True}
 @final
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Entries of a derivative, and those of them that never change.
+    """Entries of a derivative, divided into varying and constant ones.
 
     Attributes:
         rows, columns: of all structural nonzeros, columnwise, shape (nnz,).
-        varying: which of them the function returns, increasing, shape (nv,).
+        varying: indices of those that the function returns, increasing, shape (nv,).
         constant: values of the others, shape (nnz - nv,).
     """
 
@@ -47,7 +47,7 @@ class Entries:
 
     @cached_property
     def still(self) -> Indices:
-        """Numbers of the constant ones, shape (nnz - nv,)."""
+        """Indices of the constant entries, shape (nnz - nv,)."""
         return np.setdiff1d(np.arange(self.rows.size), self.varying)
 
 
@@ -59,7 +59,7 @@ class Block:
     Attributes:
         n, m: numbers of local unknowns v and of rows.
         rows: (v, theta) -> r.
-        share: (v, theta) -> q; None where there is none.
+        share: (v, theta) -> q; None if there is none.
         slopes: (v, theta) -> dq/dv, its varying nonzeros.
         jacobian: (v, theta) -> r, varying nonzeros of dr/dv.
         hessian: (v, theta, sigma, lam) -> varying nonzeros of the upper triangle of
@@ -108,7 +108,7 @@ def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None =
 
 
 def _entries(matrix: Symbols) -> tuple[Entries, Symbols]:
-    """Places of the nonzeros of a matrix, and those that are no plain numbers as a column."""
+    """Return the places of the nonzeros of a matrix, and the varying ones as a column."""
     rows, columns = (np.array(part, dtype=np.int64) for part in matrix.sparsity().get_triplet())
     if isinstance(matrix, ca.MX):
         return Entries(rows, columns, np.arange(rows.size), np.zeros(0)), matrix.nz[:]
@@ -125,7 +125,7 @@ def _entries(matrix: Symbols) -> tuple[Entries, Symbols]:
 @final
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Local unknowns v = S_i w at `places` places, given by terms of the same shape everywhere.
+    """Local unknowns v = S_i w at `places` places, by terms of the same shape everywhere.
 
     Attributes:
         local: local unknown of each term, shape (terms,), increasing.
@@ -146,7 +146,7 @@ class Selection:
 
 
 def select(parts: Sequence[Indices | tuple[Indices, Array]], places: int) -> Selection:
-    """A selection from parts that follow each other.
+    """Return a selection from consecutive parts.
 
     Args:
         parts: (k, places) columns of k local unknowns; or columns and weights, both
@@ -184,7 +184,7 @@ class Linear:
 
     @staticmethod
     def of(rows: Indices, columns: Indices, weights: Array) -> "Linear":
-        """The same rows (terms,) at every place, with columns and weights (terms, places)."""
+        """Return equal rows (terms,) at every place, with columns and weights (terms, places)."""
         terms, places = columns.shape
         at = np.tile(np.arange(places), terms)
         return Linear(at, np.repeat(rows, places), columns.ravel(), weights.ravel())
@@ -208,13 +208,13 @@ class Rows:
 
     @staticmethod
     def of(rows: Sequence[Row | Join]) -> "Rows":
-        """Conditions of a problem."""
+        """Return the rows of conditions of a problem."""
         columns = [[r.nominal for r in rows], [r.lower for r in rows], [r.upper for r in rows]]
         return Rows(tuple(row.name for row in rows), *(np.array(c, dtype=float) for c in columns))
 
     @staticmethod
     def zero(names: Sequence[str], scale: Array) -> "Rows":
-        """Equations: rows that are zero."""
+        """Return the rows of equations, which are zero."""
         zeros = np.zeros(len(names))
         return Rows(tuple(names), scale, zeros, zeros)
 
@@ -226,20 +226,20 @@ class Rows:
 @final
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Rows and costs of one kind at many places.
+    """Rows and costs of one type at many places.
 
     Attributes:
         rows: of each place.
-        order: where the rows of each place stand among all rows: those with lower numbers first,
-            shape (places,); see `order_of`.
-        span: number of the span.
-        interval, offset: the place is `offset` of the way through an interval of the mesh, both of
+        order: position of the rows of each place among all rows: lower numbers first, shape
+            (places,); see `order_of`.
+        span: index of the phase.
+        interval, offset: the place is at the fraction `offset` of an interval of the mesh, both of
             shape (places,).
         block: nonlinear part; None for linear rows.
         selection: its local unknowns.
         theta: its parameters, MX (k, places) or (k, 1).
         linear: linear part of the rows.
-        slot: number of the cost that the shares go to.
+        slot: index of the cost of the shares.
     """
 
     rows: Rows
@@ -260,7 +260,7 @@ class Piece:
 
     @property
     def m(self) -> int:
-        """Rows a place."""
+        """Number of rows per place."""
         return len(self.names)
 
     @property
@@ -270,7 +270,7 @@ class Piece:
 
 
 def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order: Indices) -> Piece:
-    """Rows that stand once: row i is the sum of weights[i, j] w[columns[i, j]]."""
+    """Return single rows: row i is the sum of weights[i, j] w[columns[i, j]]."""
     numbers = np.repeat(np.arange(len(rows.names)), columns.shape[1])
     kept = weights.ravel() != 0.0
     return Piece(
@@ -284,9 +284,9 @@ def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order:
 
 
 LAST = 63
-"""The last number inside of a stage; 0 is the gap to the next one."""
+"""Last number inside a stage; 0 is the gap to the next one."""
 
 
 def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
-    """Order of rows by span, interval and number inside of the interval, at most `LAST`."""
+    """Return the order of rows by phase, interval and number inside the interval, up to `LAST`."""
     return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside

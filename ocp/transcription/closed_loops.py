@@ -1,14 +1,14 @@
-"""Mechanisms with constraints phi(q, t) = 0: they hold exactly at every node, so nothing drifts.
+"""Mechanisms with constraints phi(q, t) = 0, which hold exactly at every node, without drift.
 
-Collocation keeps phi'' = 0 at its points; what this leaves is taken away at the end of each
-interval by the smallest correction, with multipliers mu, nu as further unknowns:
+Collocation keeps phi'' = 0 at its points; the remaining violation is removed at the end of each
+interval by the smallest correction, with multipliers mu, nu as additional unknowns:
 
     q_(k+1) = q_end + phi_q' mu,   phi(q_(k+1), t) = 0
     v_(k+1) = v_end + phi_q' nu,   phi_q v_(k+1) + phi_t = 0
 
-phi_q is taken at q_end, which makes a node an explicit function of the interval before. Coordinates
-may be named wherever values are given, dependent ones too: those that follow from the others
-are set free again, so that no condition stands twice.
+phi_q is evaluated at q_end, which makes a node an explicit function of the interval before.
+Coordinates may be named wherever values are given, also dependent ones: those that follow from the
+others are released, so that no condition is stated twice.
 
 Source: Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12/13, 1985, 77-90 (constraints on two
 levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected collocation).
@@ -29,19 +29,19 @@ from symfric.foundation.checks import listed
 from symfric.model.holonomic import Holonomic
 
 RANK = 1e-8
-"""Singular values below this share of the largest one count as zero."""
+"""Relative singular values below this count as zero."""
 STEPS, ITERATIONS = 20, 30
-"""Stations on the way from the start of a model to named coordinates, and iterations at each."""
+"""Continuation steps from the start of a model to named coordinates, and iterations at each."""
 FINE, NEAR = 4, 5
-"""The same from one point of a motion to the next."""
+"""Continuation steps and iterations from one point of a motion to the next."""
 
 
 @final
 class Loops:
-    """Numbers of the constraints of a span, by nominal coordinates."""
+    """Numeric constraints of a phase, scaled by nominal coordinates."""
 
     def __init__(self, span: Span, mechanics: Holonomic, begin: float, free: bool) -> None:
-        """The span starts at the time `begin` [s], which may be chosen, or its end (`free`)."""
+        """Set up a phase that starts at the time `begin` [s]; `free`: its begin or end is free."""
         self.span, self.n, self.begin = span, mechanics.n, begin
         p = {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
         self.start = span.model.initial_state(None, p)
@@ -58,26 +58,26 @@ class Loops:
         self.open = bool(unknown) and bool(ca.depends_on(phi, ca.vertcat(*unknown)))
 
     def at(self, q: Array, t: float) -> tuple[Array, Array, Array]:
-        """Phi (m,), its Jacobian by nominal coordinates (m, n), and phi_t (m,), in span time."""
+        """Return phi (m,), its scaled Jacobian (m, n), and phi_t (m,), in time of the phase."""
         values = self._function(q, self.begin + t, self.span.p)
         phi, slope, rate = (np.array(part) for part in values)
         slope = slope * self.nominal / self.sizes[:, None]
         return phi.ravel() / self.sizes, slope, rate.ravel() / self.sizes
 
     def closed(self, q: Array, held: Sequence[int], t: float) -> tuple[Array, float]:
-        """Coordinates that satisfy the constraints best with those `held` as they are in q.
+        """Return coordinates that satisfy the constraints best with those `held` as in q.
 
-        By Gauss and Newton on the way from the start of the model, the shortest change each time.
-        Returns also by how much the constraints are off.
+        Gauss-Newton with continuation from the start of the model, the shortest change in each
+        step. Also returns the remaining residual of the constraints.
         """
         now = self._towards(self.start[: self.n], q, held, t, (STEPS, ITERATIONS))
         return now, float(np.abs(self.at(now, t)[0]).max())
 
     def follow(self, x: Array, times: Array, lead: Sequence[int]) -> Array:
-        """Coordinates and rates x (2 n, points) moved onto the constraints, one after the other.
+        """Move coordinates and rates x (2 n, points) onto the constraints, one point after another.
 
-        As many of the coordinates `lead` as the constraints leave open keep their values, the first
-        ones first.
+        As many of the coordinates `lead` as the constraints leave free keep their values, in their
+        order.
         """
         n, found = self.n, x.copy()
         now = self.start[:n]
@@ -95,7 +95,7 @@ class Loops:
     def _towards(
         self, start: Array, q: Array, held: Sequence[int], t: float, pace: tuple[int, int]
     ) -> Array:
-        """From `start` to the values of q that are `held`, the others by the shortest change."""
+        """Move from `start` to the `held` values of q, the others by the shortest change."""
         free = np.setdiff1d(np.arange(self.n), held)
         now, begin = start.copy(), start[list(held)]
         for s in np.linspace(0.0, 1.0, pace[0] + 1)[1:]:
@@ -115,15 +115,15 @@ class Loops:
 def dependent(
     A: Array, given: Sequence[int], plain: Sequence[int], strict: Sequence[int]
 ) -> list[int] | None:
-    """Columns of A to release so that the others leave all its rows to be satisfied.
+    """Return columns of A to release so that the others can satisfy all its rows.
 
-    As few as possible: `plain` ones before those `given`; None where they do not suffice.
+    As few as possible: `plain` ones before those `given`; None if they are not sufficient.
     """
     taken = {*given, *plain, *strict}
     free = [i for i in range(A.shape[1]) if i not in taken]
     u, s, _ = np.linalg.svd(A, full_matrices=False)
     rank, size = int((s > RANK * s[0]).sum()), float(s[0])
-    rest = u[:, :rank].T @ A  # as many rows as are independent
+    rest = u[:, :rank].T @ A  # independent rows
     basis = _range(rest[:, free], size)
     released: list[int] = []
     for candidates in (plain, given):
@@ -140,7 +140,7 @@ def dependent(
 
 
 def _range(A: Array, size: float) -> Array:
-    """An orthonormal basis of the columns of A."""
+    """Return an orthonormal basis of the columns of A."""
     if not A.size:
         return np.zeros((A.shape[0], 0))
     u, s, _ = np.linalg.svd(A, full_matrices=False)
@@ -148,22 +148,22 @@ def _range(A: Array, size: float) -> Array:
 
 
 CLOSED = 1e-7
-"""Largest residual of constraints that named coordinates count as satisfying, over the change
-by nominal coordinates; numbers that users write down have six digits or more."""
+"""Largest residual of constraints with which named coordinates count as consistent, scaled by
+nominal coordinates; user-specified numbers have six digits or more."""
 BRANCH = 0.1
-"""Largest error of named coordinates that follow from others on the way to the solution, over
-nominal ones: beyond that the loops might close in another way."""
+"""Largest error of dependent named coordinates during the solve, over nominal ones: beyond that the
+loops might close in another configuration."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Known coordinates, or rates, at a node with conditions.
+    """Prescribed coordinates, or rates, at a node with conditions.
 
     Attributes:
-        imposed: whether the constraints are rows there; not where they follow from links.
-        released: states that are named and follow from others, and the range they get instead of
-            their value.
+        imposed: whether the constraints are rows there; False if they follow from links.
+        released: prescribed states that follow from others -> the range that replaces their
+            value.
     """
 
     imposed: bool = True
@@ -173,16 +173,16 @@ class Known:
 @final
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Constraints of a span.
+    """Constraints of a phase.
 
     Attributes:
         local: its unknowns.
         loops: numbers of the constraints.
         m: number of constraints.
-        correction: rows of the gaps that hold the multipliers, for all states.
+        correction: rows of the gaps with the multipliers, for all states.
         levels: phi and its rate, scaled.
-        scale: SI values of phi, of its rate divided by the rows.
-        known: fraction of T -> what is known there of q, of v.
+        scale: SI values of phi and its rate, divided by the rows.
+        known: fraction of T -> prescribed q and v there.
     """
 
     local: Local
@@ -195,17 +195,17 @@ class Closing:
 
     @property
     def released(self) -> dict[float, dict[int, Box]]:
-        """Fraction of T -> states whose values are not conditions there -> range instead."""
+        """Fraction of T -> states whose values are not conditions there -> their range."""
         return {at: {**q.released, **v.released} for at, (q, v) in self.known.items()}
 
     def consistent(self, points: SpanPoints, nodes: Array, inner: Array) -> SpanPoints:
-        """`points` moved onto the constraints, at fractions of T of the nodes and between them.
+        """Return `points` moved onto the constraints, at fractions of T of nodes and inner points.
 
-        Coordinates with values at ends and via points lead, the others follow without a leap.
+        Coordinates with values at ends and via points lead, the others follow continuously.
         """
         span, n = self.local.span, self.loops.n
         held: dict[int, None] = {}
-        for at, (q, _) in [*self.known.items()][::-1]:  # the start is the least of the user's
+        for at, (q, _) in [*self.known.items()][::-1]:  # the start has the lowest priority
             boxes = [span.nodes[at][v.name] for v in span.model.x[:n]]
             held |= {i: None for i in range(n) if fixed(boxes[i]) and i not in q.released}
         times = np.concatenate([nodes, inner])
@@ -217,7 +217,7 @@ class Closing:
     def corrected(
         self, gap: Piece, x: tuple[Indices, Array], layout: Layout, scheme: Coefficients, data: Data
     ) -> Piece:
-        """The piece of the gaps with the corrections of all intervals, whose states end at x."""
+        """Return the piece of the gaps with corrections of all intervals, whose states end at x."""
         own = layout.spans[self.local.number]
         z = own.z[:, scheme.degree - 1 :: scheme.degree]
         parts = [*self.local.columns(layout, x, z, own.u, own.intervals), own.extra]
@@ -229,7 +229,7 @@ class Closing:
     def pieces(
         self, layout: Layout, data: Data, nodes: Mapping[float, int], everywhere: bool
     ) -> Iterator[Piece]:
-        """Constraints at the nodes, on both levels; at the first one unless `everywhere`.
+        """Yield constraints at the nodes, on both levels; or only at the first one.
 
         The steps of an integrator end on the constraints.
         """
@@ -252,16 +252,16 @@ class Closing:
 def closing(
     local: Local, before: Span | None, periodic: Sequence[str], named: Collection[str]
 ) -> Closing | None:
-    """The constraints of a span; None where there are none.
+    """Return the constraints of a phase; None if there are none.
 
     Args:
-        before: the span before it in the same scenario.
-        periodic: states that end the problem as they start it, where this is its first span.
-        named: states whose start the user names; others give way where the constraints ask for it.
+        before: the phase before it in the same scenario.
+        periodic: periodic states of the problem, if this is its first phase.
+        named: states with a start given by the user; others are released if constraints require it.
 
     Raises:
-        ValueError: named coordinates that do not satisfy the constraints, or links that ask for
-            more than they leave open.
+        ValueError: named coordinates that do not satisfy the constraints, or links that
+            prescribe more than the constraints leave free.
     """
     span, mechanics = local.span, local.span.model.holonomic
     if mechanics is None or not mechanics.phi.numel():
@@ -305,7 +305,7 @@ def _known(
     before: Span | None,
     start: tuple[Sequence[str], Collection[str]],
 ) -> tuple[Known, Known]:
-    """Known coordinates and rates at a node, and those among them that follow from the rest.
+    """Return prescribed coordinates and rates at a node, and those that follow from the others.
 
     `start` is periodic and named states of the start.
     """
@@ -329,7 +329,7 @@ def _known(
     for level in range(2):
         inside = range(level * n, (level + 1) * n)
         if all(linked.get(i, False) for i in range((level + 1) * n)):
-            found.append(Known(imposed=False))  # rates are those of the same coordinates
+            found.append(Known(imposed=False))  # rates of the same coordinates
             continue
         given = [i - level * n for i in held if i in inside]
         plain = [i - level * n for i in inside if linked.get(i) is True or i in default]
@@ -345,7 +345,7 @@ def _known(
         ranges: dict[int, Box] = {}
         for i in (i + level * n for i in released):
             ranges[i] = span.box(names[i])
-            if i in own:  # loops close in more than one way: this is the one that was named
+            if i in own:  # loops may close in several configurations: keep the named one
                 around = BRANCH * loops.nominal[i]
                 ranges[i] = meet(ranges[i], (target[i] - around, target[i] + around))
         found.append(Known(released=ranges))
@@ -359,7 +359,7 @@ def _known(
 def _linked(
     span: Span, before: Span | None, periodic: Sequence[str], names: Sequence[str]
 ) -> dict[int, bool]:
-    """Number of a state at the start -> whether it is a state at another node, or an expression."""
+    """Return index of a linked state -> True if linked to a state, False to an expression."""
     if before is None:
         return {names.index(name): True for name in periodic}
     known = {v.name: v.symbol for v in before.model.x}
@@ -373,7 +373,7 @@ def _linked(
 def _rate_error(
     span: Span, loops: Loops, rows: tuple[Array, Array], held: Sequence[int], target: Array
 ) -> float:
-    """Error of rates that no motion through known coordinates has; 0 if there is one."""
+    """Return the error of inconsistent rates at known coordinates; 0 if they are consistent."""
     (A, A_t), n = rows, loops.n
     known = [i for i in held if i >= n]
     free_q = [i for i in range(n) if i not in held]
@@ -393,6 +393,6 @@ def _inconsistent(span: Span, at: float, names: Sequence[str], off: float) -> st
     place = {0.0: "start", 1.0: "end"}.get(at, f"via {at:g}")
     return (
         f"{span.name}: {place}: expected values that satisfy the constraints of the mechanism, got "
-        f"{listed(names)}, with which they are off by {off:.2g}; name independent ones only, the "
+        f"{listed(names)}, with a residual of {off:.2g}; name only independent ones, the "
         "others follow"
     )

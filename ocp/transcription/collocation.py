@@ -1,15 +1,15 @@
-"""Equations at one collocation point, and how the points of an interval hang together.
+"""Equations at a collocation point, and the coupling of the points of an interval.
 
-Of an explicit model with states x the rows are
+For an explicit model with states x the rows are
 
     0 = h f(t, x, z, u, p) - x'(s_j),   0 = alg(t, x, z, u, p),   path conditions
 
-Of a mechanism they are implicit: its accelerations are slopes a = v'(s_j) / h of the polynomial, so
-that no mass matrix is inverted, in the equations or in their derivatives:
+For a mechanism they are implicit: its accelerations are slopes a = v'(s_j) / h of the polynomial,
+so no mass matrix is inverted, in the equations or in their derivatives:
 
     0 = h v - q'(s_j),   0 = h (M(q) a + phi_q' lam - Q),   0 = phi_q a + ...,   0 = h y' - y'(s_j)
 
-Everything is divided by nominal values; slopes of the polynomials are linear in the unknowns.
+All rows are divided by nominal values; slopes of the polynomials are linear in the unknowns.
 """
 
 from collections.abc import Sequence
@@ -31,20 +31,20 @@ from symfric.integrator.compiled.compiler import library
 from symfric.model.holonomic import Holonomic
 
 PER_INSTRUCTION = 3e-9
-"""Seconds that the virtual machine needs."""
+"""Time of the virtual machine per instruction [s]."""
 ITERATIONS = 30
-"""Of a solver, at least; it asks for every function once in each."""
+"""Least number of solver iterations, each with one call of every function."""
 FUNCTIONS = ("rows", "share", "slopes", "jacobian", "hessian")
 
 
 @final
 @dataclass(eq=False)
 class Engine:
-    """The fastest Functions of a block that are there; mutable only in what it remembers.
+    """The fastest available Functions of a block, with a cache of compiled ones.
 
     Attributes:
-        block: as it was made, of SX.
-        expected: time [s] that compiled code would have saved so far, as predicted.
+        block: the original block, of SX.
+        expected: predicted time [s] that compiled code would have saved so far.
     """
 
     block: Block
@@ -58,7 +58,7 @@ class Engine:
     @cached_property
     def _instructions(self) -> int:
         if not self.block.rows.is_a("SXFunction"):
-            return 0  # calls of other functions are not one C file
+            return 0  # calls of other functions do not fit in one C file
         return sum(function.n_instructions() for function in self._functions.values())
 
     @cached_property
@@ -80,33 +80,33 @@ class Engine:
         return code.dump()
 
     def at(self, places: int) -> Block:
-        """The block, to be evaluated at so many places in every iteration of a solver."""
+        """Return the block, compiled if worthwhile, for a number of places per solver iteration."""
         if "_compiled" in self.__dict__:
             return self._compiled
         self.expected += ITERATIONS * places * self._instructions * PER_INSTRUCTION
         if self._prospect.pays(self.expected):
             try:
                 return self._compiled
-            except CompileError:  # a broken compiler is no reason not to solve
+            except CompileError:  # solve without a compiler if it is broken
                 self._prospect.hopeless = True
         return self.block
 
 
 LEAST, MOST = 1e-6, 1e6
-"""Range of the scales of rows without nominal value, which are their derivatives."""
+"""Limits of scales of rows without nominal value, which follow from their derivatives."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PointEquations:
-    """The equations of one collocation point of a span.
+    """The equations of one collocation point of a phase.
 
     Attributes:
-        local: its unknowns; behind them v knows the slopes of the velocities of a mechanism.
+        local: its unknowns, followed in v by the slopes of the velocities of a mechanism.
         engine: rows and share of the cost.
         rows: names, sizes and ranges; path conditions are the last ones.
-        sloped: for each state the row from which its slope is subtracted; -1 where the slope is a
-            local unknown instead.
+        sloped: for each state the row from which its slope is subtracted; -1 if the slope is a
+            local unknown.
     """
 
     local: Local
@@ -116,12 +116,12 @@ class PointEquations:
 
     @property
     def block(self) -> Block:
-        """Rows and share of the cost, as they were made."""
+        """Rows and share of the cost, uncompiled."""
         return self.engine.block
 
 
 def point_equations(local: Local) -> PointEquations:
-    """Write the equations of a collocation point of a span."""
+    """Formulate the equations of a collocation point of a phase."""
     span, h = local.span, local.h
     model = span.model
     values, x_nominal = local.values, model.nominal("x")
@@ -170,7 +170,7 @@ def _evaluated(
     values: Sequence[ca.SX],
     accelerations: tuple[ca.SX, ca.SX] | None = None,
 ) -> list[ca.SX]:
-    """Expressions in the symbols of the model at other values."""
+    """Evaluate expressions in the symbols of the model at other values."""
     symbols, values = list(span.symbols), list(values)
     if accelerations is not None:
         symbols.append(accelerations[0])
@@ -180,14 +180,14 @@ def _evaluated(
 
 
 def _masses(span: Span, mechanics: Holonomic) -> Array:
-    """Diagonal of the mass matrix at the start of the model, shape (n,)."""
+    """Return the diagonal of the mass matrix at the start of the model, shape (n,)."""
     n = mechanics.n
     M = ca.jacobian(mechanics.implicit[:n, :], mechanics.a)
     return _positive(_at_start(span, ca.diag(M)))
 
 
 def _row_sizes(span: Span, mechanics: Holonomic | None) -> Array:
-    """Largest change of each algebraic row by a nominal change of an unknown, at the start."""
+    """Return the largest change of each algebraic row for a nominal change of an unknown."""
     model = span.model
     if not model.z:
         return np.zeros(0)
@@ -203,7 +203,7 @@ def _row_sizes(span: Span, mechanics: Holonomic | None) -> Array:
 
 
 def _at_start(span: Span, expression: ca.SX) -> Array:
-    """Numbers of an expression where the model starts, its accelerations zero."""
+    """Evaluate an expression at the start of the model, with zero accelerations."""
     model, mechanics = span.model, span.model.holonomic
     symbols = [*span.symbols, *([] if mechanics is None else [mechanics.a])]
     z, u = (np.array([float(v.start) for v in group]) for group in (model.z, model.u))
@@ -214,7 +214,7 @@ def _at_start(span: Span, expression: ca.SX) -> Array:
 
 
 def _positive(values: Array) -> Array:
-    """Sizes that are safe to divide by."""
+    """Return sizes that are safe to divide by."""
     sizes = np.abs(values)
     return np.clip(np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0), LEAST, MOST)
 
@@ -222,7 +222,7 @@ def _positive(values: Array) -> Array:
 def pieces_of_points(
     number: int, equations: PointEquations, layout: Layout, scheme: Coefficients, data: Data
 ) -> Piece:
-    """The equations at all collocation points of a span."""
+    """Return the equations at all collocation points of a phase."""
     local, span = equations.local, layout.spans[number]
     d, N = scheme.degree, span.intervals
     interval, j = np.repeat(np.arange(N), d), np.tile(np.arange(d), N)
@@ -245,7 +245,7 @@ def pieces_of_points(
 
 
 def _carrying(layout: Layout, number: int, interval: Indices) -> Indices:
-    """Columns of the states that carry the polynomial of each `interval`, (nx, d + 1, places)."""
+    """Return the columns of the states that define the polynomial of each `interval`."""
     span = layout.spans[number]
     d = span.degree
     inner = span.inner.reshape(span.inner.shape[0], span.intervals, d)[:, interval]
@@ -253,7 +253,7 @@ def _carrying(layout: Layout, number: int, interval: Indices) -> Indices:
 
 
 def gaps(number: int, span: Span, layout: Layout, scheme: Coefficients) -> Piece:
-    """The polynomial of each interval ends at the next node: x_(k+1) = sum_r ends[r] x_r."""
+    """Return the rows of continuity at the next node: x_(k+1) = sum_r ends[r] x_r."""
     own = layout.spans[number]
     interval = np.arange(own.intervals)
     names = [v.name for v in span.model.x]
@@ -275,8 +275,8 @@ def gaps(number: int, span: Span, layout: Layout, scheme: Coefficients) -> Piece
 
 
 def ends_of(number: int, layout: Layout, scheme: Coefficients) -> tuple[Indices, Array]:
-    """Columns and weights (nx, terms, N) of the states at the ends of all intervals of a span."""
+    """Return columns and weights (nx, terms, N) of the states at the ends of all intervals."""
     carrying = _carrying(layout, number, np.arange(layout.spans[number].intervals))
-    ends = np.flatnonzero(scheme.ends)  # the others are exactly zero
+    ends = np.flatnonzero(scheme.ends)  # the others are zero
     columns = carrying[:, ends]
     return columns, np.broadcast_to(scheme.ends[ends, None], columns.shape)

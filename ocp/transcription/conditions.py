@@ -1,4 +1,4 @@
-"""Conditions at single nodes and between spans: ends, via points, links, joins, end costs."""
+"""Conditions at single nodes and between phases: ends, via points, links, joins, end costs."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,14 +30,14 @@ from symfric.foundation.variable import stacked
 @final
 @dataclass(frozen=True, eq=False)
 class AtNode:
-    """Rows, or a share of the cost, at one node of a span.
+    """Rows, or a share of the cost, at one node of a phase.
 
     Attributes:
         local: their unknowns.
-        fraction: which node, as a fraction of T.
+        fraction: of the node, as a fraction of T.
         rows: the conditions; none for a cost.
         block: rows and share.
-        inside: whether they know inputs or algebraic variables, which belong to an interval.
+        inside: whether they contain inputs or algebraic variables, which belong to an interval.
     """
 
     local: Local
@@ -47,7 +47,7 @@ class AtNode:
     inside: bool
 
     def piece(self, layout: Layout, scheme: Coefficients, data: Data, node: int) -> Piece:
-        """The piece of it at node number `node` of the mesh."""
+        """Return the piece at node number `node` of the mesh."""
         interval, offset, parts = columns_at(self.local, layout, scheme, node, self.inside)
         stage, inside = (interval, LAST - 1) if self.inside else (node, 1)
         order = order_of(self.local.number, np.array([stage]), inside)
@@ -58,10 +58,10 @@ class AtNode:
 def columns_at(
     local: Local, layout: Layout, scheme: Coefficients, node: int, inside: bool
 ) -> tuple[int, float, list[Columns]]:
-    """Interval, place in it, and columns of the local unknowns at a node of the mesh.
+    """Return interval, place in it, and columns of the local unknowns at a node of the mesh.
 
-    Algebraic variables and inputs are those of the interval before; at node 0 those of the first
-    collocation point. With `inside` states are those of that interval, not the copy at the node.
+    Algebraic variables and inputs belong to the interval before; at node 0 to the first
+    collocation point. With `inside` states belong to that interval, not to the copy at the node.
     """
     span, d = layout.spans[local.number], scheme.degree
     interval, offset = (0, 0.0) if node == 0 else (node - 1, 1.0)
@@ -76,14 +76,14 @@ def columns_at(
 
 
 def _sum(columns: Indices, weights: Array) -> Columns:
-    """Sums of `columns` (k, terms) with the same weights, at one place."""
+    """Return sums of `columns` (k, terms) with the same weights, at one place."""
     kept = np.flatnonzero(weights)
     factors = np.broadcast_to(weights[kept], (columns.shape[0], kept.size))
     return columns[:, kept, None], factors[:, :, None]
 
 
 def at_nodes(local: Local) -> list[AtNode]:
-    """Conditions at the ends and at via points of a span, and its cost at the end."""
+    """Return conditions at the ends and at via points of a phase, and its cost at the end."""
     span = local.span
     found: list[AtNode] = []
     for fraction, rows in span.rows_at.items():
@@ -102,10 +102,10 @@ def at_nodes(local: Local) -> list[AtNode]:
 @final
 @dataclass(frozen=True, eq=False)
 class AtStarts:
-    """Rows at the starts of the intervals of a span, with the inputs that begin there.
+    """Rows at the starts of the intervals of a phase, with the inputs that begin there.
 
-    Inputs are held: what depends on them jumps there, before the first collocation point. That of
-    the first interval is left to the conditions at the start of the span.
+    Inputs are held: expressions with them jump there, before the first collocation point. The first
+    interval is covered by the conditions at the start of the phase.
 
     Attributes:
         local: their unknowns.
@@ -118,7 +118,7 @@ class AtStarts:
     block: Block
 
     def piece(self, layout: Layout, scheme: Coefficients, data: Data) -> Piece:
-        """The piece of it; algebraic variables are those of the first collocation points."""
+        """Return the piece; algebraic variables are those of the first collocation points."""
         number = self.local.number
         span, at = layout.spans[number], np.arange(1, layout.spans[number].intervals)
         z = span.z[:, at * scheme.degree]
@@ -128,13 +128,13 @@ class AtStarts:
 
 
 def at_starts(local: Local, rows: Sequence[Row]) -> AtStarts:
-    """Conditions at the starts of all intervals of a span but the first one."""
+    """Return conditions at the starts of all intervals of a phase but the first one."""
     expressions = stacked(row.expression / row.nominal for row in rows)
     return AtStarts(local, Rows.of(rows), _node_block(local, expressions))
 
 
 def _knows_inside(span: Span, expression: ca.SX) -> bool:
-    """True if an expression holds algebraic variables or inputs."""
+    """Return True if an expression contains algebraic variables or inputs."""
     inside = ca.vertcat(span.model.vector("z"), span.model.vector("u"))
     return bool(inside.numel()) and bool(ca.depends_on(expression, inside))
 
@@ -148,13 +148,13 @@ def _node_block(local: Local, rows: ca.SX, share: ca.SX | None = None) -> Block:
 @final
 @dataclass(frozen=True, eq=False)
 class Between:
-    """Rows between the end of one span and the start of the next one.
+    """Rows between the end of one phase and the start of the next one.
 
     Attributes:
         before, after: unknowns of both.
         block: its rows, in the local unknowns of both.
         rows: names, sizes and ranges.
-        link: whether the rows say where states start; joins do not.
+        link: whether the rows determine the start of states; False for joins.
     """
 
     before: Local
@@ -164,7 +164,7 @@ class Between:
     link: bool
 
     def piece(self, layout: Layout, scheme: Coefficients, data: Sequence[Data]) -> Piece:
-        """The piece of it."""
+        """Return the piece."""
         a, b = self.before.number, self.after.number
         N = layout.spans[a].intervals
         zero, one, last = np.zeros(1, np.int64), np.ones(1), np.array([N - 1])
@@ -184,7 +184,7 @@ class Between:
 
 
 def between(before: Local, after: Local) -> list[Between]:
-    """Links that are expressions, and joins, of a span to the one before."""
+    """Return links that are expressions, and joins, of a phase to the one before."""
     span = after.span
     v, theta = ca.vertcat(before.v, after.v), ca.vertcat(before.theta, after.theta)
     found: list[Between] = []
@@ -207,17 +207,17 @@ def between(before: Local, after: Local) -> list[Between]:
 
 
 def _same_state(before: Span, expression: ca.SX) -> int:
-    """Number of the state that the expression is; -1 where it is none."""
+    """Return the index of the state equal to the expression, or -1."""
     return next((i for i, v in enumerate(before.model.x) if ca.is_equal(expression, v.symbol)), -1)
 
 
 def plain_links(
     number: int, before: Span, span: Span, layout: Layout, released: Collection[int]
 ) -> list[Piece]:
-    """Continuity of states from span `number - 1`, `before`, to span `number`.
+    """Return the continuity of states from phase `number - 1`, `before`, to phase `number`.
 
     Args:
-        released: states of `span` whose start follows from that of others.
+        released: states of `span` whose start follows from other states.
     """
     a, b = layout.spans[number - 1], layout.spans[number]
     states = [v.name for v in span.model.x]
@@ -238,10 +238,10 @@ def plain_links(
 def whole(
     problem: Problem, layout: Layout, released: Sequence[Mapping[float, Collection[int]]]
 ) -> list[Piece]:
-    """Periodicity, shared starts and sums of durations.
+    """Return periodicity, shared starts and sums of durations.
 
     Args:
-        released: of each span, states at fractions of T whose values follow from others.
+        released: for each phase, states at fractions of T whose values follow from others.
     """
     spans, phases = problem.spans, len(problem.chain)
     end = order_of(len(spans), 0, 0)
@@ -275,7 +275,7 @@ def _equal_states(
     names: Sequence[str],
     order: Indices,
 ) -> list[Piece]:
-    """States `names` at (span, node) a equal those at b."""
+    """Return rows for equal states `names` at (phase, node) a and b."""
     if not names:
         return []
     columns: list[Indices] = []
@@ -292,7 +292,7 @@ def _equal_states(
 
 
 def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece]:
-    """Rows whose linear part bounds the cost of each scenario: cost - largest <= 0."""
+    """Return rows whose linear part bounds the cost of each scenario: cost - largest <= 0."""
     column = np.array([[layout.largest]])
     rows = Rows((name,), np.ones(1), np.array([-inf]), np.zeros(1))
     return [

@@ -1,4 +1,4 @@
-"""The nonlinear program that a solver gets, and what it gives back."""
+"""The nonlinear program for a solver, and the result of the solver."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,8 +23,8 @@ class Place:
 
     Attributes:
         name: "the equation of v", "force".
-        span: number of the span.
-        fraction: where in the span, between 0 and 1; nan for what belongs to all of it.
+        span: index of the phase.
+        fraction: position in the phase, between 0 and 1; nan for the whole phase.
         scale: SI value divided by the value in the program.
     """
 
@@ -36,12 +36,12 @@ class Place:
 
 @final
 class Places(Sequence[Place]):
-    """Places of all rows or unknowns, made on demand."""
+    """Places of all rows or unknowns, computed on demand."""
 
     def __init__(
         self, count: int, make: Callable[[], tuple[Sequence[str], Indices, Indices, Array, Array]]
     ) -> None:
-        """`make` returns names, and of each place number of the name, span, fraction, scale."""
+        """Store `make`, which returns names, and index, phase, fraction, scale of each place."""
         self._count, self._make = count, make
 
     @cached_property
@@ -64,12 +64,12 @@ class Places(Sequence[Place]):
 @final
 @dataclass(frozen=True, eq=False)
 class Stages:
-    """Stages of the program, as structured solvers take them: x_k with u_k, rows of its gap first.
+    """Stages of the program for structured solvers: x_k with u_k, rows of its gap first.
 
     Attributes:
-        nx, nu: states and further unknowns of each stage, in the order of w; the last nu is 0.
-        ng: rows of each stage besides its gap x_(k+1) = F(x_k, u_k), in the order of g.
-        equality: which rows of g are equations, shape (m,).
+        nx, nu: states and other unknowns of each stage, in the order of w; the last nu is 0.
+        ng: rows of each stage except its gap x_(k+1) = F(x_k, u_k), in the order of g.
+        equality: mask of the rows of g that are equations, shape (m,).
     """
 
     nx: tuple[int, ...]
@@ -79,14 +79,14 @@ class Stages:
 
 
 def no_structure() -> tuple[Stages | None, str]:
-    """Structure of a program that was not analysed."""
+    """Return the structure of a program that was not analysed."""
     return None, "no known structure"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A nonlinear program with exact sparse derivatives; everything scaled.
+    """A nonlinear program with exact sparse derivatives; all values are scaled.
 
         min f(w, p)   subject to   lower_w <= w <= upper_w,   lower_g <= g(w, p) <= upper_g
 
@@ -96,10 +96,10 @@ class Program:
         gradient: (x, p) -> (f, grad_f_x).
         jacobian: (x, p) -> (g, jac_g_x).
         hessian: (x, p, lam_f, lam_g) -> triu_hess_gamma_x_x.
-        values: numbers of p.
-        rows, unknowns: what each row and each unknown is about.
+        values: values of p.
+        rows, unknowns: name and place of each row and unknown.
         scale: SI values of the unknowns divided by w.
-        structure: finds the stages, on demand.
+        structure: function that returns the stages.
     """
 
     w: ca.MX
@@ -121,22 +121,22 @@ class Program:
 
     @property
     def stages(self) -> Stages | None:
-        """Structure for solvers that use it; None where there is none, see `unstaged`."""
+        """Structure for solvers that use it; None if there is none, see `unstaged`."""
         return self.structure()[0]
 
     @property
     def unstaged(self) -> str:
-        """Why there are no stages."""
+        """Reason why there are no stages."""
         return self.structure()[1]
 
     @property
     def nlp(self) -> dict[str, ca.MX]:
-        """The program as `casadi.nlpsol` takes it."""
+        """Arguments of the program for `casadi.nlpsol`."""
         return {"x": self.w, "p": self.p, "f": self.f, "g": self.g}
 
     @property
     def derivatives(self) -> dict[str, ca.Function]:
-        """Options of `casadi.nlpsol` that hand the derivatives over."""
+        """Options of `casadi.nlpsol` with the derivatives."""
         return {"grad_f": self.gradient, "jac_g": self.jacobian, "hess_lag": self.hessian}
 
 
@@ -147,10 +147,10 @@ def stages_of(
     made: Assembled,
     equality: Array,
 ) -> tuple[Stages | None, str]:
-    """The stages, or None and what couples more than neighbours.
+    """Return the stages, or None and the coupling that prevents them.
 
     Args:
-        equality: which rows are equations, shape (m,).
+        equality: mask of the rows that are equations, shape (m,).
     """
     common = _common(problem, layout)
     if common:
@@ -160,7 +160,7 @@ def stages_of(
     K = nx.size - 1
     gaps = np.bincount(owner[gap], minlength=K + 1)
     if (gaps[:-1] != nx[1:]).any() or gaps[-1]:
-        return None, "states that start anew behind a phase"
+        return None, "states that restart after a phase"
     rows, columns = (
         np.array(part, np.int64) for part in made.jacobian.sparsity_out(1).get_triplet()
     )
@@ -182,7 +182,7 @@ def stages_of(
 
 
 def _common(problem: Problem, layout: Layout) -> str:
-    """Name of an unknown that all of the motion has in common, if there is one."""
+    """Return the name of an unknown common to the whole motion, if there is one."""
     if len(problem.scenarios) > 1:
         return "several scenarios"
     if problem.chosen:
@@ -193,7 +193,7 @@ def _common(problem: Problem, layout: Layout) -> str:
 
 
 def _columns(layout: Layout) -> tuple[Indices, Indices, Indices]:
-    """First column and number of states of each stage, and the stage of each column."""
+    """Return first column and number of states of each stage, and the stage of each column."""
     first = np.concatenate([span.nodes[0] for span in layout.spans])
     nx = np.concatenate([np.full(s.nodes.shape[1], s.nodes.shape[0]) for s in layout.spans])
     stage_of = np.searchsorted(first, np.arange(layout.size), side="right") - 1
@@ -203,26 +203,26 @@ def _columns(layout: Layout) -> tuple[Indices, Indices, Indices]:
 def _rows(
     layout: Layout, pieces: tuple[Piece, ...], made: Assembled
 ) -> tuple[Indices, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
-    """Stage of each row, and whether it closes the gap to the next one."""
+    """Return the stage of each row, and whether it closes the gap to the next one."""
     begins = np.cumsum([0, *(span.intervals + 1 for span in layout.spans)])
     m = made.g.numel()
     owner, gap = np.zeros(m, np.int64), np.zeros(m, dtype=bool)
     for piece, at in zip(pieces, made.at, strict=True):
         span, interval = piece.order >> 40, (piece.order >> 6) & ((1 << 34) - 1)
         stage = begins[np.minimum(span, len(layout.spans))] + interval
-        known = stage < begins[-1]  # what holds between all spans stands behind them
+        known = stage < begins[-1]  # rows between all phases come after them
         owner[at] = np.where(known, stage, begins[-1] - 1)
         gap[at] = known & ((piece.order & 63) == 0)
     return owner, gap
 
 
 def _named(pieces: tuple[Piece, ...], made: Assembled, row: int) -> str:
-    """Name of a row."""
+    """Return the name of a row."""
     for piece, at in zip(pieces, made.at, strict=True):
         for name, numbers in zip(piece.names, at, strict=True):
             if row in numbers:
-                return f"{name}, which knows more than its interval"
-    return "a row that knows more than its interval"
+                return f"{name}, which depends on more than its interval"
+    return "a row that depends on more than its interval"
 
 
 Array = NDArray[np.float64]
@@ -231,13 +231,13 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class Progress:
-    """The optimisation after an iteration.
+    """State of the optimisation after an iteration.
 
     Attributes:
-        iteration: how many so far in this solve.
+        iteration: number of iterations in this solve.
         cost: J at this iterate.
         violation: largest violation of an equation, a constraint or a bound, scaled.
-        stage: which of several solves this is, such as "widths 0.1"; empty for a single one.
+        stage: name of one of several solves, such as "widths 0.1"; empty for a single one.
     """
 
     iteration: int
@@ -250,7 +250,7 @@ Report = Callable[[Progress], object]
 
 
 def in_stage(progress: Report | None, stage: str) -> Report | None:
-    """`progress` with the name of one of several solves."""
+    """Return `progress` with the name of one of several solves."""
     if progress is None:
         return None
     return lambda now: progress(replace(now, stage=stage))
@@ -259,7 +259,7 @@ def in_stage(progress: Report | None, stage: str) -> Report | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Unknowns and multipliers, scaled: all it takes to start again from here."""
+    """Unknowns and multipliers, scaled: the data for a restart."""
 
     w: Array
     lam_w: Array
@@ -267,7 +267,7 @@ class Iterate:
 
     @staticmethod
     def cold(w: Array, rows: int) -> "Iterate":
-        """`w` with zero multipliers for it and for so many rows."""
+        """Return `w` with zero multipliers for it and for a number of rows."""
         return Iterate(w, np.zeros(w.size), np.zeros(rows))
 
 
@@ -280,8 +280,8 @@ class SolverStatistics:
         unknowns, constraints: size of the nonlinear program, the last one of several.
         jacobian_nonzeros, hessian_nonzeros: of the constraints; of the Lagrangian (one triangle).
         iterations: of the solver, all solves together.
-        solves: their number.
-        build_time, solve_time: wall time [s] for making the program and its derivatives, and for
+        solves: number of solves.
+        build_time, solve_time: wall time [s] for building the program and its derivatives, and for
             solving it.
         verify_time: wall time [s] of the re-simulation.
     """
@@ -297,7 +297,7 @@ class SolverStatistics:
     solves: int = 1
 
     def then(self, later: "SolverStatistics") -> "SolverStatistics":
-        """Both in a row: the sizes of the later one, counts and times of both."""
+        """Return the total: the sizes of the later one, counts and times of both."""
         return replace(
             later,
             iterations=self.iterations + later.iterations,
@@ -311,17 +311,17 @@ class SolverStatistics:
 @final
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of a solver; a failed solve is an outcome, too.
+    """Result of a solver, also of a failed solve.
 
     Attributes:
-        iterate: the solution, or the best point seen: among feasible ones that of least cost, else
-            that of least violation.
+        iterate: the solution, or the best iterate: among feasible ones the one of least cost, else
+            of least violation.
         cost: J there.
-        violations: of each row of g there, scaled.
-        bound_violations: of each unknown, likewise.
-        status: how it ended; `sentence` says it with the worst row and what to try; `answer` is the
-            solver's own word for it.
-        cycles: whether the last iterations went round without getting anywhere.
+        violations: of each row of g, scaled.
+        bound_violations: of each unknown, scaled.
+        status: of the end; `sentence` describes it with the worst row and a remedy; `answer` is the
+            solver's return code.
+        cycles: whether the last iterations were cyclic.
         statistics: size, iterations, times.
         cause: the exception in `progress` that stopped it, if any.
     """
@@ -339,18 +339,18 @@ class Outcome:
 
     @property
     def violation(self) -> float:
-        """The largest of all violations, scaled."""
+        """Largest of all violations, scaled."""
         worst = max(self.violations.max(initial=0.0), self.bound_violations.max(initial=0.0))
         return float(worst)
 
 
 def outside(values: Array, lower: Array, upper: Array) -> Array:
-    """Distance of each value from its bounds; infinity for one that is not finite."""
+    """Return the distance of each value from its bounds; infinity for a non-finite one."""
     far = np.maximum(0.0, np.maximum(lower - values, values - upper))
     return np.where(np.isfinite(values), far, np.inf)
 
 
 def worst_of(program: Program, w: Array, g: Array) -> float:
-    """Largest violation of a row or of a bound of an unknown."""
+    """Return the largest violation of a row or of a bound of an unknown."""
     rows = outside(g, program.lower_g, program.upper_g).max(initial=0.0)
     return float(max(rows, outside(w, program.lower_w, program.upper_w).max(initial=0.0)))

@@ -1,6 +1,6 @@
 """Discretisation of a motion: schemes, meshes, and bounds of the unknowns on them.
 
-Collocation after Radau or Gauss-Legendre, or shooting.
+Radau and Gauss-Legendre collocation, and shooting.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,7 +38,7 @@ class Coefficients:
         slopes: l_r'(s_j), shape (d + 1, d).
         weights: shape (d,).
         ends: l_r(1), shape (d + 1,).
-        inner_ends: values at 1 of the polynomials through s_1 ... s_d, which carry the algebraic
+        inner_ends: values at 1 of the polynomials through s_1 ... s_d, which define the algebraic
             variables, shape (d,).
     """
 
@@ -77,7 +77,7 @@ class _Collocation:
         return 2 * self.degree + self.gain
 
     def coefficients(self) -> Coefficients:
-        """Coefficients of the method on an interval."""
+        """Return the coefficients of the method on an interval."""
         return _collocation(self.kind, self.degree)
 
 
@@ -86,7 +86,7 @@ class _Collocation:
 class Radau(_Collocation):
     """Radau IIA collocation with `degree` points: L-stable, order 2 d - 1 at the nodes.
 
-    Limits: the order holds where the solution is smooth.
+    Limits: the order requires a smooth solution.
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5.
 
     Raises:
@@ -102,8 +102,8 @@ class Radau(_Collocation):
 class Legendre(_Collocation):
     """Gauss-Legendre collocation with `degree` points: order 2 d at the nodes, conserves energy.
 
-    Limits: A-stable, not L-stable: what is stiff rings from interval to interval. The end of an
-    interval is no collocation point: algebraic variables there are extrapolated.
+    Limits: A-stable, not L-stable: stiff components oscillate from interval to interval. The end of
+    an interval is not a collocation point: algebraic variables there are extrapolated.
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5.
 
     Raises:
@@ -121,9 +121,9 @@ class Shooting:
 
     "exponential" passes through stiff bristles, where collocation points do not converge.
 
-    Limits: bounds and path conditions hold at the nodes of the mesh only, and they cannot name
-    algebraic variables: these are inside of the steps. Second derivatives of steps that solve
-    equations are dear: of an arm with six joints fifty times those of collocation.
+    Limits: bounds and path conditions hold only at the nodes of the mesh, and cannot include
+    algebraic variables, which are internal to the steps. Second derivatives of steps that solve
+    equations are expensive: for an arm with six joints fifty times those of collocation.
 
     Raises:
         ValueError: unknown method, fewer than one step.
@@ -139,7 +139,7 @@ class Shooting:
         object.__setattr__(self, "steps", checks.count("Shooting: steps", self.steps))
 
     def coefficients(self) -> Coefficients:
-        """No point inside of an interval, whose end is none of a polynomial."""
+        """Return coefficients without inner points and without a polynomial."""
         none = np.zeros(0)
         return Coefficients(np.zeros(1), np.zeros((1, 0)), none, np.zeros(1), none)
 
@@ -157,7 +157,7 @@ def _collocation(kind: str, degree: int) -> Coefficients:
 
 
 def _slopes(nodes: Array) -> Array:
-    """l_r'(s_j) at row r, column j, by the barycentric formula.
+    """Return l_r'(s_j) at row r, column j, by the barycentric formula.
 
     Source: Berrut and Trefethen, SIAM Review 46(3), 2004, 501-517.
     """
@@ -166,12 +166,12 @@ def _slopes(nodes: Array) -> Array:
     products = gaps.prod(axis=1)
     slopes = products[None, :] / products[:, None] / gaps.T
     np.fill_diagonal(slopes, 0.0)
-    np.fill_diagonal(slopes, -slopes.sum(axis=0))  # a constant has no slope
+    np.fill_diagonal(slopes, -slopes.sum(axis=0))  # the slope of a constant is zero
     return slopes
 
 
 def _at_end(nodes: Array) -> Array:
-    """l_r(1); exactly a unit vector where 1 is a node."""
+    """Return l_r(1); exactly a unit vector if 1 is a node."""
     gaps = nodes[:, None] - nodes[None, :]
     np.fill_diagonal(gaps, 1.0)
     factors = np.tile(1.0 - nodes, (nodes.size, 1))
@@ -181,20 +181,20 @@ def _at_end(nodes: Array) -> Array:
 
 SAME_NODE = 1e-9
 MOST_INTERVALS = 10**6
-"""Programs with more intervals exceed any memory."""
+"""Largest number of intervals; larger programs exceed any memory."""
 
 WHAT = "their number or increasing fractions of T from 0 to 1"
 
 
 def make_mesh(span: Span, intervals: int | ArrayLike) -> Array:
-    """Fractions of T that bound the intervals of a span.
+    """Return fractions of T that bound the intervals of a phase.
 
     Args:
-        span: its `via` fractions become nodes, where they are not already.
+        span: its `via` fractions become nodes.
         intervals: number of equal intervals, or the fractions 0 = s_0 < s_1 < ... < s_N = 1.
 
     Raises:
-        ValueError: neither.
+        ValueError: an invalid value.
     """
     if checks.as_number(intervals) is not None:
         count = checks.count("intervals", intervals, most=MOST_INTERVALS)
@@ -208,27 +208,27 @@ def make_mesh(span: Span, intervals: int | ArrayLike) -> Array:
 
 
 def _bounds_intervals(mesh: Array) -> bool:
-    """Increasing fractions from 0 to 1, at least two."""
+    """Return True for at least two increasing fractions from 0 to 1."""
     return mesh.size > 1 and mesh[0] == 0.0 and mesh[-1] == 1.0 and bool((np.diff(mesh) > 0).all())
 
 
 def make_meshes(problem: Problem, intervals: int | ArrayLike | Sequence[ArrayLike]) -> list[Array]:
-    """A mesh for each span.
+    """Return a mesh for each phase of each scenario.
 
     Args:
-        problem: what is to be put on them.
-        intervals: the number for each span, fractions for each span, or a list with one of
+        problem: the problem.
+        intervals: the number for each phase, fractions for each phase, or a list with one of
             these for each phase.
 
     Raises:
-        ValueError: none of these.
+        ValueError: an invalid value.
     """
     phases = len(problem.chain)
     single = checks.as_number(intervals) is not None or np.ndim(_first(intervals)) == 0
     if single and not (isinstance(intervals, list | tuple) and _counts(intervals, phases)):
         given: list[ArrayLike] = [intervals] * phases  # pyright: ignore[reportAssignmentType]
     else:
-        given = list(checks.many("intervals", intervals, "meshes, one a phase"))
+        given = list(checks.many("intervals", intervals, "meshes, one for each phase"))
     if len(given) != phases:
         raise ValueError(
             f"intervals: expected one mesh for each of {phases} phases, got {len(given)}"
@@ -241,24 +241,24 @@ def _first(intervals: object) -> Any:
 
 
 def _counts(intervals: Sequence[object], phases: int) -> bool:
-    """True if these are numbers of intervals, one a phase, and no fractions."""
+    """Return True for numbers of intervals, one for each phase, instead of fractions."""
     return len(intervals) == phases and all(
         (number := checks.as_number(value)) is not None and number >= 1 for value in intervals
     )
 
 
 def nodes_of(span: Span, mesh: Array) -> dict[float, int]:
-    """Number of the node at each fraction that the span has conditions at.
+    """Return the index of the node at each fraction with conditions of the phase.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is no such node.
     """
     found: dict[float, int] = {}
     for fraction in span.nodes:
         node = int(np.argmin(np.abs(mesh - fraction)))
         if abs(mesh[node] - fraction) > SAME_NODE:
             raise ValueError(
-                f"mesh of {span.name}: expected a node at {fraction:g}, where the span has "
+                f"mesh of {span.name}: expected a node at {fraction:g}, where the phase has "
                 f"conditions, got one at {mesh[node]:g}; use make_mesh"
             )
         found[fraction] = node
@@ -266,11 +266,11 @@ def nodes_of(span: Span, mesh: Array) -> dict[float, int]:
 
 
 def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]:
-    """A mesh for each span; with one a phase, it serves all scenarios.
+    """Return a mesh for each phase of each scenario; one for each phase serves all scenarios.
 
     Raises:
-        ValueError: another number of them, no increasing fractions from 0 to 1, or different ones
-            for spans that share inputs.
+        ValueError: a wrong number of meshes, no increasing fractions from 0 to 1, or different
+            ones for phases that share inputs.
     """
     spans, phases = problem.spans, len(problem.chain)
     given = [np.asarray(mesh, dtype=float).ravel() for mesh in meshes]
@@ -278,7 +278,7 @@ def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]
         given = given * (len(spans) // phases)
     if len(given) != len(spans):
         raise ValueError(
-            f"meshes: expected one for each of {len(spans)} spans or {phases} phases, got "
+            f"meshes: expected {phases}, one for each phase, or {len(spans)} with scenarios, got "
             f"{len(given)}"
         )
     for span, mesh in zip(spans, given, strict=True):
@@ -297,7 +297,7 @@ def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]
 
 
 def split(mesh: Array, parts: Sequence[int]) -> Array:
-    """Cut interval k into `parts[k]` equal ones.
+    """Divide interval k into `parts[k]` equal ones.
 
     Raises:
         ValueError: not a number >= 1 for each interval.
@@ -315,7 +315,7 @@ def split(mesh: Array, parts: Sequence[int]) -> Array:
 
 
 def join(mesh: Array, away: Sequence[int], keep: Iterable[float] = ()) -> Array:
-    """Take inner nodes away by their numbers, except those at fractions to `keep`."""
+    """Remove inner nodes by their indices, except those at fractions to `keep`."""
     kept = np.ones(mesh.size, dtype=bool)
     kept[list(away)] = False
     kept[[0, -1]] = True
@@ -325,7 +325,7 @@ def join(mesh: Array, away: Sequence[int], keep: Iterable[float] = ()) -> Array:
 
 
 def scale_of(problem: Problem, layout: Layout) -> Array:
-    """SI values of the unknowns divided by w, shape (n,)."""
+    """Return SI values of the unknowns divided by w, shape (n,)."""
     scale = np.ones(layout.size)
     for span, own in zip(problem.spans, layout.spans, strict=True):
         model = span.model
@@ -344,15 +344,15 @@ def bounds_of(
     nodes: Sequence[Mapping[float, int]],
     released: Sequence[Mapping[float, Mapping[int, Box]]],
 ) -> tuple[Array, Array]:
-    """Lower and upper bounds of w, scaled.
+    """Return lower and upper bounds of w, scaled.
 
     Args:
-        nodes: of each span, number of the node at each fraction with conditions.
-        released: of each span, states at these fractions that follow from others, and ranges of
-            them.
+        nodes: for each phase, index of the node at each fraction with conditions.
+        released: for each phase, states at these fractions that follow from others, and their
+            ranges.
 
-    Where the last collocation point is the end of its interval, the copy at the node alone is
-    bounded: bounds on both would depend on each other.
+    If the last collocation point is the end of its interval, only the copy at the node is bounded:
+    bounds on both would be dependent.
     """
     lower, upper = np.full(layout.size, -np.inf), np.full(layout.size, np.inf)
     every = zip(problem.spans, layout.spans, nodes, released, strict=True)

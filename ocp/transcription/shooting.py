@@ -1,9 +1,9 @@
-"""Multiple shooting: an interval is a few steps of an integrator.
+"""Multiple shooting: each interval consists of a few steps of an integrator.
 
     x_(k+1) = F(x_k, u_k, p, t_k, h),   share of the cost = c(h),   c' = L(t, x, z, u, p),  c(0) = 0
 
-F is `symfric.flow` of the model with its cost as one more state, so that derivatives are exact for
-the discrete map. Bounds and path conditions hold at the nodes.
+F is `symfric.flow` of the model with its cost as an additional state, so the derivatives are exact
+for the discrete map. Bounds and path conditions hold at the nodes.
 """
 
 from collections.abc import Iterator
@@ -24,20 +24,20 @@ from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 LARGEST = 20_000
-"""Operations of an interval up to which it is written out as one expression; of longer ones the
-steps stay calls, which are slower but differentiate in a moment."""
+"""Largest number of operations of an interval that is expanded to one expression; for longer ones
+the steps stay function calls, which are slower but differentiate quickly."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The equations of one interval of a span.
+    """The equations of one interval of a phase.
 
     Attributes:
         local: its unknowns; x and u are those at its start.
         block: rows and share of the cost.
         path: conditions at a node, with the input of the interval before (without inputs), and
-            with that of the interval behind; None where there are none.
+            with that of the next interval; None if there are none.
     """
 
     local: Local
@@ -46,11 +46,11 @@ class Shot:
 
 
 def shot(local: Local, scheme: Shooting) -> Shot:
-    """Write the equations of an interval of a span.
+    """Formulate the equations of an interval of a phase.
 
     Raises:
-        ValueError: conditions or costs at nodes that know algebraic variables, a bound on one, a
-            mechanism that is moved in time.
+        ValueError: conditions or costs at nodes that contain algebraic variables, a bound on one,
+            a mechanism with prescribed motion in time.
     """
     span = local.span
     _check(span)
@@ -70,11 +70,11 @@ def shot(local: Local, scheme: Shooting) -> Shot:
 
 
 def _written_out(v: ca.MX, theta: ca.MX, rows: ca.MX, share: ca.MX | None) -> Block:
-    """The block as expressions of numbers where that is not too long, else as calls of steps."""
+    """Return the block as expanded expressions if not too long, else as calls of steps."""
     interval = ca.Function("interval", [v, theta], [rows, *([] if share is None else [share])])
     try:
         flat = interval.expand()
-    except RuntimeError:  # an equation is solved inside
+    except RuntimeError:  # it contains an implicit equation
         flat = None
     if flat is None or flat.n_instructions() > LARGEST:
         symbols = [ca.MX.sym("v", v.numel()), ca.MX.sym("theta", theta.numel())]
@@ -86,7 +86,7 @@ def _written_out(v: ca.MX, theta: ca.MX, rows: ca.MX, share: ca.MX | None) -> Bl
 
 
 def with_cost(span: Span) -> tuple[Model, int]:
-    """The model with time as a parameter at the start, and its cost as a state if there is one."""
+    """Return the model with its start time as a parameter, and its cost, if any, as a state."""
     model = span.model
     start = Variable("shooting_start", "s")
     shifted = model.t + start.symbol
@@ -101,7 +101,7 @@ def with_cost(span: Span) -> tuple[Model, int]:
 
 
 def _check(span: Span) -> None:
-    """Refuse what shooting cannot see."""
+    """Raise ValueError for conditions that shooting does not support."""
     model = span.model
     problems: list[str] = []
     inside = model.vector("z")
@@ -109,7 +109,7 @@ def _check(span: Span) -> None:
     named = [(row.name, row.expression) for row in conditions] + [("the end cost", span.end)]
     for name, expression in named:
         if model.z and ca.depends_on(expression, inside):
-            problems.append(f"{name} knows algebraic variables")
+            problems.append(f"{name} depends on algebraic variables")
     problems += [
         f"a bound on {v.name}, an algebraic variable"
         for v in model.z
@@ -128,7 +128,7 @@ def _check(span: Span) -> None:
 
 
 def _paths(local: Local) -> Iterator[tuple[Rows, Block | None]]:
-    """Path conditions without inputs, then those with inputs."""
+    """Yield path conditions without inputs, then those with inputs."""
     span = local.span
     u = span.model.vector("u")
     knows = [bool(u.numel()) and bool(ca.depends_on(row.expression, u)) for row in span.path]
@@ -144,7 +144,7 @@ def _paths(local: Local) -> Iterator[tuple[Rows, Block | None]]:
 def pieces_of_intervals(
     number: int, made: Shot, layout: Layout, gap: Piece, data: Data
 ) -> Iterator[Piece]:
-    """The flow over all intervals, whose linear part is in `gap`, and the path conditions."""
+    """Yield the flow over all intervals, whose linear part is in `gap`, and the path conditions."""
     own = layout.spans[number]
     N = own.intervals
     interval, zero = np.arange(N), np.zeros(N)
@@ -152,7 +152,7 @@ def pieces_of_intervals(
     theta = data.theta(interval, zero)
     yield replace(gap, block=made.block, selection=select(parts, N), theta=theta)
     (free, without), (bound, with_inputs) = made.path
-    after = (interval, interval + 1, zero + 1.0)  # a start is given more often than chosen
+    after = (interval, interval + 1, zero + 1.0)  # starts are usually prescribed
     ends = (np.append(interval, N - 1), np.arange(N + 1), np.append(zero, 1.0))
     for rows, written, (at, node, offset) in ((free, without, after), (bound, with_inputs, ends)):
         if written is not None:

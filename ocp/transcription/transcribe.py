@@ -1,9 +1,9 @@
-"""From a problem to a nonlinear program on meshes.
+"""Transcription of a problem to a nonlinear program on meshes.
 
-    w = [x_0, (u_1, (x, z)_11 ... (x, z)_1d), x_1, ..., x_N, T] of each span, chosen p
+    w = [x_0, (u_1, (x, z)_11 ... (x, z)_1d), x_1, ..., x_N, T] for each phase, chosen p
 
-with a copy of the state at every node. What has to be differentiated is one point of each span and
-what holds at single nodes: `discretise` does it once. `Discretisation.on` puts it on meshes, whose
+with a copy of the state at every node. Only one point of each phase and the conditions at single
+nodes are differentiated, once, by `discretise`. `Discretisation.on` puts them on meshes, whose
 fractions, like all parameters, are parameters of the program.
 """
 
@@ -58,11 +58,11 @@ class Equations:
     """The equations of a problem at points and nodes, with derivatives.
 
     Attributes:
-        problem, scheme: what was discretised, and how.
-        spans: of each span the equations at its collocation points, or of its intervals.
-        closing: of each span the constraints of its mechanism; None where it has none.
+        problem, scheme: the problem and its scheme.
+        spans: for each phase the equations at its collocation points, or of its intervals.
+        closing: for each phase the constraints of its mechanism; None if it has none.
         nodes: conditions at single nodes.
-        between: conditions between spans.
+        between: conditions between phases.
         starts: conditions at the starts of all intervals.
     """
 
@@ -76,12 +76,12 @@ class Equations:
 
     @property
     def released(self) -> list[dict[float, dict[int, Box]]]:
-        """Of each span: fraction of T -> states that follow from others -> their range."""
+        """For each phase: fraction of T -> states that follow from others -> their range."""
         return [{} if part is None else part.released for part in self.closing]
 
 
 def _data(problem: Problem, p: ca.MX, meshes: Sequence[Array]) -> list[Data]:
-    """The parts of p that belong to each span."""
+    """Return the parts of p that belong to each phase."""
     found: list[Data] = []
     first, phases = 0, len(problem.chain)
     before = ca.MX(0)
@@ -100,7 +100,7 @@ def _data(problem: Problem, p: ca.MX, meshes: Sequence[Array]) -> list[Data]:
 def skeleton_of(
     made: Equations, meshes: Sequence[Array], nodes: Sequence[Mapping[float, int]]
 ) -> Skeleton:
-    """Put the equations on the numbers of intervals of `meshes`."""
+    """Assemble the program for the numbers of intervals of `meshes`."""
     problem, scheme = made.problem, made.scheme.coefficients()
     layout = _layout(made, scheme, meshes)
     w = ca.MX.sym("w", layout.size)
@@ -175,7 +175,7 @@ def _pieces(
     data: Sequence[Data],
     nodes: Sequence[Mapping[float, int]],
 ) -> Iterator[Piece]:
-    """Rows and costs of all spans."""
+    """Yield the rows and costs of all phases."""
     spans, phases = made.problem.spans, len(made.problem.chain)
     for number, (span, equations) in enumerate(zip(spans, made.spans, strict=True)):
         gap, loops = gaps(number, span, layout, scheme), made.closing[number]
@@ -206,7 +206,7 @@ def _pieces(
 
 
 KEPT = 4
-"""Programs that a discretisation remembers: those of the meshes it was put on last."""
+"""Number of programs that a discretisation caches, for the most recent meshes."""
 
 Key = tuple[tuple[int, ...], ...]
 
@@ -214,11 +214,11 @@ Key = tuple[tuple[int, ...], ...]
 @final
 @dataclass(frozen=True, eq=False)
 class Discretisation:
-    """A problem whose equations are differentiated, ready to be put on meshes.
+    """A problem with differentiated equations, to be put on meshes.
 
     Attributes:
-        equations: what holds at points, at nodes and between spans.
-        made: what programs share, by numbers of intervals.
+        equations: at points, at nodes and between phases.
+        made: common parts of programs, by numbers of intervals.
     """
 
     equations: Equations
@@ -235,20 +235,20 @@ class Discretisation:
         return self.equations.scheme
 
     def on(self, meshes: Sequence[Array]) -> Transcription:
-        """The program on `meshes`: one for each span, or one for each phase (see `make_meshes`).
+        """Return the program on `meshes`, one for each phase (see `make_meshes`).
 
-        Meshes with as many intervals as before, and conditions at the same nodes, change numbers
-        only: the symbols and Functions of their programs are the same objects.
+        Meshes with the same numbers of intervals and the same nodes with conditions change only
+        values: the symbols and Functions of their programs are the same objects.
 
         Raises:
-            ValueError: no such meshes.
+            ValueError: invalid meshes.
         """
         problem = self.problem
         given = check_meshes(problem, meshes)
         nodes = [nodes_of(span, mesh) for span, mesh in zip(problem.spans, given, strict=True)]
         key = tuple((mesh.size - 1, *at.values()) for mesh, at in zip(given, nodes, strict=True))
         skeleton = self.made.pop(key, None) or skeleton_of(self.equations, given, nodes)
-        self.made[key] = skeleton  # the youngest stands last
+        self.made[key] = skeleton  # the most recent one is last
         for old in list(self.made)[:-KEPT]:
             del self.made[old]
         return Transcription(problem, self.scheme, given, skeleton)
@@ -257,12 +257,12 @@ class Discretisation:
 def discretise(
     problem: Problem, scheme: Scheme, starts: Mapping[int, Sequence[Row]] | None = None
 ) -> Discretisation:
-    """Write the equations of `problem` at points and nodes, and differentiate them.
+    """Formulate the equations of `problem` at points and nodes, and differentiate them.
 
     Args:
-        problem: what to discretise.
-        scheme: how; one of collocation where there are `starts`.
-        starts: number of a span -> conditions that hold at the start of each interval but the
+        problem: the problem.
+        scheme: scheme; collocation if there are `starts`.
+        starts: index of a phase -> conditions at the start of each interval but the
             first one, with the inputs that begin there.
     """
     choices = {choice.name: choice.nominal for choice in problem.chosen}

@@ -1,4 +1,4 @@
-"""A problem on meshes: numbers to names and back."""
+"""A problem on meshes: conversion between the vector of unknowns and named values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,12 +23,12 @@ from symfric.foundation.parameters import check_names
 @final
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """The part that programs on all meshes of the same numbers of intervals share.
+    """The part common to programs on meshes with the same numbers of intervals.
 
     Attributes:
-        program: without numbers of parameters and names of rows and unknowns.
+        program: without values of parameters and names of rows and unknowns.
         pieces, assembled: rows and costs, and their places in the program.
-        closing: of each span the constraints of its mechanism; None where it has none.
+        closing: for each phase the constraints of its mechanism; None if it has none.
     """
 
     problem: Problem
@@ -45,7 +45,7 @@ class Skeleton:
 
     @cached_property
     def structure(self) -> tuple[Stages | None, str]:
-        """Stages, or why there are none."""
+        """Stages, or None and the reason."""
         equality = self.program.lower_g == self.program.upper_g
         return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
 
@@ -54,12 +54,12 @@ LARGEST = "the largest cost"
 
 
 def fixed_duration(span: Span) -> float:
-    """T of a span [s]; 1 where it is chosen."""
+    """Return T of a phase [s]; 1 if it is an unknown."""
     return 1.0 if isinstance(span.T, Free) else float(span.T)
 
 
 def numbers_of(problem: Problem, meshes: Sequence[Array], p: Mapping[str, float]) -> Array:
-    """Numbers of [p, T, mesh] of each span."""
+    """Return the values [p, T, mesh] of each phase."""
     parts: list[Array] = []
     for span, mesh in zip(problem.spans, meshes, strict=True):
         own = [p.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
@@ -70,13 +70,13 @@ def numbers_of(problem: Problem, meshes: Sequence[Array], p: Mapping[str, float]
 @final
 @dataclass(frozen=True, eq=False)
 class Transcription:
-    """A problem on meshes: the nonlinear program, and the way back to names.
+    """A problem on meshes: the nonlinear program, and its conversion to named values.
 
     Attributes:
-        problem, scheme: what was transcribed, and how.
-        meshes: of each span, fractions of T that bound the intervals.
-        skeleton: what meshes with the same numbers of intervals share.
-        program: what a solver gets.
+        problem, scheme: the problem and its scheme.
+        meshes: for each phase, fractions of T that bound the intervals.
+        skeleton: common part of meshes with the same numbers of intervals.
+        program: for a solver.
     """
 
     problem: Problem
@@ -102,7 +102,7 @@ class Transcription:
         return self.skeleton.layout
 
     def pack(self, points: Points) -> Array:
-        """The vector w of `points`; of what several spans share, that of the first one."""
+        """Return the vector w of `points`; shared values are those of the first phase."""
         w = np.zeros(self.layout.size)
         for span, own in zip(points.spans[::-1], self.layout.spans[::-1], strict=True):
             w[own.nodes], w[own.inner] = span.nodes, span.inner
@@ -119,7 +119,7 @@ class Transcription:
         return w
 
     def unpack(self, w: ArrayLike) -> Points:
-        """The points in SI units that the vector `w` stands for."""
+        """Return the points of the vector `w` in SI units."""
         values = np.asarray(w, dtype=float).ravel() * self.program.scale
         spans = tuple(
             SpanPoints(
@@ -132,7 +132,7 @@ class Transcription:
         return Points(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
 
     def consistent(self, points: Points) -> Points:
-        """`points` with mechanisms on their constraints, which straight lines are not."""
+        """Return `points` with mechanisms moved onto their constraints."""
         spans = [
             span if loops is None else loops.consistent(span, mesh, self.inner_fractions(number))
             for number, (span, mesh, loops) in enumerate(
@@ -142,12 +142,12 @@ class Transcription:
         return replace(points, spans=tuple(spans))
 
     def duration(self, points: Points, span: int) -> float:
-        """T of a span [s], chosen or fixed."""
+        """Return T of a phase [s], free or fixed."""
         T = self.problem.spans[span].T
         return points.spans[span].T if isinstance(T, Free) else float(T)
 
     def when(self, w: Array, place: Place) -> str:
-        """Return the time of a place in words; its phase and scenario where there are several."""
+        """Return the time of a place as text, with its phase and scenario if there are several."""
         problem, span = self.problem, self.problem.spans[place.span]
         words: list[str] = []
         if np.isfinite(place.fraction):
@@ -161,7 +161,7 @@ class Transcription:
         return " ".join(words)
 
     def inner_fractions(self, span: int) -> Array:
-        """Collocation points of a span as fractions of T, shape (N d,)."""
+        """Return the collocation points of a phase as fractions of T, shape (N d,)."""
         mesh, nodes = self.meshes[span], self.scheme.coefficients().nodes[1:]
         inner = mesh[:-1, None] + np.diff(mesh)[:, None] * nodes
         if nodes.size and nodes[-1] == 1.0:
@@ -169,7 +169,7 @@ class Transcription:
         return inner.ravel()
 
     def fractions(self, span: int) -> Array:
-        """Nodes and collocation points of a span as increasing fractions of T."""
+        """Return nodes and collocation points of a phase as increasing fractions of T."""
         return np.unique(np.concatenate([self.meshes[span], self.inner_fractions(span)]))
 
     def values(
@@ -177,15 +177,15 @@ class Transcription:
         p: Mapping[str, float] | None = None,
         meshes: Sequence[Array] | None = None,
     ) -> Array:
-        """Numbers of the parameters of the program.
+        """Return the values of the parameters of the program.
 
         Args:
-            p: parameters of the models by name, in all spans that have them, in place of those of
-                the problem; of scenarios too.
-            meshes: with as many intervals as those of this transcription.
+            p: parameters of the models by name, in all phases that have them, instead of those of
+                the problem, also in scenarios.
+            meshes: with the same numbers of intervals as this transcription.
 
         Raises:
-            ValueError: a name that no span has, or other meshes.
+            ValueError: an unknown name, or other meshes.
         """
         given = self.meshes if meshes is None else check_meshes(self.problem, meshes)
         if [mesh.size for mesh in given] != [mesh.size for mesh in self.meshes]:
@@ -199,7 +199,7 @@ Columns = tuple[list[str], Indices, Indices, Array, Array]
 
 
 def _row_places(skeleton: Skeleton, meshes: Sequence[Array]) -> Columns:
-    """Names of rows, and of each row number of the name, span, fraction, scale."""
+    """Return names of rows, and for each row index of the name, phase, fraction, scale."""
     m = skeleton.program.g.numel()
     names: list[str] = []
     name, span = np.zeros(m, np.int64), np.zeros(m, np.int64)
@@ -215,7 +215,7 @@ def _row_places(skeleton: Skeleton, meshes: Sequence[Array]) -> Columns:
 
 
 def _unknown_places(transcription: Transcription) -> Columns:
-    """Names of unknowns, and of each number of the name, span, fraction, scale."""
+    """Return names of unknowns, and for each index of the name, phase, fraction, scale."""
     layout, n = transcription.layout, transcription.layout.size
     names: list[str] = []
     name, owner = np.zeros(n, np.int64), np.zeros(n, np.int64)

@@ -1,4 +1,4 @@
-"""Unknowns of a motion: named values, their places in the program, and symbols of one place."""
+"""Unknowns of a motion: values, their places in the program, and symbols at one place."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,10 +16,10 @@ from symfric.foundation.variable import stacked
 @final
 @dataclass(frozen=True, eq=False)
 class SpanPoints:
-    """Values of everything that is chosen in one span, in SI units.
+    """Values of all unknowns of one phase, in SI units.
 
     Attributes:
-        T: duration [s], chosen or fixed.
+        T: duration [s], free or fixed.
         nodes: states at the nodes of the mesh, shape (nx, N + 1).
         inner: states at the collocation points, shape (nx, N d).
         z: algebraic variables there, shape (nz, N d).
@@ -36,11 +36,11 @@ class SpanPoints:
 @final
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Values of everything that is chosen.
+    """Values of all unknowns.
 
     Attributes:
-        spans: one for each span of the problem.
-        chosen: values of the parameters that are chosen with the motion.
+        spans: one for each phase and scenario of the problem.
+        chosen: values of the parameters chosen with the motion.
     """
 
     spans: tuple[SpanPoints, ...]
@@ -50,12 +50,12 @@ class Points:
 @final
 @dataclass(frozen=True, eq=False)
 class SpanLayout:
-    """Places of the unknowns of one span in w; shared ones are those of another span.
+    """Places of the unknowns of one phase in w; shared ones belong to another phase.
 
     Attributes:
-        T: of the duration; -1 where it is fixed.
+        T: of the duration; -1 if it is fixed.
         nodes, inner, z, u: as in `SpanPoints`.
-        extra: further unknowns of each interval, shape (k, N).
+        extra: additional unknowns of each interval, shape (k, N).
     """
 
     T: int
@@ -72,11 +72,11 @@ class SpanLayout:
 
     @property
     def degree(self) -> int:
-        """Collocation points of an interval."""
+        """Number of collocation points of an interval."""
         return self.inner.shape[1] // self.intervals
 
     def points_of(self, interval: int) -> Indices:
-        """States that carry the polynomial of an interval, shape (nx, d + 1)."""
+        """Return the states that define the polynomial of an interval, shape (nx, d + 1)."""
         d = self.degree
         inner = self.inner[:, interval * d : (interval + 1) * d]
         return np.column_stack([self.nodes[:, interval], inner])
@@ -85,15 +85,15 @@ class SpanLayout:
 @final
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The order of the unknowns, which is that of time within each span.
+    """Order of the unknowns, by time within each phase.
 
-        w = [x_0, (u_1, (x, z)_11 ... (x, z)_1d, extra_1), x_1, ..., x_N, T] of each span,
+        w = [x_0, (u_1, (x, z)_11 ... (x, z)_1d, extra_1), x_1, ..., x_N, T] for each phase,
             chosen parameters, largest cost
 
     Attributes:
-        spans: one for each span.
-        chosen: parameters that are chosen.
-        largest: bound of all costs where the largest counts; -1 elsewhere.
+        spans: one for each phase and scenario.
+        chosen: of chosen parameters.
+        largest: bound of all costs if the largest counts; else -1.
         size: number of unknowns.
     """
 
@@ -106,12 +106,12 @@ class Layout:
 @final
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Unknowns of one span: states, algebraic variables, inputs and more an interval.
+    """Numbers of unknowns of one phase: states, algebraic variables, inputs, extra per interval.
 
     Attributes:
         intervals: number of intervals N.
-        like: number of the span whose duration and inputs are the same; -1 where there is none.
-        shared: rows of the inputs that are the same as in span `like`.
+        like: index of the phase with the same duration and inputs; -1 if there is none.
+        shared: rows of the inputs that are the same as in phase `like`.
     """
 
     nx: int
@@ -125,7 +125,7 @@ class Sizes:
 
 
 def lay_out(sizes: Sequence[Sizes], degree: int, chosen: int, largest: bool) -> Layout:
-    """Places of all unknowns in one vector, span by span and interval by interval."""
+    """Return places of all unknowns in one vector, by phase and interval."""
     spans: list[SpanLayout] = []
     first = 0
     for s in sizes:
@@ -168,24 +168,24 @@ Columns = Indices | tuple[Indices, Array]
 
 
 def time_scale(span: Span) -> float:
-    """Magnitude of a duration that is chosen [s]."""
+    """Return the magnitude of a free duration [s]."""
     return span.T.start if isinstance(span.T, Free) else 1.0
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Local:
-    """Local unknowns v and parameters theta of a span at one time, as SX symbols.
+    """Local unknowns v and parameters theta of a phase at one time, as SX symbols.
 
-        v = (x, z, u, T if free, free time before, chosen p),  scaled but for the time before
+        v = (x, z, u, T if free, free time before, chosen p),  scaled except the time before
         theta = (p, T, fixed time before, length h of the interval and the place as fractions of T,
                  quadrature weight)
 
     Attributes:
-        number: of the span.
-        span: what it is about.
-        before: numbers and spans of the same scenario before it.
-        choices: names of all parameters that are chosen in the problem, and their magnitudes.
+        number: index of the phase.
+        span: the phase.
+        before: indices and phases of the same scenario before it.
+        choices: names of all chosen parameters of the problem, and their magnitudes.
         inner: whether there are collocation points, and algebraic variables with them.
     """
 
@@ -212,12 +212,12 @@ class Local:
 
     @property
     def free(self) -> bool:
-        """True if the duration is chosen."""
+        """True if the duration is free."""
         return isinstance(self.span.T, Free)
 
     @property
     def free_before(self) -> list[tuple[int, Span]]:
-        """Spans before it with a duration that is chosen."""
+        """Phases before it with a free duration."""
         return [(i, span) for i, span in self.before if isinstance(span.T, Free)]
 
     @property
@@ -270,7 +270,7 @@ class Local:
     def columns(
         self, layout: Layout, x: Columns, z: Columns, u: Columns, places: int
     ) -> list[Columns]:
-        """Parts of `blocks.select` for v, with the columns of x, z and u at `places` given."""
+        """Return parts of `blocks.select` for v, with given columns of x, z and u at `places`."""
         parts: list[Columns] = [x, z, u] if self.inner else [x, u]
         if self.free:
             parts.append(np.full((1, places), layout.spans[self.number].T))
@@ -296,12 +296,12 @@ class Local:
         weights: Array | None = None,
         linear: Linear | None = None,
     ) -> Piece:
-        """The piece of a block of these local unknowns.
+        """Return the piece of a block of these local unknowns.
 
         Args:
             rows: its rows.
             parts: columns of the local unknowns, see `columns`.
-            data: parameters of the span.
+            data: parameters of the phase.
             at: interval and offset of each place.
             order: of the rows.
             weights: of a quadrature on an interval of length 1, at each place.
@@ -328,11 +328,11 @@ def _spread(values: Indices, shape: tuple[int, int, int]) -> Indices:
 @final
 @dataclass(frozen=True, eq=False)
 class Data:
-    """Parameters of the program that belong to one span, MX.
+    """Parameters of the program that belong to one phase, MX.
 
     Attributes:
         p: of the model, (n_p, 1).
-        T: duration, where it is fixed [s].
+        T: duration, if it is fixed [s].
         before: fixed time before it [s].
         mesh: fractions of T that bound the intervals, (N + 1, 1).
     """
@@ -343,9 +343,9 @@ class Data:
     mesh: ca.MX
 
     def theta(self, interval: Indices, offset: Array, weights: Array | None = None) -> ca.MX:
-        """Theta of `Local` at places `offset` of the way through an `interval`, (k, places).
+        """Return theta of `Local` at the fractions `offset` of an `interval`, (k, places).
 
-        `weights` are those of a quadrature on an interval of length 1, zeros if none.
+        `weights` belong to a quadrature on an interval of length 1; zeros by default.
         """
         places = interval.size
         weights = np.zeros(places) if weights is None else weights

@@ -53,7 +53,7 @@ def test_bound_left_between_nodes_is_found_where_it_is_left_most() -> None:
     assert (miss.what, miss.name) == ("bound", "x")
     assert miss.time == pytest.approx(1.0, abs=1e-3)
     assert miss.miss == pytest.approx(0.04, abs=1e-6)
-    assert "x is left by 0.04 m at 1 s" in found.sentence
+    assert "x is violated by 0.04 m at 1 s" in found.sentence
 
 
 def test_end_and_cost_that_the_control_does_not_give_are_misses() -> None:

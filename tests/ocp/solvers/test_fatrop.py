@@ -60,7 +60,7 @@ def test_legendre_has_stages_too() -> None:
 
 def test_programs_without_stages_are_refused_with_the_reason() -> None:
     with pytest.raises(
-        ValueError, match=r"Fatrop: .* stages, got one with a free duration; take Ipopt\(\)"
+        ValueError, match=r"Fatrop: .* stages, got one with a free duration; use Ipopt\(\)"
     ):
         solve_once(unit_move(T=Free(0.5, 2.0)), 5, solver=Fatrop())
 

@@ -181,7 +181,7 @@ def test_points_are_a_guess() -> None:
 def test_points_of_another_mesh_and_what_is_no_guess_are_refused() -> None:
     into = on(unit_move(), 6)
     other = initial_points(on(unit_move(), 7))
-    with pytest.raises(ValueError, match=r"guess: expected points of 1 spans, .* shape \(2, 7\)"):
+    with pytest.raises(ValueError, match=r"guess: expected points of 1 phases, .* shape \(2, 7\)"):
         start_of(into, other)
     with pytest.raises(ValueError, match=r"guess: .* got points of other meshes or models"):
         start_of(into, initial_points(on(there_and_back(), 6)))

@@ -68,17 +68,17 @@ def test_the_jacobian_has_the_form_that_stages_promise() -> None:
         ),
         (
             Problem(Phase(UNIT, 1.0, start={"x": FREE}), EFFORT, periodic=["x"]),
-            "x, which knows more than its interval",
+            "x, which depends on more than its interval",
         ),
         (
             Problem(Phase(UNIT, 1.0) >> Phase(UNIT, 1.0, link={"v": None}), EFFORT),
-            "states that start anew behind a phase",
+            "states that restart after a phase",
         ),
         (
             Problem(
                 Phase(UNIT, 1.0) >> Phase(UNIT, 1.0, joins=[lambda a, b: a.v + b.v >= 0]), EFFORT
             ),
-            "join 1, which knows more than its interval",
+            "join 1, which depends on more than its interval",
         ),
     ],
 )  # fmt: skip
