@@ -19,7 +19,6 @@ def outcomes(work: object, tasks: list[object], limit: float = 60.0) -> dict[int
 
 
 def test_results_exceptions_exits_and_signals_are_distinguished() -> None:
-    assert outcomes(abs, [-1, 2, -3]) == {0: 1, 1: 2, 2: 3}
     found = outcomes(abs, [-1, "text", -3])
     assert found[1] == Crashed("exit status 1", "TypeError: bad operand type for abs(): 'str'")
     assert (found[0], found[2]) == (1, 3)
