@@ -4,7 +4,7 @@
     fit = Fit(InverseDynamics(), "stribeck", data).solve()
     print(fit)
 
-Other kinds of residuals: `Points`, `Shooting`, `ClosedLoop`.
+Other types of residuals: `Points`, `Shooting`, `ClosedLoop`.
 """
 
 from typing import TYPE_CHECKING

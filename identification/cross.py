@@ -1,8 +1,8 @@
-"""What a model says of data that it was not fitted to: by records, or by blocks of time with gaps.
+"""Cross-validation of a fit: by records, or by blocks of time with gaps.
 
-Each fold is left out once, the model is fitted to the rest, and what it leaves of the fold counts.
-Neighbouring samples share noise and motion; so folds are whole records or blocks of time, and the
-rest keeps a distance from them.
+Each fold is left out once, the model is fitted to the rest, and its residuals on the fold count.
+Neighbouring samples share noise and motion; therefore folds are whole records or blocks of time,
+with a gap to the rest.
 Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
 """
 
@@ -26,22 +26,22 @@ from symfric.foundation.status import SolveError
 Array = NDArray[np.float64]
 
 GAP = 0.05
-"""Share of a block that is left out between it and the rest."""
+"""Gap between a block and the rest, over the length of the block."""
 LEAST = 20
-"""Samples of a piece that is worth fitting."""
+"""Fewest samples of a part used for fitting."""
 DIVERGED = 1e3
-"""Error [%] from which on a number says no more than that what was predicted ran away."""
+"""Error [%] above which a prediction counts as diverged."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a model leaves of one signal of one record that it was not fitted to.
+    """Residuals of one signal of one record that was not fitted.
 
     Attributes:
         record: its name.
         signal, unit: of the signal.
-        t: times of the residuals [s]; of points, velocities.
+        t: times of the residuals [s]; for points, velocities.
         r: predicted - measured [SI], shape of t.
         spread: standard deviation of the measured signal [SI].
     """
@@ -59,12 +59,12 @@ class Left:
 @final
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """Errors on what was left out.
+    """Errors on the data that were left out.
 
     Attributes:
-        left: of all folds.
+        left: residuals of all folds.
         folds: number of folds that could be fitted and compared.
-        failed: why others could not.
+        failed: messages on the failed folds.
         by: "records", "blocks of time" or "points".
     """
 
@@ -95,14 +95,14 @@ class CrossValidation:
 def cross_validate(
     fit: Fit, folds: int = 4, start: Mapping[str, float] | None = None
 ) -> CrossValidation:
-    """Fit to all but one part of the data, again and again, and look at that part.
+    """Fit to all but one part of the data, for each part in turn, and evaluate that part.
 
     Args:
-        fit: the question; its data are divided.
-        folds: number of parts: groups of records where there are as many records, else blocks of
-            time of each record, of points every so many.
-        start: values from which the parts are fitted, from one start each: those of a fit to
-            all data; None: as `fit` says.
+        fit: its data are divided.
+        folds: number of parts: groups of records if there are as many records, else blocks of
+            time of each record, or for points every n-th one.
+        start: values from which the parts are fitted, from one start each, such as the result of
+            a fit to all data; None: as in `fit`.
 
     Raises:
         ValueError: fewer than two folds.
@@ -121,7 +121,7 @@ def cross_validate(
 
 
 def left_of(fit: Fitted, data: Dataset) -> list[Left]:
-    """What a fit leaves of other data.
+    """Return the residuals of a fit on other data.
 
     Raises:
         ValueError: data that cannot be compared, or a fit from JSON.
@@ -137,7 +137,7 @@ def _parts(residuals: Residuals, names: Sequence[str], r: Array) -> Iterator[Lef
 
 
 def relative(left: Sequence[Left]) -> float:
-    """Root mean square error over the spread of each signal [%], all signals alike; NaN of none."""
+    """Return the rms error over the spread [%], averaged over signals; NaN if empty."""
     signals = dict.fromkeys(part.signal for part in left)
     each = list[float]()
     for s in signals:
@@ -149,14 +149,14 @@ def relative(left: Sequence[Left]) -> float:
 
 
 def percent(value: float) -> str:
-    """An error [%] in words."""
+    """Return an error [%] as text."""
     if value > DIVERGED:
         return "diverged"
     return f"{value:.3g} %" if isfinite(value) else "-"
 
 
 def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
-    """The same with the times that all have: laws without states leave out what is near rest."""
+    """Return residuals at common times only: laws without states omit samples near rest."""
     common: dict[tuple[str, str], Array] = {}
     for left in many:
         for part in left:
@@ -167,7 +167,7 @@ def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
 
 def _at(part: Left, times: Array) -> Left:
     there = np.isin(part.t, times)
-    if not there.any():  # nothing is shared: each as it is
+    if not there.any():  # no common times: unchanged
         return part
     return replace(part, t=part.t[there], r=part.r[there])
 
@@ -178,7 +178,7 @@ def _rms(parts: Sequence[Array]) -> float:
 
 
 def _divided(data: Dataset, folds: int) -> tuple[list[tuple[Dataset, Dataset]], str]:
-    """(rest, part) of each fold, and what the parts are."""
+    """Return (rest, part) of each fold, and the type of the parts."""
     if len(data) >= folds:
         groups = [data.records[k::folds] for k in range(folds)]
         outside = [tuple(r for r in data if r not in group) for group in groups]
@@ -200,7 +200,7 @@ def _strided(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
 
 
 def _blocked(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
-    """Block k of each record, and what lies before and behind it at a distance."""
+    """Return block k of each record, and the samples before and after it beyond a gap."""
     rest, part = list[Record](), list[Record]()
     for record in data:
         first, last = (round(j * record.size / folds) for j in (k, k + 1))
@@ -216,6 +216,6 @@ def _blocked(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
     if not rest:
         raise ValueError(
             f"cross_validate: expected records of at least {2 * LEAST} samples, got data "
-            f"'{data.name}'; take fewer folds"
+            f"'{data.name}'; use fewer folds"
         )
     return _named(data, rest), _named(data, part)

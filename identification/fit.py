@@ -3,7 +3,7 @@
     data = Dataset.read("run*.csv", units="rad, N m")
     fit = Fit(Shooting(windows=4.0), "lugre", data, free={"sigma_0": log(1e3, 1e7)}).solve()
 
-data -> kind of residuals -> unknowns -> least squares from many starts -> verdict -> result
+data -> type of residuals -> unknowns -> least squares from many starts -> verdict -> result
 """
 
 from collections.abc import Mapping
@@ -38,33 +38,33 @@ from symfric.foundation.status import SolveError, Status
 Array = NDArray[np.float64]
 MOST_STARTS = 10_000
 QUICK = 40
-"""Evaluations of a fit that only helps to choose a setting."""
+"""Evaluations of a fit that only selects a setting."""
 OF_KIND = ("x0", "dead_time")
-"""Entries of `free` that belong to the kind of residuals."""
+"""Entries of `free` that belong to the residuals."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """One question to data.
+    """A fit of a law, a machine or a model to data.
 
         minimise over p, sigma   sum_s n_s ln sigma_s^2 + sum_i loss(r_i(p) / sigma_s(i))
 
     Attributes:
-        kind: what is compared: `Points()`, `InverseDynamics()`, `Shooting()`, `ClosedLoop()`.
+        kind: type of residuals: `Points()`, `InverseDynamics()`, `Shooting()`, `ClosedLoop()`.
         what: a law or its text ("stribeck", "asymmetric(coulomb+viscous)"), a scene, or a model. A
             law becomes the friction of a `Drive`.
         data: one or several records.
-        free: names, or name -> how: a start value, (lower, upper), `log(...)`, `linear(...)`,
-            `above(name)`, `tied(name, factor)`. They are fitted beside what is fitted by its role;
-            of a model all parameters are. "x0" and "dead_time" go to the kind.
-        fixed: name -> value of what is not fitted; "others": all that `free` does not name.
+        free: names, or name -> a start value, (lower, upper), `log(...)`, `linear(...)`,
+            `above(name)`, `tied(name, factor)`. They are fitted in addition to those fitted by
+            their role; for a model, all parameters. "x0" and "dead_time" go to `kind`.
+        fixed: name -> value of held parameters; "others": all that are not in `free`.
         normal_force: of a law [N]; with 1 N its coefficients read as forces.
         noise: "estimate", or signal -> standard deviation [SI]; others are estimated.
         loss: "squares", or against outliers "huber", "soft_l1", "cauchy", "arctan".
-        starts: most starts; they end early where others cannot matter (see `many_starts`).
-        start: parameter -> value, or "data" (the default), or "law": the values that it has.
-        seed: of the starts after the first.
+        starts: largest number of starts; fewer if others are unnecessary (see `many_starts`).
+        start: parameter -> value, or "data" (the default), or "law": its values.
+        seed: random seed of the starts after the first.
         evaluations: of the residuals, allowed to each start, and as many again to the best one.
 
     Raises:
@@ -100,17 +100,17 @@ class Fit:
         progress: Progress | None = None,
         throw: bool = True,
     ) -> Fitted:
-        """Fit.
+        """Solve the fit.
 
         Args:
-            executor: of `concurrent.futures`, for the starts; the result is the same to the bit.
+            executor: of `concurrent.futures`, for the starts; the result is bit-identical.
             progress: called with a text and the fraction done.
-            throw: raise `SolveError` where the result is no use; its `partial` is the result.
+            throw: raise `SolveError` if the result is unusable; its `partial` is the result.
 
         Raises:
             ValueError: data or names that cannot be used.
-            SolveError: no start has residuals; with `throw`, also where the fit did not reach a
-                minimum, or data or residuals say that the result is no physics.
+            SolveError: no start has residuals; with `throw`, also if the fit did not reach a
+                minimum, or data or residuals make the result implausible.
         """
         begun = perf_counter()
         throw = checks.flag("Fit: throw", throw)
@@ -128,7 +128,7 @@ class Fit:
         return self._result(asked, starts, end, point, throw, perf_counter() - begun)
 
     def prepared(self) -> "Prepared":
-        """Data checked, subject chosen, residuals made: all but the solution."""
+        """Check the data, choose the subject and set up the residuals, without solving."""
         kind, free = _to_kind(self.kind, self.free)
         findings = findings_of(kind, self.data)
         seen = measured(kind, self.data, self.normal_force)
@@ -163,10 +163,10 @@ class Fit:
         return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
 
     def live(self, noise: dict[str, float], w: Array) -> Live:
-        """The problem that was solved, with its end at the coordinates `w`.
+        """Return the solved problem, with its end at the coordinates `w`.
 
         Raises:
-            ValueError: there are no residuals, as they were when it was solved.
+            ValueError: the residuals cannot be evaluated again.
         """
         asked = self.prepared()
         made = asked.task.with_noise(noise)
@@ -176,7 +176,7 @@ class Fit:
         return self._live(asked, made, point)
 
     def _live(self, asked: "Prepared", made: Task, point: Point) -> Live:
-        """The problem with its minimum and what is known of its uncertainty."""
+        """Return the problem with its minimum and its uncertainty."""
         found = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         drive = asked.subject.drive
         mass = None if drive is None else float(found.get("m", drive.m))
@@ -186,13 +186,13 @@ class Fit:
         return Live.of(asked.kind, asked.subject, self.data, made, point, certain)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
-        """Values of a fit to other data, from one start and without a verdict."""
+        """Return the values of a fit to other data, from one start and without a verdict."""
         asked = replace(self, kind=kind, data=data).prepared()
         end = descend(asked.task, asked.centre, 0, min(self.evaluations, QUICK))
         return asked.task.unknowns.named(end.w) if np.isfinite(end.cost) else None
 
     def _task(self, residuals: Residuals, found: Subject) -> Task:
-        """The least-squares problem of residuals."""
+        """Return the least-squares problem of residuals."""
         unknowns = unknowns_of(
             (*found.unknowns, *residuals.own), found.ties, residuals.names, found.held
         )
@@ -200,7 +200,7 @@ class Fit:
         if rows < len(unknowns.unknowns):
             raise ValueError(
                 f"Fit: expected at least {len(unknowns.unknowns)} residuals for as many unknowns, "
-                f"got {rows}; fix some, or add data"
+                f"got {rows}; hold some, or add data"
             )
         return task(residuals, unknowns, self.noise, self.loss, found.guard)
 
@@ -229,12 +229,12 @@ class Prepared:
     """A fit before its solution.
 
     Attributes:
-        kind: with what `free` said of it.
-        subject: what is fitted.
-        findings: what is doubtful about the data.
+        kind: type of residuals, with its entries of `free`.
+        subject: fitted law, machine or model.
+        findings: warnings on the data.
         task: the least-squares problem.
         centre: coordinates of the first start, shape (n,).
-        seen: velocity and force, where the data have them.
+        seen: velocity and force, if the data have them.
     """
 
     kind: Kind
@@ -246,22 +246,22 @@ class Prepared:
 
 
 def _status(end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
-    """How the fit ended, and what to know about it; `gain` see `Verdict.status`."""
+    """Return the status of the fit and its message; for `gain` see `Verdict.status`."""
     status, message = verdict.status(end.status, gain), end.message
     if status is Status.DOUBTFUL and not end.status.ok:
-        message = f"The search was not finished, so that a better fit may be near: {message}"
-    said = [message, *verdict.sentences]
-    return status, " ".join(_sentence(text) for text in said if text)
+        message = f"The search was not finished; a better fit may be near: {message}"
+    messages = [message, *verdict.sentences]
+    return status, " ".join(_sentence(text) for text in messages if text)
 
 
 def _unseen(asked: Prepared) -> str:
-    """What a fit at the measured velocity cannot know of a law with states."""
+    """Return a message on the limits of inverse dynamics for a law with states."""
     law = asked.subject.law
     if law is None or not law.states or not isinstance(asked.kind, InverseDynamics):
         return ""
     return (
-        f" The states of {type(law).__name__} follow the measured velocity, of which noise and few "
-        "samples leave little near rest: take Fit(Shooting(windows=1.0), ...), which simulates."
+        f" The states of {type(law).__name__} follow the measured velocity, which noise and "
+        "sampling make inaccurate near rest: use Fit(Shooting(windows=1.0), ...), which simulates."
     )
 
 
@@ -270,7 +270,7 @@ def _sentence(text: str) -> str:
 
 
 def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
-    """The kind with what `free` says of it, and the rest of `free`."""
+    """Return the residuals with their entries of `free`, and the rest of `free`."""
     if not isinstance(free, Mapping):
         return kind, free
     given: dict[str, Any] = dict(free)  # pyright: ignore[reportUnknownArgumentType]
@@ -279,7 +279,7 @@ def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
     for name in mine:
         if name not in known:
             raise ValueError(
-                f"Fit: free: expected parameters, got {name}, which {type(kind).__name__} has not; "
+                f"Fit: free: expected parameters, got {name}, which {type(kind).__name__} lacks; "
                 "Shooting has start values and a dead time"
             )
     return (replace(kind, **mine) if mine else kind), given  # pyright: ignore[reportArgumentType, reportUnknownVariableType]
@@ -287,7 +287,7 @@ def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
 
 def _check_kind(fit: Fit) -> None:
     if isinstance(fit.kind, type) or not callable(getattr(fit.kind, "prepare", None)):
-        such = "a kind of residuals, such as Points(), InverseDynamics() or Shooting()"
+        such = "a type of residuals, such as Points(), InverseDynamics() or Shooting()"
         raise checks.refused("Fit: kind", such, fit.kind)
 
 

@@ -1,12 +1,12 @@
-"""Several laws on one data set: which one says most, how surely, and at what cost.
+"""Comparison of several laws on one data set: accuracy, significance and cost.
 
     validation   root mean square error on data that were not fitted, over the spread of the signals
     AICc         n ln(mean square) + 2 k n / (n - k - 1)
     BIC          n ln(mean square) + k ln n
 
-n is the effective number of samples, by the colour that the best law leaves in each signal; it is
-the same for all laws. With the number of rows instead, coloured residuals make any further
-parameter look certain. All laws are compared at the times that all of them describe.
+n is the effective number of samples, from the autocorrelation that the best law leaves in each
+signal; it is the same for all laws. With the number of rows instead, autocorrelated residuals would
+make any additional parameter look significant. All laws are compared at their common times.
 Source: Burnham and Anderson, Model Selection and Multimodel Inference, 2002.
 """
 
@@ -48,29 +48,29 @@ if TYPE_CHECKING:
 INTERRUPTED = "interrupted by the user"
 HEADER = ("law", "validation", "fit", "AICc", "BIC", "par.", "op.", "status", "")
 NUMBERS = (1, 2, 3, 4, 5, 6)
-"""What tables of laws hold, and which of it are numbers."""
+"""Header of the table of laws, and its numeric columns."""
 LOST = "not fitted"
 OWN = ("kind", "what", "data")
-"""Arguments of a fit that `select` gives itself."""
+"""Arguments of a fit that `select` sets."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One law of a ranking.
+    """A law of a ranking.
 
     Attributes:
-        law: as it was called.
-        status: how its fit ended; "" where it could not be fitted.
-        validation: error on data that were not fitted [%], NaN without, infinite where what was
-            predicted ran away (`DIVERGED`); in plain data None.
-        fitted: the same on the data of the fit [%].
-        aicc, bic: over those of the best law.
+        law: name as given.
+        status: status of its fit; "" if it could not be fitted.
+        validation: error on data that were not fitted [%], NaN without, infinite if the prediction
+            diverged (`DIVERGED`); None in plain data.
+        fitted: error on the data of the fit [%].
+        aicc, bic: difference to the best law.
         parameters: number of fitted ones, start values apart.
-        operations: instructions of force and rate; None of a model without a law.
+        operations: instructions of force and rate; None for a model without a law.
         seconds: of the fit.
-        sentence: what speaks against it, or why it could not be fitted.
-        fit: the result; None where there is none.
+        sentence: main objection to it, or reason why it could not be fitted.
+        fit: the result; None if there is none.
     """
 
     law: str
@@ -87,7 +87,7 @@ class Row:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """It below `HEADER`, as text."""
+        """Row of the table below `HEADER`, as text."""
         numbers = (
             *map(percent, (self.validation, self.fitted)), *map(_number, (self.aicc, self.bic)),
             str(self.parameters), "-" if self.operations is None else str(self.operations),
@@ -97,7 +97,7 @@ class Row:
         return self.law, *numbers, self.status or LOST, self.sentence
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data; numbers that are none are None."""
+        """Return plain data, with None for non-finite numbers."""
         named: dict[str, Any] = {
             "law": self.law, "status": self.status, "validation [%]": self.validation,
             "fit [%]": self.fitted, "AICc": self.aicc, "BIC": self.bic,
@@ -112,13 +112,13 @@ class Row:
 @final
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Laws, the one that predicts best first; those that could not be fitted last.
+    """Laws, the best predictor first; those that could not be fitted last.
 
     Attributes:
         rows: of the laws.
         data: name of the data.
-        how: what the validation error is of.
-        effective: samples that the residuals count as, of all signals together.
+        how: method of the validation.
+        effective: effective number of samples of all signals together.
     """
 
     rows: tuple[Row, ...]
@@ -138,13 +138,13 @@ class Ranking:
         return self.rows[0].fit
 
     def __getitem__(self, law: str) -> Row:
-        """The row of a law by its name."""
+        """Return the row of a law by its name."""
         checks.choice("select: law", law, [row.law for row in self.rows])
         return next(row for row in self.rows if row.law == law)
 
     @property
     def title(self) -> str:
-        """The data and what was validated, in a line."""
+        """Data and validation method, in a line."""
         return f"laws on {self.data}: {self.how}; {self.effective:.0f} effective samples"
 
     def __str__(self) -> str:
@@ -155,20 +155,20 @@ class Ranking:
         return "\n".join([self.title, *texts, *lost])
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
-        """What a notebook shows: the table and its picture."""
+        """Return the notebook view: the table and its figure."""
         drawn = any(row.fit is not None for row in self.rows)
         table = Table(HEADER, tuple(row.cells for row in self.rows), NUMBERS)
         return Shown(self.title, table=table).html(self.plot() if drawn else None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the fits as plain data."""
+        """Return everything but the fits as plain data."""
         return {
             "data": self.data, "how": self.how, "effective": self.effective,
             "rows": [row.to_dict() for row in self.rows],
         }  # fmt: skip
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Errors on data that were and were not fitted, and criteria, a bar for each law.
+        """Plot errors on fitted and other data, and information criteria, as bars for each law.
 
         Args:
             path: image file.
@@ -189,34 +189,34 @@ def select(
     progress: Progress | None = None,
     **fit: Any,
 ) -> Ranking:
-    """Fit several laws to the same data and rank them by what they say of other data.
+    """Fit several laws to the same data and rank them by their errors on other data.
 
     Args:
         laws: texts, laws, scenes or models, or name -> one of them.
         data: to fit to.
-        kind: of residuals; `InverseDynamics()` if none.
+        kind: type of residuals; None: `InverseDynamics()`.
         validate: other data; None: cross-validation.
         folds: of the cross-validation; 0: none, the ranking is by BIC.
         executor: for the starts of each law.
         progress: called with a text and the fraction done.
         fit: further arguments of `Fit`, the same for all laws.
 
-    A law that cannot be fitted has a row that says why; after Ctrl-C those that were fitted are
-    ranked, and the row of the others says so.
+    A law that cannot be fitted has a row with the reason; after Ctrl-C the fitted laws are
+    ranked, and the rows of the others are marked as interrupted.
 
     Raises:
-        ValueError: no laws, or arguments that no law could be fitted with.
+        ValueError: no laws, or invalid arguments.
     """
     named = _named(laws)
     checks.kind("select: data", data, Dataset, "data, such as Dataset.read('run.csv')")
     folds = checks.count("select: folds", folds, least=0)
     checks.check_names("select", fit, [f.name for f in fields(Fit) if f.name not in OWN])
-    asked: Any = InverseDynamics() if kind is None else kind
+    residuals: Any = InverseDynamics() if kind is None else kind
     tried = list[_Tried]()
     for number, (name, what) in enumerate(named.items()):
         if progress is not None:
             progress(name, number / len(named))
-        one = Fit(asked, what, data, **fit)
+        one = Fit(residuals, what, data, **fit)
         try:
             tried.append(_try(name, one, validate, folds, executor))
         except KeyboardInterrupt:  # what was fitted before is ranked
@@ -231,7 +231,7 @@ def select(
     how = f"validation on {validate.name}" if validate is not None else "no validation"
     crossed = next((t.crossed for t in tried if t.crossed is not None), None)
     if crossed is None and validate is None and folds > 1:
-        how = f"no validation, although {folds} folds were asked for"
+        how = f"no validation, although {folds} folds were requested"
     if crossed is not None:
         how = f"validation by {folds} folds ({crossed.by})"
     return _ranked(tried, data.name, how)
@@ -240,7 +240,7 @@ def select(
 @final
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """What came of one law."""
+    """Outcome of one law."""
 
     name: str
     why: str = ""
@@ -251,7 +251,7 @@ class _Tried:
 
     @property
     def ended(self) -> bool:
-        """Whether the user ended it."""
+        """True if the user interrupted it."""
         stopped = self.fit is not None and self.fit.status is Status.INTERRUPTED
         return stopped or self.why == INTERRUPTED
 
@@ -273,7 +273,7 @@ def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:
 def _try(
     name: str, asked: Fit, validate: Dataset | None, folds: int, executor: Executor | None
 ) -> _Tried:
-    """Fit and validate one law; what stands in the way is kept as a sentence."""
+    """Fit and validate one law; failures are kept as messages."""
     try:
         found = asked.solve(executor=executor, throw=False)
     except (ValueError, SolveError) as error:
@@ -345,7 +345,7 @@ def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -
 
 
 def _count(t: _Tried) -> int:
-    """Fitted parameters that are asked for."""
+    """Return the number of fitted parameters without nuisances."""
     live = None if t.fit is None else t.fit.live
     return 0 if live is None else sum(not u.nuisance for u in live.task.unknowns.unknowns)
 
@@ -359,7 +359,7 @@ def _mean_squares(left: Sequence[Left]) -> dict[str, float]:
 
 
 def _effective(good: Sequence[_Tried], inside: Sequence[Sequence[Left]]) -> dict[str, float]:
-    """Signal -> independent samples in what the law leaves that leaves least of it."""
+    """Return signal -> independent samples of the residuals of the law that fits it best."""
     found: dict[str, tuple[float, float]] = {}
     for t, left in zip(good, inside, strict=True):
         counts: dict[str, float] = {}

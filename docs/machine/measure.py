@@ -177,7 +177,7 @@ FOLDER = MADE / "tables"
 Row = Mapping[str, str]
 """Column -> cell."""
 TOOLS = {"opti": "Opti", "rockit": "rockit", "do_mpc": "do-mpc"}
-ROUTES = {"flow": "``flow``", "colloca": "collocation"}
+ROUTES = {"flow": "``flow``", "collocation": "collocation"}
 
 
 def tables() -> dict[str, str]:
@@ -203,7 +203,7 @@ def moves(lines: Sequence[Row]) -> str:
     body: list[list[str]] = []
     for law, route in keys:
         own = {m["tool"]: m for m in lines if (m["law"], m["route"]) == (law, route)}
-        costs = sorted({m["J"] for m in own.values() if not m[""]})
+        costs = sorted({m["cost J [N^2 s]"] for m in own.values() if not m["status"]})
         cost = " ... ".join(dict.fromkeys((costs[0], costs[-1]))) if costs else ""
         cells = [cell(own[tool]) if tool in own else "" for tool in TOOLS]
         body.append([f":doc:`{law} </laws/{law}>`", ROUTES[route], cost, *cells])
@@ -212,10 +212,10 @@ def moves(lines: Sequence[Row]) -> str:
 
 def cell(line: Row) -> str:
     """Miss, iterations and seconds of one tool in the move, or the reason why it ended."""
-    if line[""] or line["miss"] in ("nan", "-"):
-        return rst.plain(line[""] or "none")
-    miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")
-    return rst.plain(f"{miss}, {line['it.']}, {line['s']} s")
+    if line["status"] or line["miss [m]"] in ("nan", "-"):
+        return rst.plain(line["status"] or "none")
+    miss = f"{float(line['miss [m]']):.1e}".replace("e-0", "e-")
+    return rst.plain(f"{miss}, {line['iterations']}, {line['processor time [s]']} s")
 
 
 def integrators(lines: Sequence[Row]) -> str:
@@ -232,11 +232,12 @@ def integrators(lines: Sequence[Row]) -> str:
 
 def off(line: Row) -> str:
     """Error and time of an integrator, or that it stops."""
-    if line[""]:
+    if line["status"]:
         return "stops"
-    if line["error [m]"] == "-":
+    if line["largest error [m]"] == "-":
         return "not finite"
-    return rst.plain(f"{float(line['error [m]']):.0e} m, {float(line['time ratio']):.1f} times")
+    error, ratio = line["largest error [m]"], line["ratio of time to symfric"]
+    return rst.plain(f"{float(error):.0e} m, {float(ratio):.1f} times")
 
 
 def write_interop() -> None:

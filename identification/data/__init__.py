@@ -1,1 +1,1 @@
-"""Measured records: reading, units, merging, resampling, and what is doubtful about them."""
+"""Measured records: reading, units, merging, resampling, and checks."""

@@ -1,4 +1,4 @@
-"""All checks of some data, and those of times, points, units and a measured velocity."""
+"""Complete check of a data set, and the checks of times, points, units and a measured velocity."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -25,16 +25,16 @@ from identification.data.record import GAP, JITTER, Record
 from identification.data.rough import Rough, rough_model, smoothed
 
 FEWEST, FEW = 20, 50
-"""Samples without which nothing can be said, and little."""
+"""Numbers of samples below which a record is an error, and a warning."""
 SLOW = 0.5
-"""Sample interval [s] from which on times may be in ms."""
+"""Sample interval [s] above which times may be in ms."""
 
 
 def of_times(view: View) -> Iterator[Finding]:
-    """Gaps, irregular intervals, too few samples, times that may be in another unit."""
+    """Find gaps, irregular intervals, too few samples, times that may be in another unit."""
     record = view.record
     if record.size < FEW:
-        text = f"There are {record.size} samples only."
+        text = f"The record has only {record.size} samples."
         yield view.finding("short", "t", text, "error" if record.size < FEWEST else "warning")
     if record.t is None or record.size < 3:
         return
@@ -45,7 +45,7 @@ def of_times(view: View) -> Iterator[Finding]:
         k = int(gaps[np.argmax(intervals[gaps])])
         text = (
             f"The times have {gaps.size} gap(s), the longest of {intervals[k]:.3g} s at "
-            f"{view.at(k)}: data.resampled() makes a record of each piece."
+            f"{view.at(k)}: data.resampled() makes one record of each piece."
         )
         yield view.warning("gap", "t", text, k, k + 1)
     off = np.abs(intervals - usual)
@@ -69,17 +69,17 @@ def of_times(view: View) -> Iterator[Finding]:
 
 FEWEST_POINTS = 4
 WRONG = 0.2
-"""Share of points whose force goes with the motion below which the sign is wrong."""
+"""Share of points with friction along the motion below which the sign is wrong."""
 
 
 def of_points(view: View) -> Iterator[Finding]:
-    """Too few points, one direction, one speed, a force that drives instead of braking."""
+    """Find too few points, one direction, one speed, a force that drives instead of braking."""
     record = view.record
     if "v" not in record or "F" not in record:
         return
     v, force = record["v"], record["F"]
     if record.size < FEWEST_POINTS:
-        text = f"There are {record.size} points only."
+        text = f"The data have only {record.size} points."
         yield view.warning("short", "v", text)
     if np.ptp(v) == 0 or np.ptp(force) == 0:
         name = "v" if np.ptp(v) == 0 else "F"
@@ -91,12 +91,12 @@ def of_points(view: View) -> Iterator[Finding]:
     around = float(np.median(force)) if both else 0.0
     if np.mean(v[moving] * (force[moving] - around) > 0) < WRONG:
         text = (
-            "F is opposite to v in most points: friction is counted as what the drive needs, so "
-            "F v > 0; turn one sign round."
+            "F is opposite to v in most points: friction counts as the force that the drive needs, "
+            "so F v > 0; reverse one sign."
         )
         yield view.error("sign", "F", text)
     if not both:
-        text = "All points are of one direction: friction cannot be told from a constant force."
+        text = "All points have one direction: friction and a constant force are not separable."
         yield view.warning("one-way", "v", text)
 
 
@@ -108,14 +108,14 @@ LIMITS = {
     "m/s": (1e-9, 100.0, 1e5),
     "rad/s": (1e-9, 1e4, 1e8),
 }
-"""Ranges: smaller than the first or larger than the last is an error, than the second a doubt."""
+"""Ranges: below the first or above the last is an error, above the second a warning."""
 FASTEST = {"m": (50.0, 1e5), "rad": (1e4, 1e8)}
-"""Speeds of a position: doubt, error."""
+"""Speeds of a position for a warning and an error."""
 TOGETHER = (("m", "N"), ("rad", "N m"))
 
 
 def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
-    """Units that do not belong together, and ranges that no machine has."""
+    """Find units that do not belong together, and implausible ranges."""
     record = view.record
     mixed = [record.units[view.roles[r]] for r in ("x", "force") if r in view.roles]
     if len(mixed) == 2 and "" not in mixed and tuple(mixed) not in TOGETHER:
@@ -147,9 +147,9 @@ def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
 
 
 WIDTH = 12.0
-"""Standard deviation of the window under which both are compared, in samples."""
+"""Standard deviation of the smoothing window of both signals, in samples."""
 ALIKE = 0.7
-"""Correlation that both must have."""
+"""Least correlation of both."""
 OFF = 0.2
 """Relative error of the scale above which it is reported."""
 KNOWN = {
@@ -168,7 +168,7 @@ KNOWN = {
 
 
 def of_velocity(view: View) -> Iterator[Finding]:
-    """A velocity of another sign or scale than the position has, likewise an acceleration."""
+    """Find a velocity that differs from the slope of the position, or an acceleration likewise."""
     record = view.steady
     if record is None or record.size < 100:
         return
@@ -206,17 +206,17 @@ def of_velocity(view: View) -> Iterator[Finding]:
 
 
 HOPELESS = {"standstill", "noise", "constant", "short", "wrap", "swapped", "glitch", "frozen"}
-"""Errors after which a rough model of the drive says nothing."""
+"""Errors after which a rough model of the drive is meaningless."""
 
 
 def check(name: str, records: Sequence[Record], roles: Mapping[str, str]) -> Findings:
-    """What is doubtful about the records, errors first.
+    """Check the records; errors come first.
 
     Args:
         name: of the data.
         records: to check.
-        roles: part in the drive ("x", "v", "a", "force") -> signal, where that is called
-            otherwise; only signals with a part are held against each other.
+        roles: part in the drive ("x", "v", "a", "force") -> signal, if the names differ; only
+            signals with a part are compared with each other.
     """
     found = [f for k, one in enumerate(records) for f in _of_record(View.of(one, k, roles))]
     found.sort(key=lambda finding: finding.severity != "error")

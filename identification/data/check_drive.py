@@ -8,15 +8,15 @@ from identification.data.findings import Array, Finding, View, count_of
 from identification.data.rough import Rough, explained_when_late, one_way, rough_model, with_column
 
 SURE = 5.0
-"""Standard errors that make a statement."""
+"""Significance level, in standard errors."""
 LITTLE, MUCH = 0.5, 0.8
-"""Shares of the force that the rough model explains: of a wrong and of a right pair of columns."""
+"""Shares of the force that the rough model explains: for exchanged and for correct columns."""
 NOTHING = 0.05
-"""Share of the force below which it has no part in the motion."""
+"""Share of the force below which it is unrelated to the motion."""
 
 
 def of_direction(view: View, model: Rough) -> Iterator[Finding]:
-    """A drive whose friction puts power in, and pairs of columns that make sense the other way."""
+    """Find friction that supplies power, and columns that fit only when exchanged."""
     names = view.name("force"), view.name("x")
     swapped = rough_model(view, exchanged=True)
     if (
@@ -26,8 +26,8 @@ def of_direction(view: View, model: Rough) -> Iterator[Finding]:
         and swapped.explained > model.explained + 0.4
     ):
         text = (
-            f"{names[0]} moves as a position and {names[1]} as a force (a rough drive explains "
-            f"{swapped.explained:.0%} of it that way, {model.explained:.0%} as it is): the columns "
+            f"{names[0]} behaves like a position, {names[1]} like a force (a rough drive explains "
+            f"{swapped.explained:.0%} when exchanged, {model.explained:.0%} as given): the columns "
             "are exchanged."
         )
         yield view.error("swapped", names[0], text)
@@ -46,8 +46,8 @@ def of_direction(view: View, model: Rough) -> Iterator[Finding]:
         yield view.error("sign", names[0], text)
     elif both and model.clean and model.explained < NOTHING and model.independent > 100:
         text = (
-            f"A rough drive explains {max(model.explained, 0.0):.0%} of {names[0]}: it has nothing "
-            f"to do with the motion of {names[1]}, or there is more at work than one mass."
+            f"A rough drive explains {max(model.explained, 0.0):.0%} of {names[0]}: it is not "
+            f"related to the motion of {names[1]}, or more than one mass is involved."
         )
         yield view.finding("unrelated", names[0], text, "error" if _white(view) else "warning")
     if both and model.sure(0) < -SURE and put_in > 0 and model.explained > LITTLE:
@@ -59,24 +59,24 @@ def of_direction(view: View, model: Rough) -> Iterator[Finding]:
 
 
 def _white(view: View) -> bool:
-    """Whether the force is noise: neighbours have nothing to do with each other."""
+    """Return True if neighbouring samples of the force are nearly uncorrelated."""
     force = view.signal("force")
     return force is not None and abs(float(np.corrcoef(force[1:], force[:-1])[0, 1])) < 0.2
 
 
 LARGE = 0.12
-"""Drift over the robust spread of the force that is told."""
+"""Drift over the robust spread of the force above which it is reported."""
 DRIFTS = 4.5
 LAGS = (-20, -10, -5, -3, -2, -1, 1, 2, 3, 5, 10, 20)
-"""Delays that are tried, in samples, before those between the neighbours of the best one."""
+"""Delays that are tried first, in samples; then those between the neighbours of the best one."""
 BETTER = 0.88
-"""Unexplained part that a delay leaves, over that without it, from which on it is told ..."""
+"""Largest ratio of the unexplained parts with and without a reported delay ..."""
 WORSE = 1.05
-"""... where the same lead leaves more."""
+"""... if the opposite delay has at least this ratio."""
 
 
 def of_drift(view: View, model: Rough, free: Rough | None) -> Iterator[Finding]:
-    """A force that follows the time in addition to what a rough drive needs."""
+    """Find a force that drifts with time relative to the force of a rough drive."""
     if not model.clean or model.explained < 0.5 or free is None or one_way(model):
         return
     rise, sure = float(free.values[-1]), free.sure(-1)
@@ -85,14 +85,14 @@ def of_drift(view: View, model: Rough, free: Rough | None) -> Iterator[Finding]:
         name = view.name("force")
         text = (
             f"{name} drifts by {rise:.3g} {view.record.units[name]} from the first to the last "
-            "sample against what a rough drive needs: a sensor without a fixed zero, or a drive "
-            "that warms."
+            "sample relative to a rough drive model: a sensor with a drifting zero, or a drive "
+            "that warms up."
         )
         yield view.warning("drift", name, text)
 
 
 def of_dead_time(view: View, model: Rough, free: Rough | None) -> Iterator[Finding]:
-    """A force that explains the motion better when it is moved in time."""
+    """Find a force that explains the motion better when it is shifted in time."""
     if not model.clean or model.explained < 0.5 or abs(model.sure(0)) < 5 or free is None:
         return
     now = max(1 - free.explained, 1e-9)
@@ -118,30 +118,30 @@ def of_dead_time(view: View, model: Rough, free: Rough | None) -> Iterator[Findi
 UNSURE = 3.0
 """Rough mass over its standard error below which the accelerations are too small."""
 SPREAD = 1.7
-"""Speed that 90 % of the way stay below, over that which 10 % do: less is one speed."""
+"""Ratio of the 90 % and 10 % quantiles of the speed below which there is only one speed."""
 MOST = 0.97
-"""Share of the time at rest beyond which hardly anything moved."""
+"""Share of the time at rest above which there is too little motion."""
 
 
 def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
-    """Too small accelerations, one speed only, hardly any motion."""
+    """Find too small accelerations, a single speed, too little motion."""
     if not model.clean:
         text = (
-            f"The accelerations do not stand above the noise of {view.name('x')}: a mass "
-            "cannot be told from these data."
+            f"The accelerations do not exceed the noise of {view.name('x')}: a mass is "
+            "not identifiable from these data."
         )
         yield view.warning("excitation", view.name("x"), text)
         return
     if abs(model.sure(0)) < UNSURE:
         unit = "kg m^2" if view.record.units[view.name("x")] == "rad" else "kg"
         text = (
-            f"The accelerations are too small to tell a mass: a rough one is {model.values[0]:.2g} "
-            f"+- {model.errors[0]:.1g} {unit}; give it as fixed."
+            f"The accelerations are too small to identify a mass: roughly {model.values[0]:.2g} "
+            f"+- {model.errors[0]:.1g} {unit}; pass it as fixed."
         )
         yield view.warning("excitation", view.name("x"), text)
     moving = model.moving
     if moving.mean() < 1 - MOST:
-        text = f"The drive moves in {moving.mean():.1%} of the time only."
+        text = f"The drive moves only {moving.mean():.1%} of the time."
         yield view.warning("excitation", view.name("x"), text)
     speed = np.abs(model.v[moving])
     if speed.size > 20:
@@ -149,8 +149,8 @@ def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
         if high < SPREAD * low:
             text = (
                 f"Most of the motion is at one speed, {low:.3g} to {high:.3g} "
-                f"{view.record.units[view.name('x')]}/s: how friction depends on velocity cannot "
-                "be told."
+                f"{view.record.units[view.name('x')]}/s: the velocity dependence of friction is "
+                "not identifiable."
             )
             yield view.warning("speeds", view.name("x"), text)
 
@@ -158,15 +158,15 @@ def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
 MOVED = 6.0
 """Range of the position over its noise (standard deviation) below which nothing moved."""
 COUNTS = 4
-"""Counts of an encoder below which nothing moved."""
+"""Encoder counts below which nothing moved."""
 WHITE = 0.3
 """Correlation of neighbours below which a position is noise."""
 ONE_WAY = 0.005
-"""Share of the way in the other direction up to which the drive moves one way."""
+"""Share of the path in the other direction below which the drive moves in one direction only."""
 
 
 def of_motion(view: View) -> Iterator[Finding]:
-    """Signals that hold no motion."""
+    """Find signals without motion."""
     x, force = view.signal("x"), view.signal("force")
     if x is not None and view.record.t is not None and x.size >= 20:
         yield from _still(view, x)
@@ -174,10 +174,10 @@ def of_motion(view: View) -> Iterator[Finding]:
         name = view.name("force")
         text = f"{name} is {force[0]:g} {view.record.units[name]} throughout: "
         if float(force[0]) == 0:
-            text += "motion without a drive tells friction over mass only."
+            text += "motion without a drive determines only friction over mass."
             yield view.warning("constant", name, text)
         else:
-            yield view.error("constant", name, f"{text}nothing was measured there.")
+            yield view.error("constant", name, f"{text}nothing was measured.")
 
 
 def _still(view: View, x: Array) -> Iterator[Finding]:
@@ -192,48 +192,48 @@ def _still(view: View, x: Array) -> Iterator[Finding]:
     noise = float(np.std(steps)) / np.sqrt(2)
     if lag < WHITE:
         text = (
-            f"{name} is noise of {noise:.3g} {unit}: neighbouring samples have "
-            "nothing to do with each other, and no body moves like that."
+            f"{name} is noise of {noise:.3g} {unit}: neighbouring samples "
+            "are uncorrelated, which is not the motion of a body."
         )
         yield view.error("noise", name, text)
     elif np.ptp(np.quantile(x, (0.02, 0.98))) < MOVED * _white_part(x):
         text = (
             f"{name} moves by {np.ptp(np.quantile(x, (0.02, 0.98))):.3g} {unit}"
-            " only, which its noise does, too."
+            ", no more than its noise."
         )
         yield view.error("standstill", name, text)
 
 
 def _white_part(x: Array) -> float:
-    """Standard deviation of the white part of the position."""
+    """Return the standard deviation of the white part of the position."""
     return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
 def of_one_way(view: View, model: Rough) -> Iterator[Finding]:
-    """Motion in one direction."""
+    """Find motion in one direction only."""
     if model.clean and one_way(model, ONE_WAY):
         direction = "forwards" if model.v.sum() > 0 else "backwards"
         text = (
-            f"The drive moves {direction} only: friction cannot be told from a constant force, "
-            "nor from gravity."
+            f"The drive moves {direction} only: friction is not separable from a constant force "
+            "or from gravity."
         )
         yield view.warning("one-way", view.name("x"), text)
 
 
 LINE = 0.45
-"""Share of what is left that lies in one line of its spectrum: a hum."""
+"""Share of the residuals in one spectral line above which it is a hum."""
 LOUD = 0.02
-"""Its amplitude over the spread of the force from which on it is told."""
+"""Its amplitude over the spread of the force above which it is reported."""
 PERIODS, CLEAR, ANSWER = 8, 20.0, 0.01
-"""A line of the velocity: periods in the record, power over that beside it, share of all power."""
+"""Spectral line of the velocity: periods in the record, power over background, power share."""
 HARMONICS = (1, 2)
-"""Of an excitation, that friction may leave in the force."""
+"""Harmonics of an excitation that friction may leave in the force."""
 UNEQUAL, DIFFERS = 0.04, 6.0
 """Difference of the mass between both directions, relative, and in standard errors."""
 
 
 def of_residue(view: View, free: Rough | None) -> Iterator[Finding]:
-    """A periodic force beside the drive; a mass that differs by the direction."""
+    """Find a periodic force in addition to the drive's, and a mass that differs by direction."""
     if free is None or not free.clean or free.explained < 0.5:
         return
     yield from _hum(view, free)
@@ -252,18 +252,18 @@ def _hum(view: View, free: Rough) -> Iterator[Finding]:
     if share > LINE and loud and not any(_answered(free, round(k / n)) for n in HARMONICS):
         name = view.name("force")
         text = (
-            f"{name} hums: beside what a rough drive needs there is a sine of {size:.2g} "
+            f"{name} hums: in addition to a rough drive model it has a sine of {size:.2g} "
             f"{view.record.units[name]} and {k / left.size / free.step:.3g} Hz, {share:.0%} of "
-            "what is left: the mains, or a motion that the position does not show."
+            "the residuals: the mains, or a motion that the position does not show."
         )
         yield view.warning("hum", name, text)
 
 
 def _answered(free: Rough, k: int) -> bool:
-    """Whether the velocity has a line of its own at bin k: an excitation, no hum.
+    """Return True if the velocity has a spectral line at bin k: an excitation, not a hum.
 
-    Not asked of less than `PERIODS` periods, where a line cannot be told from a move; so a slow
-    excitation that only bends bristles can still be called a hum.
+    Not tested below `PERIODS` periods, where a line and a move are indistinguishable; so a slow
+    excitation that only bends bristles can still be reported as a hum.
     """
     if k < PERIODS:
         return False
@@ -280,8 +280,8 @@ def _unequal(view: View, free: Rough) -> Iterator[Finding]:
     if abs(ratio) > UNEQUAL and abs(value) > DIFFERS * error:
         name = view.name("force")
         text = (
-            f"{name} asks for a mass {2 * abs(ratio):.0%} larger "
-            f"{'forwards' if ratio > 0 else 'backwards'}: its gain differs by its sign, or it is "
+            f"{name} corresponds to a mass {2 * abs(ratio):.0%} larger "
+            f"{'forwards' if ratio > 0 else 'backwards'}: its gain depends on its sign, or it is "
             "clipped or filtered on one side."
         )
         yield view.warning("unequal", name, text)

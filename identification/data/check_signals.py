@@ -1,4 +1,4 @@
-"""Checks of single signals: spikes, clipping, frozen stretches, jumps, resolution."""
+"""Checks of single signals: spikes, clipping, frozen intervals, jumps, resolution."""
 
 from collections.abc import Iterator
 
@@ -9,19 +9,19 @@ from identification.data.findings import Array, Finding, Severity, View, constan
 from identification.data.rough import Rough, rough_model
 
 FAR = 12.0
-"""Distance from the running median, over that of the farthest 5 %, that is a spike."""
+"""Distance of a spike from the running median, over that of the farthest 5 % ..."""
 RANGE = 0.2
-"""... and over the range that 98 % of the signal have."""
+"""... over the range of 98 % of the signal ..."""
 BACK = 3.0
-"""... and over the difference of the samples three before and three behind."""
+"""... and over the difference of the samples three before and three after."""
 MANY = 0.02
-"""Share of the samples from which on they are no exceptions."""
+"""Share of the samples above which they are not exceptions."""
 HEAVY = 0.5
-"""Share of a signal's variance that lies in its spikes and spoils any least squares."""
+"""Share of a signal's variance in spikes above which least squares is invalid."""
 
 
 def of_spikes(view: View) -> Iterator[Finding]:
-    """Spikes of every signal; those that outweigh the signal are an error."""
+    """Find spikes of every signal; those that outweigh the signal are an error."""
     named = view.roles.values()
     for signal, y in view.known():
         if view.record.t is None:
@@ -35,7 +35,7 @@ def of_spikes(view: View) -> Iterator[Finding]:
         unit = view.record.units[signal]
         text = (
             f"{signal} is far off its neighbours in {far.size} sample(s), most at {view.at(k)} by "
-            f"{off[k]:.3g} {unit}: take them out with data.without_spikes()."
+            f"{off[k]:.3g} {unit}: remove them with data.without_spikes()."
         )
         yield view.finding(
             "glitch" if position else "spikes",
@@ -48,39 +48,41 @@ def of_spikes(view: View) -> Iterator[Finding]:
 
 
 def spike_samples(y: Array, *, position: bool) -> tuple[NDArray[np.intp], Array]:
-    """The samples that are spikes, and the distance of all samples from their neighbours."""
+    """Return the samples that are spikes, and the distance of all samples from their neighbours."""
     none = np.zeros(0, dtype=np.intp)
     if y.size < 50 or np.ptp(y) == 0:
         return none, np.zeros(y.size)
     off = np.abs(y - median_of_five(y))
     usual = max(float(np.quantile(off, 0.95)), count_of(y))
     limit = max(FAR * usual, RANGE * float(np.ptp(np.quantile(y, (0.01, 0.99)))))
-    if position:  # smooth: much less is a glitch
+    if position:  # a position is smooth: a lower limit
         limit = max(FAR * usual, 3 * float(np.quantile(np.abs(np.diff(y)), 0.9)))
-    through = np.abs(np.roll(y, -3) - np.roll(y, 3))  # what moves on has no spike
+    through = np.abs(np.roll(y, -3) - np.roll(y, 3))  # a spike returns to its neighbours
     through[:3] = through[-3:] = 0.0
     far = np.flatnonzero((off > limit) & (off > BACK * through))
     return (far if limit > 0 and far.size <= MANY * y.size else none), off
 
 
 def median_of_five(y: Array) -> Array:
-    """The running median, which single samples and pairs do not move."""
+    """Return the running median of five, which ignores single samples and pairs."""
     padded = np.pad(y, 2, mode="edge")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
 RUN, SHARE = 5, 0.002
-"""Samples in a row at the extreme value, and share of all that lie in such runs, from which on
-it is clipping."""
+"""Consecutive samples at an extreme value, and share of the record in such runs, that count as
+clipping.
+"""
 THERE = 0.6
-"""Share of all long constant runs that lie at the extremes: else the signal is of few levels."""
+"""Least share of long constant runs at the extremes; below it, the signal has few levels."""
 MEAN, MOST = 0.03, 0.1
-"""Force that the motion asks for beyond the limit, over it: mean and 90 % of the clipped samples.
-Where the drive itself was at its limit, the motion asks for no more than that."""
+"""Predicted force beyond the limit, over the limit: mean and 90 % quantile of the clipped samples.
+If the drive itself was at its limit, the motion needs no larger force.
+"""
 
 
 def of_clipping(view: View) -> Iterator[Finding]:
-    """Signals that are held at their largest or smallest value."""
+    """Find signals held at their largest or smallest value."""
     for signal, y in view.known():
         if y.size < 50 or np.ptp(y) == 0:
             continue
@@ -95,7 +97,7 @@ def of_clipping(view: View) -> Iterator[Finding]:
         at_ends = held & np.isin(levels, [top for _, top in sides])
         if not sides or length[at_ends].sum() < THERE * length[held].sum():
             continue
-        if signal == view.name("x"):  # at rest at the end of its way
+        if signal == view.name("x"):  # at rest at the end of its travel
             continue
         k = int(np.argmax(np.where(at_ends, length, 0)))
         samples = int(length[at_ends].sum())
@@ -112,7 +114,7 @@ def of_clipping(view: View) -> Iterator[Finding]:
 
 
 def _verdict(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
-    """Whether the force itself was limited, or only what the sensor could show of it."""
+    """Return the severity: whether the force itself was limited, or only its measurement."""
     unsure = "the amplifier or the sensor was at its limit there"
     model = rough_model(view, curve=True) if signal == view.name("force") else None
     if model is None or view.steady is None:
@@ -127,8 +129,8 @@ def _verdict(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]
     most = float(np.quantile(passed, 0.9))
     if passed.mean() > MEAN * top and most > MOST * top:
         return "error", (
-            f"the motion asks for up to {most:.3g} {view.record.units[signal]} more, so it was not "
-            "the drive but its sensor that was at its limit"
+            f"the motion needs up to {most:.3g} {view.record.units[signal]} more, so its sensor "
+            "was at its limit, not the drive"
         )
     return "warning", unsure
 
@@ -136,17 +138,17 @@ def _verdict(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]
 Counts = NDArray[np.intp]
 
 FROZEN = 8
-"""Equal values in a row that a signal with noise does not have."""
+"""Number of consecutive equal values that a noisy signal does not have."""
 REPEATED = 0.02
-"""Share of equal neighbours up to which a signal counts as one that never repeats."""
+"""Share of equal neighbours below which a signal counts as never repeating."""
 LOST = 0.2
-"""Share of a record that may be frozen before nothing can come of it."""
+"""Share of a frozen record above which it is unusable."""
 JUMP = 8.0
-"""Step after a frozen stretch, over the usual largest one, that betrays it."""
+"""Step after a frozen interval, over the usual largest one, that counts as a jump."""
 
 
 def of_frozen(view: View) -> Iterator[Finding]:
-    """Stretches of equal values in signals that do not repeat elsewhere, or that end in a jump."""
+    """Find intervals of equal values in signals that do not repeat elsewhere or jump afterwards."""
     for signal, y in view.known():
         if y.size < 50 or np.ptp(y) == 0:
             continue
@@ -170,10 +172,10 @@ def of_frozen(view: View) -> Iterator[Finding]:
         after = f", then jumps by {steps[end]:.3g} {view.record.units[signal]}" if jumped else ""
         lost = length[k] > LOST * y.size and noisy
         fatal = (jumped and signal == view.name("x")) or (lost and signal in view.roles.values())
-        elsewhere = ", while it never repeats elsewhere" if noisy else ""
+        elsewhere = ", although it never repeats elsewhere" if noisy else ""
         text = (
             f"{signal} keeps the value {y[begin]:.6g} for {length[k]} samples from "
-            f"{view.at(begin)} on{after}{elsewhere}: the sensor or the recorder stood still."
+            f"{view.at(begin)} on{after}{elsewhere}: the sensor or the recorder was stuck."
         )
         yield view.finding("frozen", signal, text, "error" if fatal else "warning", begin, end)
 
@@ -181,7 +183,7 @@ def of_frozen(view: View) -> Iterator[Finding]:
 def _longest_that_jumps(
     y: Array, steps: Array, first: Counts, length: Counts, long: NDArray[np.bool_]
 ) -> tuple[int, bool]:
-    """The longest run of equal values after which the signal is somewhere else."""
+    """Return the longest run of equal values that ends in a jump, and whether there is one."""
     usual = float(np.quantile(steps, 0.995))
     best, found = 0, False
     for k in np.flatnonzero(long).tolist():
@@ -194,36 +196,36 @@ def _longest_that_jumps(
 
 
 JUMPED = 15.0
-"""Step over that which 99.5 % of all stay below, and ..."""
+"""Step over the 99.5 % quantile of all steps, and ..."""
 NEAR = 8.0
-"""... over the steps next to it: what moved fast before or after has not jumped."""
+"""... over the adjacent steps; excludes fast motion."""
 LEAST = 20
-"""Counts of an encoder below which nothing can be told."""
+"""Encoder counts below which jumps are not evaluated."""
 WHITE = 0.5
 """Correlation of neighbours below which a position is noise."""
 ALIKE = 0.05
-"""Relative spread of jumps that are a period."""
+"""Relative spread below which jumps are of one period."""
 FORCED = 5.0
-"""Step of the force, over that which 90 % stay below, that goes with a true jump."""
+"""Step of the force, over the 90 % quantile, that accompanies a true jump."""
 OFTEN = 6
-"""So many jumps of different sizes are stick-slip at a low sample rate rather than losses."""
+"""Number of jumps of different sizes that indicates stick-slip at a low sample rate."""
 
 
 def of_jumps(view: View) -> Iterator[Finding]:
-    """Wrapped positions and lost ones."""
+    """Find wrapped positions and lost counts."""
     x = view.signal("x")
     if x is None or view.record.t is None or x.size < 50 or np.ptp(x) <= LEAST * count_of(x):
         return
     lag = float(np.corrcoef(x[1:], x[:-1])[0, 1])
-    if lag < WHITE:  # noise jumps all the time
+    if lag < WHITE:  # noise always jumps
         return
     name, unit = view.name("x"), view.record.units[view.name("x")]
     steady = median_of_five(x)
     steps = np.diff(steady)
     size = np.abs(steps)
     usual = max(float(np.quantile(size, 0.995)), count_of(x))
-    beside = np.maximum(np.roll(size, 2), np.roll(size, -2))
-    far = np.flatnonzero((size > JUMPED * usual) & (size > NEAR * np.maximum(beside, usual)))
+    nearby = np.maximum(np.roll(size, 2), np.roll(size, -2))
+    far = np.flatnonzero((size > JUMPED * usual) & (size > NEAR * np.maximum(nearby, usual)))
     if not far.size:
         raw = np.abs(np.diff(x))  # a wrap of a fast drive: many jumps raise the usual step
         far = np.flatnonzero(raw > 0.5 * np.ptp(x))
@@ -245,7 +247,7 @@ def of_jumps(view: View) -> Iterator[Finding]:
         return
     pushed = _force_jumps(view, k)
     text = f"{name} jumps {far.size} time(s), most by {size[k]:.3g} {unit} at {view.at(k)}: " + (
-        "a motion too fast for the sample rate." if pushed else "a sensor that lost its place."
+        "a motion too fast for the sample rate." if pushed else "a sensor that lost its reference."
     )
     yield view.finding(
         "jump",
@@ -258,7 +260,7 @@ def of_jumps(view: View) -> Iterator[Finding]:
 
 
 def _force_jumps(view: View, k: int) -> bool:
-    """Whether the force jumps with the position: then the body did, as in a slip."""
+    """Return True if the force jumps with the position, as in a true slip."""
     force = view.signal("force")
     if force is None:
         return False
@@ -268,26 +270,26 @@ def _force_jumps(view: View, k: int) -> bool:
 
 
 def _period(x: Array, far: NDArray[np.intp]) -> float:
-    """The jumps plus what the position moved on meanwhile, as it did before and after."""
+    """Return the jumps plus the regular motion meanwhile, estimated from adjacent steps."""
     steps = np.diff(x)
     inner = far[(far > 4) & (far < steps.size - 5)]
     found: list[float] = []
     for k in inner.tolist():
         near = np.arange(k - 2, k + 3)
         at = int(near[np.argmax(np.abs(steps[near]))])
-        beside = float(np.median(np.abs(steps[[at - 2, at - 1, at + 1, at + 2]])))
-        found.append(abs(float(steps[at])) + beside)
+        nearby = float(np.median(np.abs(steps[[at - 2, at - 1, at + 1, at + 2]])))
+        found.append(abs(float(steps[at])) + nearby)
     return float(np.median(found)) if found else float(np.ptp(x))
 
 
 COARSE = 0.04
-"""Step of a force over its range that is told."""
+"""Step of a force over its range above which it is reported."""
 PER_SAMPLE = 0.5
-"""Counts per sample at a usual speed below which velocities are guesses."""
+"""Counts per sample at a usual speed below which velocities are inaccurate."""
 
 
 def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
-    """Forces of few levels, positions of few counts at the speeds of the record."""
+    """Find forces of few levels, and positions of few counts at the speeds of the record."""
     force = view.signal("force")
     if force is not None and np.ptp(force) > 0:
         usual = float(np.ptp(np.quantile(force, (0.01, 0.99))))
@@ -296,7 +298,7 @@ def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
             name = view.name("force")
             text = (
                 f"{name} has steps of {step:.3g} {view.record.units[name]}, {step / spread:.0%} of "
-                "its range: finer differences of friction cannot be told."
+                "its range: finer differences of friction are not resolved."
             )
             yield view.warning("resolution", name, text)
     x = view.signal("x")
@@ -310,7 +312,7 @@ def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
             name = view.name("x")
             text = (
                 f"{name} has counts of {count:.3g} {view.record.units[name]}, and a quarter of the "
-                f"motion makes less than {slow / count:.2g} of one per sample: velocities there "
-                "are averages over several."
+                f"motion is less than {slow / count:.2g} counts per sample: velocities there "
+                "are averages over several samples."
             )
             yield view.warning("resolution", name, text)

@@ -24,10 +24,10 @@ class Dataset:
 
     Attributes:
         records: at least one.
-        name: of all of them, for messages.
+        name: common name, for messages.
 
     Raises:
-        ValueError: no records, or some that turn and some that slide.
+        ValueError: no records, or both rotary and linear ones.
     """
 
     records: tuple[Record, ...]
@@ -63,33 +63,33 @@ class Dataset:
         points: bool = False,
         missing: Missing = "refuse",
     ) -> "Dataset":
-        """Records from files: CSV and other text, `.mat` up to version 7, `.npz`, `.npy`.
+        """Read records from files: CSV and other text, `.mat` up to version 7, `.npz`, `.npy`.
 
-        Text: comma, semicolon, tab or spaces; decimal commas where they do not separate; comment
+        Text: comma, semicolon, tab or spaces; decimal commas unless commas separate cells; comment
         lines; a header such as `t [s], x [mm], F [N]` or none; a row of units below it or none.
         MATLAB: variables, structs (nested; a vector of structs is several records), matrices.
 
-        A column becomes the channel t, x, v, a or force if its name is that or a usual other one
-        (time, q, pos, angle, vel, omega, torque, ...) and no second column could be meant; all
+        A column becomes the channel t, x, v, a or force if its name is the channel or a usual
+        alias (time, q, pos, angle, vel, omega, torque, ...) and no other column matches; all
         others keep their names. Every canonical channel needs a unit, from the file or the call;
-        numbers are SI afterwards. Columns that are not all numbers are left out, and whoever asks
-        for one is told why; for canonical channels they are an error.
+        numbers are SI afterwards. Columns with non-numeric cells are left out, and a later
+        request for one raises an error with the reason; for canonical channels they are errors.
 
         Args:
             paths: a file, a pattern such as "run*.csv", or a list of them.
             columns: channel -> column ({"x": "encoder [mm]"}), or the names of all columns in
                 their order (["t [ms]", "x", "-", "force"]; "-" leaves one out).
             units: "rad, N m" for canonical channels whose columns have no unit, or channel ->
-                unit ({"x": "mm", "theta_2": "deg"}), which overrules the file.
+                unit ({"x": "mm", "theta_2": "deg"}), which overrides the file.
             step: sample interval [s] of files without a time.
-            variable: struct, matrix or deeper part of a `.mat` or `.npz` file: "run(2).log".
+            variable: struct, matrix or nested part of a `.mat` or `.npz` file: "run(2).log".
             points: rows are points (v, F) of a friction curve; no time is needed.
             missing: "drop" leaves out rows in which a channel has no number (an empty cell, NaN)
-                and rows that repeat the one before, time and all; `resampled` then makes the
+                and rows that repeat the previous one, time included; `resampled` then makes the
                 intervals equal and cuts at long gaps.
 
         Raises:
-            ValueError: what cannot be used, with file, row and column; of several files all.
+            ValueError: unusable data, with file, row and column; for several files, all errors.
         """
         wanted = Wanted(columns, units, step, checks.flag("read: points", points), None, missing)
         found = read_records(paths, wanted, variable)
@@ -110,19 +110,19 @@ class Dataset:
         name: str = "data",
         **arrays: object,
     ) -> "Dataset":
-        """One record from arrays: `Dataset.of(t=t, x=x, force=force)`, a dict, a pandas frame.
+        """Make one record from arrays: `Dataset.of(t=t, x=x, force=force)`, a dict, a pandas frame.
 
-        Numbers are SI (m, N; `units="rad, N m"` where it turns) unless a name says more, such as
-        "x [mm]"; the columns of a frame need units as those of a file do.
+        Numbers are SI (m, N; `units="rad, N m"` if rotary) unless a name has a unit, such as
+        "x [mm]"; the columns of a frame need units, as in a file.
 
         Args:
-            frame: what holds the columns: a mapping or a frame.
+            frame: a mapping or a frame with the columns.
             units, columns, step, points, missing: as in `read`.
             name: of the record.
             arrays: further columns by name.
 
         Raises:
-            ValueError: columns that are no numbers or of different lengths, no time, no unit.
+            ValueError: non-numeric columns or columns of different lengths, no time, no unit.
         """
         checks.text("Dataset.of: name", name)
         raw, framed = columns_of(name, frame, arrays)
@@ -141,7 +141,7 @@ class Dataset:
         return self.records[index]
 
     def __add__(self, other: "Dataset") -> "Dataset":
-        """The records of both."""
+        """Return the records of both."""
         other = checks.kind("Dataset: +", other, Dataset, "a Dataset")
         return Dataset((*self.records, *other.records), f"{self.name} + {other.name}")
 
@@ -150,7 +150,7 @@ class Dataset:
 
     @property
     def rotary(self) -> bool:
-        """Whether the drive turns: its channels are in rad and N m."""
+        """True for a rotary drive, with channels in rad and N m."""
         return any(_turns(one) for one in self.records)
 
     @property
@@ -159,31 +159,31 @@ class Dataset:
         return sum(one.size for one in self.records)
 
     def each(self, change: Callable[[Record], Record]) -> "Dataset":
-        """The data with every record changed."""
+        """Apply a function to every record."""
         return Dataset(tuple(map(change, self.records)), self.name)
 
     def check(self, **roles: str) -> Findings:
-        """What is doubtful about the data, each with its place; printable.
+        """Check the data and return the findings, each with its place; printable.
 
-        An error means that no fit of these data as they are can be physics; a warning, that some
-        numbers cannot be told or are worse than they look. Every signal is searched for clipping,
-        spikes and frozen stretches; those with a part in the drive are held against each other:
-        sign and delay of force against motion, exchanged columns, standstill, one-way motion, too
-        little excitation, wraps, drift, units.
+        An error makes a physically meaningful fit impossible; a warning means that some numbers are
+        not identifiable or less accurate than they appear. Every signal is checked for clipping,
+        spikes and frozen intervals; signals with a part in the drive are compared with each other:
+        sign and delay of force against motion, exchanged columns, standstill, motion in one
+        direction, too little excitation, wraps, drift, units.
 
         Args:
-            roles: signals that are not called by their part: `check(x="theta", force="tau_1")`.
+            roles: signals whose names differ from their part: `check(x="theta", force="tau_1")`.
 
-        Limits: a force with a wrong gain, units that are wrong in a consistent way, a load that
-        changed between records leave no trace in the data alone.
+        Limits: a wrong gain of the force, consistently wrong units, or a load that changed between
+        records are not detectable from the data alone.
         """
         return check(self.name, self.records, roles)
 
     def between(self, begin: float, end: float) -> "Dataset":
-        """The samples of each record with begin <= t <= end [s]; records without any are left out.
+        """Return the samples with begin <= t <= end [s]; records without any are left out.
 
         Raises:
-            ValueError: no record has two samples there.
+            ValueError: no record has two samples in this interval.
         """
         begin, end = (checks.number("Dataset.between", at, unit="s") for at in (begin, end))
         held = [
@@ -194,32 +194,32 @@ class Dataset:
         )
 
     def thinned(self, every: int) -> "Dataset":
-        """Every `every`-th sample of each record; noise is not filtered before."""
+        """Return every n-th sample of each record, n = `every`, without prior filtering."""
         return self.each(lambda one: one.thinned(every))
 
     def renamed(self, names: Mapping[str, str]) -> "Dataset":
-        """The data with other names of signals: {"old": "new"}."""
+        """Return the data with other names of signals: {"old": "new"}."""
         return self.each(lambda one: one.renamed(names))
 
     def without_spikes(self) -> "Dataset":
-        """The data with samples far off their neighbours replaced by a line between those."""
+        """Return the data with spikes replaced by linear interpolation."""
         return self.each(without_spikes)
 
     def unwrapped(self, periods: Mapping[str, float]) -> "Dataset":
-        """The data with signals counted modulo a period counted through: {"x": 6.2832}."""
+        """Return the data with periodic signals unwrapped: {"x": 6.2832}."""
         return self.each(lambda one: unwrapped(one, periods))
 
     def scaled(
         self, factors: Mapping[str, float], units: Mapping[str, str] | None = None
     ) -> "Dataset":
-        """The data with signals times factors: {"force": -1}; `units` where they change."""
+        """Return the data with signals times factors: {"force": -1}; `units` if they change."""
         return self.each(lambda one: scaled(one, factors, units))
 
     def split(self, share: float = 0.5) -> "tuple[Dataset, Dataset]":
-        """The first `share` of the samples of each record, and the rest: to fit and to validate.
+        """Split each record into the first `share` of its samples and the rest, for validation.
 
         Raises:
-            ValueError: a share that leaves fewer than two samples on a side.
+            ValueError: a share that leaves fewer than two samples in a part.
         """
         where = f"data '{self.name}': split"
         share = checks.number(where, share, lower=0.0, upper=1.0)
@@ -237,7 +237,7 @@ class Dataset:
     def resampled(
         self, step: float | None = None, gap: Literal["split", "refuse"] = "split"
     ) -> "Dataset":
-        """The data at equal intervals; a record with gaps becomes one for each piece.
+        """Return the data at equal intervals; a record with gaps becomes one for each piece.
 
         See `identification.data.resample.resampled`.
         """
@@ -246,7 +246,7 @@ class Dataset:
         )
 
     def delayed(self, delays: Mapping[str, float]) -> "Dataset":
-        """The data with signals moved in time [s]: new(t) = old(t - delay), the ends cut."""
+        """Return the data with signals shifted in time [s]: new(t) = old(t - delay), ends cut."""
         return self.each(lambda one: delayed(one, delays))
 
     def merged(
@@ -256,18 +256,18 @@ class Dataset:
         shift: float | Literal["estimate"] = "estimate",
         drift: float | Literal["estimate"] = 0.0,
     ) -> "Dataset":
-        """Two recorders of one experiment as one, record by record, at the times of the first.
+        """Merge two recorders of one experiment, record by record, at the times of the first.
 
         See `identification.data.merge.merged`.
 
         Args:
-            other: as many records.
-            on: a quantity that both hold, by its name here and there: ("x", "x").
-            shift: what is added to the times of `other` [s].
-            drift: how much faster the clock of the first runs, relative.
+            other: the same number of records.
+            on: a quantity in both, by its names here and in `other`: ("x", "x").
+            shift: offset added to the times of `other` [s].
+            drift: relative excess speed of the clock of the first.
 
         Raises:
-            ValueError: other numbers of records, no common time, a delay that is not determined,
+            ValueError: different numbers of records, no common time, an undetermined delay,
                 clocks that drift.
         """
         other = checks.kind(f"data '{self.name}': merged", other, Dataset, "a Dataset")
@@ -299,7 +299,7 @@ def _name(names: Sequence[str]) -> str:
 
 
 def _turns(one: Record) -> bool | None:
-    """Whether a record is that of a turning drive; None where no canonical channel tells."""
+    """Return True for a rotary drive; None without a canonical channel."""
     for key, turning in (("x", "rad"), ("v", "rad/s"), ("force", "N m"), ("F", "N m")):
         if key in one.signals and one.units[key]:
             return one.units[key] == turning

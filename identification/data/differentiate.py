@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CERTAIN = 4.0
-"""Standard deviations of the velocity's noise within which it may be rest."""
+"""Standard deviations of the velocity's noise within which the velocity may be zero."""
 
 
 @final
@@ -43,8 +43,8 @@ class MotionSignals:
         name: of the record.
         t, x, v, a: time [s], filtered position [m], velocity [m/s], acceleration [m/s^2].
         force: measured force [N], as measured.
-        filter: what was used.
-        slow: samples at which the direction of motion is not certain.
+        filter: the filter used.
+        slow: samples with an uncertain direction of motion.
     """
 
     name: str
@@ -60,16 +60,16 @@ class MotionSignals:
 
     @cached_property
     def decimation(self) -> Decimation:
-        """The low pass that thins samples to equations."""
+        """Low-pass filter and decimation from samples to equations."""
         return Decimation(self.t.size, self.filter.decimation)
 
     @cached_property
     def kept(self) -> NDArray[np.int64]:
-        """Rows of the decimation that are used: those without a slow sample in their window."""
+        """Rows of the decimation without a slow sample in their window."""
         return np.flatnonzero(~self.decimation.touched(self.slow))
 
     def equations(self, signal: Array) -> Array:
-        """`signal` thinned to the equations in use, shape (rows,)."""
+        """Return `signal` decimated to the equations in use, shape (rows,)."""
         return self.decimation(signal)[self.kept]
 
     @property
@@ -79,20 +79,20 @@ class MotionSignals:
 
 
 def derivatives(
-    x: Array | None, v: Array | None, step: float, filter: Filter, told: Velocity
+    x: Array | None, v: Array | None, step: float, filter: Filter, mixer: Velocity
 ) -> tuple[Array, Array, Array]:
-    """Filtered position, velocity and acceleration, each shape (n,).
+    """Return filtered position, velocity and acceleration, each shape (n,).
 
     Central differences of the filtered position; the acceleration is its second difference over
     two steps, whose gain falls short of one by (w h)^2 / 12 only. A measured velocity is filtered
-    and differentiated once. Of two, velocity and acceleration are mixed as `told` says.
+    and differentiated once. Of two, velocity and acceleration are combined by `mixer`.
 
     Args:
-        x: position, samples; None: it is not measured (zeros are returned).
+        x: position, samples; None: not measured (zeros are returned).
         v: measured velocity, or None.
         step: sample interval [s].
         filter: cut-off and order.
-        told: `Velocity.of(x, v, step)`.
+        mixer: `Velocity.of(x, v, step)`.
     """
     one: list[Array] = []
     other: list[Array] = []
@@ -106,17 +106,17 @@ def derivatives(
         v = lowpass(v, filter.cutoff, step, filter.order)
         other = [v, central_difference(v, step)]
     if one and other:
-        one = [told.mixed(by_x, by_v) for by_x, by_v in zip(one, other, strict=True)]
+        one = [mixer.mixed(by_x, by_v) for by_x, by_v in zip(one, other, strict=True)]
     velocity, acceleration = one or other
     return np.zeros_like(velocity) if x is None else x, velocity, acceleration
 
 
 def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
-    """Samples at which a static law cannot be asked for its force, shape (n,).
+    """Return a mask of samples with an undetermined force of a static law, shape (n,).
 
-    Those where the velocity changes sign or cannot be told from rest (four standard deviations of
-    its `noise`), and those that the low pass mixes with them: one half of 1 / cutoff around. With
-    `filter.v_min` given, those slower than that.
+    These are samples where the velocity changes sign or is not distinguishable from rest (four
+    standard deviations of its `noise`), and those that the low-pass filter mixes with them: half of
+    1 / cutoff around. With `filter.v_min`, samples slower than it.
     """
     if filter.v_min is not None:
         return np.abs(v) < filter.v_min
@@ -129,10 +129,10 @@ def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
 
 
 def filter_of(record: Record, force: str = "force", x: str = "x", v: str | None = None) -> Filter:
-    """The filter chosen from force, position and velocity of a record; see `differentiate`."""
+    """Choose the filter from force, position and velocity of a record; see `differentiate`."""
     step, (position, velocity) = record.uniform().step, _measured(record, x, v)
-    told = Velocity.of(position, velocity, step)
-    return choose_filter(record[force], step, [told.band(position, velocity, step)])
+    mixer = Velocity.of(position, velocity, step)
+    return choose_filter(record[force], step, [mixer.band(position, velocity, step)])
 
 
 def _measured(record: Record, x: str, v: str | None) -> tuple[Array, Array | None]:
@@ -148,14 +148,14 @@ def differentiate(
     x: str = "x",
     v: str | None = None,
 ) -> MotionSignals:
-    """Filtered position, velocity and acceleration of a record of a drive.
+    """Return filtered position, velocity and acceleration of a record of a drive.
 
     Args:
         record: equally spaced samples.
         filter: cut-off and decimation; `filter_of(record)` if none is given.
         force, x: names of the channels.
-        v: channel of a measured velocity, mixed with that of the position as `Velocity` says;
-            None: "v" where the record has it.
+        v: channel of a measured velocity, combined with that of the position by `Velocity`;
+            None: "v" if the record has it.
 
     Raises:
         ValueError: unequal intervals, a cut-off above the Nyquist frequency, too short a record.
@@ -163,9 +163,9 @@ def differentiate(
     step = record.uniform().step
     chosen = filter or filter_of(record, force, x, v)
     measured = _measured(record, x, v)
-    told = Velocity.of(*measured, step)
-    motion = derivatives(*measured, step, chosen, told)
-    slow = uncertain(motion[1], told.deviation(chosen, step), step, chosen)
+    mixer = Velocity.of(*measured, step)
+    motion = derivatives(*measured, step, chosen, mixer)
+    slow = uncertain(motion[1], mixer.deviation(chosen, step), step, chosen)
     cut = chosen.trim(step)
     inside = slice(cut, max(cut, record.size - cut))
     x_, v_, a_ = (signal[inside] for signal in motion)
@@ -190,9 +190,9 @@ def differentiate(
 
 
 SMOOTHINGS = 2.0
-"""Cut-off of the velocity that is looked at, over 1 / (shortest plateau)."""
+"""Cut-off of the evaluated velocity, over 1 / (shortest plateau)."""
 REST = 1e-3
-"""Speed over the largest one below which a stretch is rest and no point of a curve."""
+"""Speed over the largest one below which an interval is rest and not a point of a curve."""
 
 
 def plateaus(
@@ -205,25 +205,25 @@ def plateaus(
     change: float = 0.05,
     settle: float = 0.2,
 ) -> Dataset:
-    """Means of velocity and force over stretches of constant velocity, as points for `Points`.
+    """Return means of velocity and force over intervals of constant velocity, for `Points`.
 
-    A staircase of speeds, a triangle of positions: wherever the smoothed velocity changes by less
-    than the share `change` in the time `shortest`, for at least that time, is a plateau. Its first
-    part, of the share `settle`, is left out. Rest is none. There the acceleration is nothing, so
-    that the mean force is friction and what is constant, such as weight.
+    Suitable records are a staircase of speeds or a triangle of positions. A plateau is an interval
+    of at least `shortest` in which the smoothed velocity changes by less than the share `change`
+    in that time. Its first part, of the share `settle`, is left out; rest is excluded. There the
+    acceleration is zero, so the mean force is friction plus constant forces such as weight.
 
     Args:
         data: equally spaced records; each gives a record of points.
         force: channel of the driving force or torque.
-        v: channel of the velocity; None: "v" where there is one, else the slope of `x`.
+        v: channel of the velocity; None: "v" if there is one, else the slope of `x`.
         x: channel of the position.
         shortest: duration [s].
         change: largest relative change of velocity.
         settle: share of a plateau, 0 <= settle < 1.
 
     Returns:
-        Channels v, F, `n` (samples behind a mean, for `Points(weight="n")`) and `spread` (standard
-        deviation of the force there); mean times as `t_mean`.
+        Channels v, F, `n` (samples per mean, for `Points(weight="n")`) and `spread` (standard
+        deviation of the force); mean times as `t_mean`.
 
     Raises:
         ValueError: no record has a plateau; unequal intervals; arguments out of range.
@@ -266,7 +266,7 @@ def _slope(record: Record, x: str) -> Array:
 
 
 def _stretches(v: Array, step: float, shortest: float, change: float) -> list[tuple[int, int]]:
-    """Begin and end of each plateau."""
+    """Return begin and end of each plateau."""
     cutoff = min(SMOOTHINGS / shortest, 0.45 / step)
     smooth = lowpass(v, cutoff, step)
     steady = np.abs(central_difference(smooth, step)) * shortest < change * np.abs(smooth)
@@ -275,18 +275,18 @@ def _stretches(v: Array, step: float, shortest: float, change: float) -> list[tu
 
 
 RANK = 1e-7
-"""Smallest singular value of the scaled regressors, over the largest, that counts."""
+"""Smallest singular value of the scaled regressors that counts, relative to the largest."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Estimates by name with standard errors, and the force error they leave.
+    """Estimates by name with standard errors, and the remaining force error.
 
     Attributes:
         values: m [kg], F_v [N s/m], F_c [N], offset [N]; with directions F_v_pos, F_v_neg, ...
-        standard_errors: of the same names, for residuals that are white after decimation; None
-            where the data cannot tell the value.
+        standard_errors: of the same names, for white residuals after decimation; None for values
+            that are not identifiable.
         force_relative: norm of the force error over norm of the force [%].
         force_rms: root mean square force error [N].
     """
@@ -300,14 +300,14 @@ class LinearFit:
 def linear_regression(
     signals: MotionSignals | Sequence[MotionSignals], directions: bool = False
 ) -> LinearFit:
-    """Least squares on the decimated equations of one record or of several.
+    """Fit by least squares on the decimated equations of one record or of several.
 
     Args:
         signals: differentiated records.
         directions: separate F_v and F_c for the two directions, and no offset.
 
-    A drive that moves one way only cannot tell Coulomb friction from an offset: the smallest values
-    that fit are returned, without standard errors.
+    A drive that moves in one direction only does not separate Coulomb friction from an offset: the
+    minimum-norm values are returned, without standard errors.
     """
     records = [signals] if isinstance(signals, MotionSignals) else list(signals)
     parts = [_regressors(record, directions) for record in records]
@@ -336,12 +336,12 @@ def _regressors(signals: MotionSignals, directions: bool) -> dict[str, Array]:
 
 
 def _standard_errors(X: Array, error: Array) -> list[float | None]:
-    """Of the columns that the others do not make up."""
+    """Return standard errors; None for columns that are linear combinations of others."""
     size = np.linalg.norm(X, axis=0)
     scale = np.where(size > 0, size, 1.0)
     _, s, Vt = np.linalg.svd(X / scale, full_matrices=False)
     kept = s > RANK * max(s[0], 1e-300)
-    lost = np.sqrt(np.sum(Vt[~kept] ** 2, axis=0)) > 1e-3
+    undetermined = np.sqrt(np.sum(Vt[~kept] ** 2, axis=0)) > 1e-3
     spread = np.sqrt(np.sum((Vt[kept] / s[kept, None]) ** 2, axis=0)) / scale
     noise = np.sqrt(error @ error / max(1, error.size - X.shape[1]))
-    return [None if gone else float(noise * e) for gone, e in zip(lost, spread, strict=True)]
+    return [None if u else float(noise * e) for u, e in zip(undetermined, spread, strict=True)]

@@ -1,7 +1,7 @@
 """Zero-phase filtering, differentiation and parallel decimation of sampled signals.
 
-What identification by the inverse model needs: velocity and acceleration from position without a
-phase shift, and one and the same low pass on the measured and on the predicted force.
+Identification by the inverse model needs velocity and acceleration from position without a phase
+shift, and the same low-pass filter on the measured and on the predicted force.
 Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
 """
 
@@ -19,26 +19,26 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 LOBES = 3
-"""Zero crossings of the decimation filter on each side: few, so that few rows touch a reversal."""
+"""Zero crossings of the decimation filter on each side: few, so few rows include a reversal."""
 PASS = 0.9
 """Its cut-off (-6 dB) over the Nyquist frequency after decimation."""
 ABOVE = 4.0
-"""Power over that of the noise from which on a motion is known."""
+"""Power over the noise power above which a motion is significant."""
 
 
 @final
 @dataclass(frozen=True)
 class Filter:
-    """How positions are smoothed and equations thinned out.
+    """Smoothing of positions and decimation of equations.
 
     Attributes:
-        cutoff: cut-off of the low pass on position (and measured velocity) [Hz]; the gain there
-            is 1/2, since the filter runs forward and backward.
-        decimation: every this many samples one equation, after a low pass on all its terms.
+        cutoff: cut-off of the low-pass filter on position (and measured velocity) [Hz]; the gain
+            there is 1/2, since the filter runs forward and backward.
+        decimation: samples per equation, after a low-pass filter on all its terms.
         order: order of the Butterworth filter.
-        v_min: equations of a static law that touch samples slower than this are left out [m/s or
-            rad/s]. Filtering blurs the switch of friction at standstill, which a static law does
-            not describe anyway. None: reversals, and what cannot be told from rest, by the data.
+        v_min: equations of a static law that include samples slower than this are omitted [m/s or
+            rad/s]. Filtering blurs the switch of friction at standstill, which a static law
+            does not describe. None: reversals and samples not distinguishable from rest.
     """
 
     cutoff: float
@@ -57,22 +57,22 @@ class Filter:
             object.__setattr__(self, "v_min", v_min)
 
     def trim(self, step: float) -> int:
-        """Samples to leave out at each end, where reflection and differences are not the data."""
+        """Return the number of samples to omit at each end, where reflection affects the result."""
         return ceil(5.0 / (self.cutoff * step) - 1e-9)
 
     def gain(self, frequency: Array, step: float) -> Array:
-        """|H|^2 of the low pass at frequencies below 1/2, cycles per sample; see `lowpass`."""
+        """Return |H|^2 at frequencies below 1/2, cycles per sample; see `lowpass`."""
         ratio = np.tan(np.pi * frequency) / np.tan(np.pi * self.cutoff * step)
         return 1 / (1 + ratio ** (2 * self.order))
 
 
 def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
-    """Butterworth low pass applied forward and backward: no phase, gain |H|^2.
+    """Apply a Butterworth low-pass filter forward and backward: no phase, gain |H|^2.
 
         |H|^2 = 1 / (1 + (tan(pi f h) / tan(pi f_c h))^(2 order))
 
     which is `filtfilt` of the bilinear Butterworth filter. The ends are continued by odd
-    reflection of what is left after subtracting the straight line from end to end.
+    reflection of the signal after subtracting the straight line from end to end.
 
     Args:
         signal: samples, shape (n,).
@@ -98,19 +98,19 @@ def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
 
 
 def central_difference(signal: Array, step: float) -> Array:
-    """First derivative, second order inside and one-sided at the two ends."""
+    """Return the first derivative, of second order inside and one-sided at the two ends."""
     return np.gradient(signal, step)
 
 
 @final
 @dataclass(frozen=True)
 class Decimation:
-    """Linear low pass and thinning of `samples` values to `rows`, without phase shift.
+    """Linear low-pass filter and decimation of `samples` values to `rows`, without phase shift.
 
         y = D u,   a sinc filter of 3 lobes under a Hamming window, cut-off 0.9 Nyquist / factor
 
-    Only rows whose window lies inside the data are kept. As D is linear it acts alike on measured
-    force, acceleration and any law, which is what makes the regression unbiased.
+    Only rows whose window lies inside the data are kept. As D is linear it acts equally on measured
+    force, acceleration and any law, which makes the regression unbiased.
     """
 
     samples: int
@@ -127,35 +127,35 @@ class Decimation:
 
     @property
     def rows(self) -> int:
-        """Number of values left; zero when the window is longer than the data."""
+        """Number of remaining values; zero if the window is longer than the data."""
         return max(0, (self.samples - self.taps.size) // self.factor + 1)
 
     def centres(self, samples: NDArray[Any]) -> NDArray[Any]:
-        """The samples in the middle of the rows, shape (rows,)."""
+        """Return the samples in the middle of the rows, shape (rows,)."""
         half = self.taps.size // 2
         return samples[half : half + self.rows * self.factor : self.factor]
 
     def __call__(self, signal: Array) -> Array:
-        """D applied to `signal`, shape (samples,)."""
+        """Return D applied to `signal`, shape (samples,)."""
         return np.convolve(signal, self.taps, mode="valid")[:: self.factor]
 
     def columns(self, signals: Array) -> Array:
-        """D applied to each column of `signals`, shape (samples, k); (rows, k)."""
+        """Return D applied to each column of `signals`, (samples, k) -> (rows, k)."""
         if self.factor == 1:
             return signals
         windows = np.lib.stride_tricks.sliding_window_view(signals, self.taps.size, axis=0)
         return windows[:: self.factor] @ self.taps
 
     def touched(self, samples: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Rows with any of `samples` inside their windows, shape (rows,)."""
+        """Return a mask of rows with any of `samples` inside their windows, shape (rows,)."""
         return np.convolve(samples, np.ones(self.taps.size), mode="valid")[:: self.factor] > 0.5
 
 
 def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
-    """Frequency [Hz] below which `share` of the variance of `force` lies, white noise apart.
+    """Return the frequency [Hz] below which `share` of the variance of `force` lies, without noise.
 
-    The level of the noise is taken from the upper half of the spectrum (a median, so that lines
-    do not count; the power of white noise has the median ln 2 times its mean).
+    The level of the white noise is estimated from the upper half of the spectrum by a median, which
+    ignores lines; the power of white noise has the median ln 2 times its mean.
     """
     power = np.abs(np.fft.rfft(force - force.mean())) ** 2
     frequency = np.fft.rfftfreq(force.size, step)
@@ -165,37 +165,37 @@ def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
 
 
 def spectrum(signal: Array) -> Array:
-    """Power of a signal under a Hann window; that of white noise is its variance, shape (n//2+1,).
+    """Return the power under a Hann window; for white noise its variance, shape (n//2+1,).
 
-    For a signal that ends elsewhere than it began take `without_line` of it.
+    If a signal ends at another value than it starts, pass `without_line` of it.
     """
     return np.abs(np.fft.rfft(signal * np.hanning(signal.size))) ** 2 / (0.375 * signal.size)
 
 
 def without_line(signal: Array) -> Array:
-    """A signal less the straight line from its first to its last sample."""
+    """Return a signal minus the straight line from its first to its last sample."""
     return signal - np.linspace(signal[0], signal[-1], signal.size)
 
 
 def noise_level(power: Array) -> float:
-    """Power of the white noise in a spectrum, from its upper half, where no motion is.
+    """Return the power of the white noise in a spectrum, from its upper half, without motion.
 
-    By the median, so that lines do not count: that of white noise is ln 2 times the mean.
+    By the median, which ignores lines; for white noise it is ln 2 times the mean.
     """
     return float(np.median(power[power.size // 2 :])) / float(np.log(2))
 
 
 def position_band(x: Array, step: float) -> float:
-    """Frequency [Hz] from which on the motion does not stand out of the noise of its position.
+    """Return the frequency [Hz] above which the noise of the position exceeds its motion.
 
-    Its level is that of the upper half of the spectrum. Beyond it an acceleration is noise.
+    The noise level is that of the upper half of the spectrum. Above it an acceleration is noise.
     """
     power = spectrum(without_line(x))
     return band_above(power, np.full(power.size, noise_level(power)), step)
 
 
 def band_above(power: Array, noise: Array, step: float) -> float:
-    """Where a spectrum, averaged over 1 Hz, is for the last time `ABOVE` times its noise [Hz]."""
+    """Return the highest frequency [Hz] at which the 1 Hz mean exceeds `ABOVE` times the noise."""
     samples = 2 * (power.size - 1)
     frequency = np.linspace(0.0, 0.5 / step, power.size)
     width = min(max(9, 2 * round(0.5 * samples * step) + 1), power.size)
@@ -207,14 +207,14 @@ def band_above(power: Array, noise: Array, step: float) -> float:
 def choose_filter(
     force: Array, step: float, bands: Sequence[float] = (), rows: int = 100
 ) -> Filter:
-    """A filter from the data: the bandwidth f_b of the force decides, and f_a of the motion.
+    """Choose a filter from the data by the bandwidths f_b of the force and f_a of the motion.
 
         cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
 
     f_b is rounded to one digit. The factors are those of the EMPS reference (there f_b = 20 Hz by
-    hand). f_a is the median of `bands`, up to which each coordinate is known: f_b is at most f_a,
-    and the cut-off of the decimation, 0.9 Nyquist / decimation, too, since noise in the
-    acceleration lowers the mass. The decimation leaves at least `rows` equations where it can.
+    hand). f_a is the median of `bands`, the significant bandwidths of the coordinates: f_b is at
+    most f_a, and so is the cut-off of the decimation, 0.9 Nyquist / decimation, since noise in the
+    acceleration lowers the mass. The decimation leaves at least `rows` equations if possible.
     """
     nyquist = 0.5 / step
     known = float(np.median([*bands] or [nyquist]))
@@ -227,7 +227,7 @@ def choose_filter(
 
 
 WIDTH = 99
-"""Fewest neighbours over which a spectrum is averaged: a level is then sure within an eighth."""
+"""Fewest neighbours over which a spectrum is averaged: an accuracy of a level of one eighth."""
 SURE = 2.0
 """Factor by which two averaged levels must differ to count as different."""
 
@@ -235,26 +235,26 @@ SURE = 2.0
 @final
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """Two measurements of one velocity, mixed at each frequency by their noise.
+    """Two measurements of one velocity, combined at each frequency by their noise.
 
         V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = E_x E_v / (E_x + E_v)
 
-    which has the least noise of all mixtures and leaves the motion as it is. E_x is white noise of
-    the position under the central difference s = sin(w h) / h, and what that falls short:
+    has the least noise of all unbiased combinations. E_x is white noise of the position under the
+    central difference s = sin(w h) / h, plus the bias of this difference:
 
         E_x = S_x s^2 + (1 - s / w)^2 |V_v|^2
 
-    E_v is the white noise S_v of the measured velocity, at least. Where |V_v - V_x|^2 exceeds E_x
-    clearly, the excess is laid on the velocity channel: its scale, delay, drift or filter. Where it
-    falls clearly below, both share their noise (a velocity that was made from the position), and
-    E_v is not below E_x less it.
+    E_v is at least the white noise S_v of the measured velocity. If |V_v - V_x|^2 clearly exceeds
+    E_x, the excess is attributed to the velocity channel: its scale, delay, drift or filter. If it
+    is clearly lower, both share their noise (a velocity derived from the position), and E_v is at
+    least the difference.
 
     Attributes:
         frequency: of the spectra, cycles per sample, shape (k,).
         weight: W of the measured velocity; 0 without one, 1 without a position.
         noise: E [(m/s)^2 per sample]; white noise of variance e^2 has E = e^2.
 
-    Limit: noise levels are those of the upper half of the spectra, white below.
+    Limit: noise levels are those of the upper half of the spectra, assumed white below.
     """
 
     frequency: Array
@@ -263,10 +263,10 @@ class Velocity:
 
     @staticmethod
     def of(x: Array | None, v: Array | None, step: float) -> "Velocity":
-        """From the samples of position and velocity, one of which may be missing.
+        """Compute it from the samples of position and velocity, one of which may be missing.
 
         Raises:
-            ValueError: neither.
+            ValueError: both are missing.
         """
         known = v if x is None else x
         if known is None:
@@ -280,8 +280,8 @@ class Velocity:
         of_v = np.full(s.size, noise_level(measured))
         if x is None:
             return Velocity(frequency, np.ones(s.size), of_v)
-        lost = 1 - np.sinc(2 * frequency)
-        of_x = _averaged(of_x + lost**2 * measured, step)
+        deficit = 1 - np.sinc(2 * frequency)
+        of_x = _averaged(of_x + deficit**2 * measured, step)
         apart = _averaged(spectrum(v - central_difference(x, step)), step)
         differ = (apart > SURE * of_x) | (SURE * apart < of_x)
         of_v = np.maximum(of_v, np.where(differ, np.abs(apart - of_x), 0.0))
@@ -290,22 +290,22 @@ class Velocity:
         return Velocity(frequency, weight, weight * of_v)
 
     def mixed(self, of_x: Array, of_v: Array) -> Array:
-        """A signal by way of the position and by way of the velocity, each shape (n,), as one."""
+        """Combine a signal derived from the position and one from the velocity, each (n,)."""
         apart = of_v - of_x
         periodic = np.concatenate([apart, apart[-2:0:-1]])
         weight = np.interp(np.fft.rfftfreq(periodic.size), self.frequency, self.weight)
         return of_x + np.fft.irfft(np.fft.rfft(periodic) * weight, periodic.size)[: apart.size]
 
     def deviation(self, filter: Filter, step: float) -> float:
-        """Standard deviation of the noise after the low pass of `filter` [m/s]."""
+        """Return the standard deviation of the noise after the low-pass `filter` [m/s]."""
         inside = slice(1, -1)
         gain = filter.gain(self.frequency[inside], step)
         return float(np.sqrt(np.mean(gain**2 * self.noise[inside])))
 
     def band(self, x: Array | None, v: Array | None, step: float) -> float:
-        """Frequency [Hz] up to which the motion stands out of its noise; see `position_band`.
+        """Return the frequency [Hz] up to which the motion exceeds its noise; see `position_band`.
 
-        With both measured it is not below that of the position alone.
+        If both are measured, it is at least that of the position alone.
         """
         if x is None or v is None:
             known = v if x is None else x
@@ -316,7 +316,7 @@ class Velocity:
 
 
 def _averaged(power: Array, step: float) -> Array:
-    """A spectrum averaged over 1 Hz or `WIDTH` neighbours, whichever is wider."""
+    """Return a spectrum averaged over 1 Hz or `WIDTH` neighbours, whichever is wider."""
     samples = 2 * (power.size - 1)
     width = min(max(WIDTH, 2 * round(0.5 * samples * step) + 1), power.size)
     ones = np.ones(width)

@@ -1,4 +1,4 @@
-"""Doubts about data, each with its place, and the view of a record that the checks share."""
+"""Findings of the checks, each with its place, and the view of a record that the checks share."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ Severity = Literal["error", "warning"]
 @final
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is doubtful, or that no physics can come of.
+    """A warning or error in the data.
 
     Attributes:
         kind: one word, such as "clipping".
         record: number of the record.
-        signal: where it is seen; "" for the record as a whole.
-        sentence: what it is, where, and what to do.
-        begin, end: first and last time [s]; of points their numbers.
-        severity: "error" where no fit of these data can be physics, else "warning".
+        signal: affected signal; "" for the record as a whole.
+        sentence: description, place and remedy.
+        begin, end: first and last time [s]; for points their indices.
+        severity: "error" if no fit of these data can be physically meaningful, else "warning".
     """
 
     kind: str
@@ -37,14 +37,14 @@ class Finding:
     severity: Severity
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields by name, ready for JSON."""
+        """Return the fields by name, ready for JSON."""
         return dict(self.__dict__)
 
 
 @final
 @dataclass(frozen=True)
 class Findings:
-    """All findings of some data, errors first.
+    """Findings of a data set, errors first.
 
     Attributes:
         items: the findings.
@@ -67,29 +67,29 @@ class Findings:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """Those that no physics can come of."""
+        """Findings that make a physically meaningful fit impossible."""
         return tuple(f for f in self.items if f.severity == "error")
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """Doubtful ones, which a fit says and goes on."""
+        """Findings that a fit reports before it continues."""
         return tuple(f for f in self.items if f.severity == "warning")
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds that occur, each once."""
+        """Types of the findings, each once."""
         return tuple(dict.fromkeys(f.kind for f in self.items))
 
     @property
     def text(self) -> str:
-        """A line a finding, errors first."""
+        """Text with one line per finding, errors first."""
         if not self.items:
-            return f"{self.name}: nothing doubtful found"
+            return f"{self.name}: no problems found"
         lines = [f"  {f.severity}: {self._record(f)}{f.sentence}" for f in self.items]
         return "\n".join([f"{self.name}:", *lines])
 
     def _record(self, finding: Finding) -> str:
-        """The record of a finding, where there are several."""
+        """Return the record of a finding, if there are several."""
         several = len(self.records) > 1
         return f"{self.records[finding.record]}: " if several else ""
 
@@ -105,11 +105,11 @@ ROLES = ("x", "v", "a", "force")
 @final
 @dataclass(frozen=True, eq=False)
 class View:
-    """One record under check.
+    """A record under check.
 
     Attributes:
-        record: itself.
-        number: of it in the data.
+        record: the record.
+        number: its index in the data.
         roles: part in the drive ("x", "v", "a", "force") -> name of its signal.
     """
 
@@ -119,7 +119,7 @@ class View:
 
     @classmethod
     def of(cls, record: Record, number: int, roles: Mapping[str, str]) -> "View":
-        """The view of a record; `roles` names signals that are not called by their part."""
+        """Return the view of a record; `roles` names signals whose names differ from their part."""
         named = checks.named("check", roles, ROLES)
         given = {role: name for role, name in named.items() if role != name or name in record}
         found = {role: role for role in ROLES if role in record.signals}
@@ -127,22 +127,22 @@ class View:
         return cls(record, number, found)
 
     def signal(self, role: str) -> Array | None:
-        """The signal that plays a part, if there is one."""
+        """Return the signal of a part, if there is one."""
         return self.record.signals[self.roles[role]] if role in self.roles else None
 
     def known(self) -> Iterator[tuple[str, Array]]:
-        """Signals with a part or a unit; others may be anything, such as predictions of a model."""
+        """Yield the signals with a part or a unit; others may be predictions of a model."""
         for name, values in self.record.signals.items():
             if self.record.units[name] or name in self.roles.values():
                 yield name, values
 
     def name(self, role: str) -> str:
-        """What the signal of a part is called."""
+        """Return the name of the signal of a part."""
         return self.roles.get(role, role)
 
     @cached_property
     def steady(self) -> Record | None:
-        """The longest piece without a gap, at equal intervals; None if it is too short."""
+        """Longest piece without a gap, at equal intervals; None if it is too short."""
         record = self.record
         if record.t is None or record.size < 20:
             return None
@@ -165,7 +165,7 @@ class View:
         begin: int | None = None,
         end: int | None = None,
     ) -> Finding:
-        """A finding at the samples `begin` to `end`; without them it holds throughout."""
+        """Return a finding at the samples `begin` to `end`, by default the whole record."""
         first = 0 if begin is None else begin
         last = (self.record.size - 1 if begin is None else begin) if end is None else end
         t = self.record.t
@@ -180,7 +180,7 @@ class View:
         begin: int | None = None,
         end: int | None = None,
     ) -> Finding:
-        """A finding after which no fit of these data can be physics."""
+        """Return a finding that makes a physically meaningful fit impossible."""
         return self.finding(kind, signal, sentence, "error", begin, end)
 
     def warning(
@@ -191,24 +191,24 @@ class View:
         begin: int | None = None,
         end: int | None = None,
     ) -> Finding:
-        """A finding that leaves numbers doubtful."""
+        """Return a finding that makes numbers doubtful."""
         return self.finding(kind, signal, sentence, "warning", begin, end)
 
     def at(self, sample: int) -> str:
-        """A place in words: its time and its row."""
+        """Return a place as text: its time and its row."""
         t = self.record.t
         place = self.record.place(sample)
         return place if t is None else f"t = {t[sample]:.6g} s ({place})"
 
 
 def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First samples and lengths of the runs of equal values that make up a signal."""
+    """Return first samples and lengths of the runs of equal values of a signal."""
     first = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0) + 1])
     return first, np.diff(np.concatenate([first, [y.size]]))
 
 
 def count_of(y: Array) -> float:
-    """The smallest step between values of a signal; 0 where it has hundreds of them and no grid."""
+    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid."""
     levels = np.unique(y)
     if levels.size < 2 or levels.size > 0.5 * y.size:
         return 0.0

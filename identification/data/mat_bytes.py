@@ -1,4 +1,4 @@
-"""MATLAB files of level 4 and 5 (versions 4 to 7) as arrays: what damaged bytes cannot crash.
+"""Reader of MATLAB files of level 4 and 5 (versions 4 to 7), safe for damaged files.
 
 A level 5 file is a header and elements, each a tag (type, bytes) with its data; a matrix is an
 element of elements: flags, dimensions, name, numbers; of a struct its fields, of a cell array its
@@ -40,25 +40,25 @@ CLASSES = {
     FUNCTION: "a function",
     OPAQUE: "an object (a table or time series): save its columns as vectors",
 }
-"""Kinds of matrices that hold no numbers for us, in words."""
+"""Names of matrix types that are not read as numbers."""
 HEADER, OLD_HEADER = 128, 20
 HDF5 = b"\x89HDF"
-"""How a file of version 7.3 without a MATLAB header begins."""
+"""First bytes of a file of version 7.3 without a MATLAB header."""
 LARGEST = 2**29
-"""Bytes that a compressed element may unfold to."""
+"""Largest size of an uncompressed element [bytes]."""
 DEEPEST = 20
-"""Structs within structs."""
+"""Largest nesting depth of structs."""
 
 Node = Any
-"""Numbers (array), a text or what else it is in words (str), a struct (dict), cells (list)."""
+"""Numbers (array), a text or a description (str), a struct (dict), cells (list)."""
 
 
 def variables(content: bytes) -> dict[str, Node]:
-    """Variables by name.
+    """Return the variables by name.
 
     Raises:
         NotImplementedError: a file of version 7.3, which is HDF5.
-        ValueError: no MATLAB file, or a damaged one.
+        ValueError: not a MATLAB file, or a damaged one.
     """
     if content.startswith(HDF5):
         raise NotImplementedError
@@ -68,7 +68,7 @@ def variables(content: bytes) -> dict[str, Node]:
             raise NotImplementedError
         return dict(_level_5(content[HEADER:], order))
     if 0 not in content[:4]:
-        raise ValueError("the first bytes are those of no such file")
+        raise ValueError("the first bytes are not those of such a file")
     return dict(_level_4(content))
 
 
@@ -86,7 +86,7 @@ def _unfolded(data: bytes) -> bytes:
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """Type and data of the elements, one after the other."""
+    """Yield type and data of the elements."""
     at = 0
     while at < len(data):
         if at + 8 > len(data):
@@ -96,7 +96,7 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
         start = at + (4 if short else 8)
         kind, size = (kind & 0xFFFF, short) if short else (kind, size)
         if start + size > len(data) or (short and size > 4):
-            raise ValueError("an element is longer than what is left of it")
+            raise ValueError("an element is longer than the rest of the file")
         yield kind, data[start : start + size]
         at = at + 8 if short else start + size
         if kind != COMPRESSED:
@@ -109,7 +109,7 @@ def _matrix(data: bytes, order: str, depth: int = 0) -> tuple[str, Node]:
         return "", np.zeros((0, 0))
     flags = _numbers(*parts[0], order)
     if not flags.size or flags.dtype.kind not in "iu":
-        raise ValueError("a variable does not say what it is")
+        raise ValueError("a variable has no type")
     kind = int(flags[0]) & 0xFF
     if kind == OPAQUE:  # names come first, dimensions never
         return (parts[1][1].decode("latin-1") if len(parts) > 1 else ""), CLASSES[kind]
@@ -133,7 +133,7 @@ def _matrix(data: bytes, order: str, depth: int = 0) -> tuple[str, Node]:
 
 
 def _nested(name: str, parts: list[tuple[int, bytes]], kind: int, order: str, depth: int) -> Node:
-    """A struct as a dict, a vector of structs as a list of them, cells as a list."""
+    """Return a struct as a dict, a vector of structs as a list of them, cells as a list."""
     fields = [""]
     if kind == STRUCT:
         length = _numbers(*parts[0], order)
@@ -154,7 +154,7 @@ def _nested(name: str, parts: list[tuple[int, bytes]], kind: int, order: str, de
 
 
 def _text(kind: int, data: bytes, order: str) -> str:
-    """Text of one row; of several, the letters as they are stored."""
+    """Return text of one row; several rows in their storage order."""
     code = TEXTS.get(kind, "latin-1")
     if order == ">" and code == "utf-16-le":
         code = "utf-16-be"
@@ -185,13 +185,13 @@ def _level_4(data: bytes) -> Iterator[tuple[str, Node]]:
         machine, rest = divmod(kind, 1000)
         known = machine == (order == ">") and rest // 100 == 0 and rest // 10 < len(OLD_NUMBERS)
         if not known or min(rows, columns) < 0 or imaginary not in (0, 1) or length < 2:
-            raise ValueError("the header of a variable is that of no such file")
+            raise ValueError("the header of a variable is not that of such a file")
         code = OLD_NUMBERS[rest // 10]
         name = data[start : start + length - 1].decode("latin-1")
         start += length
         size = rows * columns * int(code[1])
         if start + size * (1 + imaginary) > len(data):
-            raise ValueError(f"variable {name!r} is longer than what is left of it")
+            raise ValueError(f"variable {name!r} is longer than the rest of the file")
         if rest % 10 or imaginary:
             yield name, "text, sparse or complex"
         else:

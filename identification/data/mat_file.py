@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7, NumPy files: variables, structs in structs, matrices, as columns.
+"""Reader of MATLAB files up to version 7 and NumPy files: variables, structs, matrices as columns.
 
 The files of the EMPS benchmark are recognised with their controller.
 Source: A. Janot, M. Gautier, M. Brunot: Data set and reference models of EMPS, 2019.
@@ -17,22 +17,22 @@ from identification.data.raw import Array, Column, Raw, label
 from identification.data.record import PositionLoop, Record
 
 EMPS = ("t", "qm", "vir", "gtau")
-"""Variables that tell an EMPS file."""
+"""Variables that identify an EMPS file."""
 
 Node = Any
 """An array, a text, a dict of nodes (struct), or a list of nodes (struct array, cell)."""
 
 
 def read_mat(file: Path, variable: str | None) -> Record | list[Raw]:
-    """The columns of each record in a MATLAB file; of an EMPS file the record itself.
+    """Return the columns of each record in a MATLAB file; for an EMPS file the record itself.
 
     Args:
         file: the file.
-        variable: a struct or matrix in it, with points for what lies deeper: "run.log"; a vector
+        variable: a struct or matrix in it, with points for nested ones: "run.log"; a vector
             of structs takes an index: "run(2)".
 
     Raises:
-        ValueError: no MATLAB file, version 7.3, a damaged one, no such variable.
+        ValueError: not a MATLAB file, version 7.3, a damaged file, no such variable.
     """
     content = _load(file)
     where = f"read '{file.name}'"
@@ -42,21 +42,21 @@ def read_mat(file: Path, variable: str | None) -> Record | list[Raw]:
 
 
 def read_npy(file: Path, variable: str | None) -> list[Raw]:
-    """The columns of a `.npy` matrix or structured array, or of an `.npz` archive of arrays."""
+    """Return the columns of a `.npy` matrix or structured array, or of an `.npz` archive."""
     where = f"read '{file.name}'"
     try:
         loaded = np.load(BytesIO(file.read_bytes()), allow_pickle=False)
         archive = not isinstance(loaded, np.ndarray)
         content = {name: loaded[name] for name in loaded.files} if archive else {"array": loaded}
-    except Exception as error:  # noqa: BLE001 (damaged bytes raise whatever they meet)
+    except Exception as error:  # noqa: BLE001 (damaged bytes raise various errors)
         raise ValueError(
-            f"{where}: expected a NumPy file of numbers, got one that is damaged or none: {error}"
+            f"{where}: expected a NumPy file of numbers, got a damaged or another file: {error}"
         ) from None
     return raws(where, file.name, {k: _node(v) for k, v in content.items()}, variable)
 
 
 def raws(where: str, name: str, content: Mapping[str, Node], variable: str | None) -> list[Raw]:
-    """The records in named variables."""
+    """Return the records in named variables."""
     if variable is not None:
         return list(_records(where, name, _found(where, content, variable), variable))
     vectors = {key: value for key, value in content.items() if _is_vector(value)}
@@ -77,7 +77,7 @@ def raws(where: str, name: str, content: Mapping[str, Node], variable: str | Non
 
 
 def described(content: Mapping[str, Node]) -> str:
-    """What the variables are, in words."""
+    """Return a description of the variables."""
     return ", ".join(f"{key} ({_kind(value)})" for key, value in content.items())
 
 
@@ -90,7 +90,7 @@ def _kind(value: Node) -> str:
 
 
 def _records(where: str, name: str, value: Node, path: str) -> Iterator[Raw]:
-    """The records of one variable: a struct or matrix is one, a vector of structs several."""
+    """Yield the records of one variable: several for a vector of structs, else one."""
     if isinstance(value, list):
         for k, one in enumerate(value, start=1):
             yield from _records(where, f"{name}({k})", one, f"{path}({k})")
@@ -115,7 +115,7 @@ def _records(where: str, name: str, value: Node, path: str) -> Iterator[Raw]:
 
 
 def _simulink(struct: Mapping[str, Node]) -> dict[str, Node] | None:
-    """The signals of a Simulink log (a structure with time), by their labels."""
+    """Return the signals of a Simulink log (a structure with time), by their labels."""
     if "time" not in struct or "signals" not in struct:
         return None
     signals = struct["signals"]
@@ -123,13 +123,13 @@ def _simulink(struct: Mapping[str, Node]) -> dict[str, Node] | None:
     for k, signal in enumerate(signals if isinstance(signals, list) else [signals], start=1):
         if not isinstance(signal, dict) or "values" not in signal:
             return None
-        said = signal.get("label", "")
-        found[said if isinstance(said, str) and said else f"signal_{k}"] = signal["values"]
+        text = signal.get("label", "")
+        found[text if isinstance(text, str) and text else f"signal_{k}"] = signal["values"]
     return found
 
 
 def _matrix(name: str, value: Array) -> Raw:
-    """The columns of a matrix; one that lies on its side is turned."""
+    """Return the columns of a matrix; a wide one is transposed."""
     if value.shape[0] < value.shape[1]:
         value = value.T
     columns = (Column.of("", "", c) for c in value.T)
@@ -137,7 +137,7 @@ def _matrix(name: str, value: Array) -> Raw:
 
 
 def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
-    """Vectors of one length as columns; shorter ones and what is none are left out."""
+    """Return the vectors of the most frequent length as columns; others are marked as unusable."""
     flat = _shortened(dict(_flat(variables)))
     lengths = [v.size for v in flat.values() if isinstance(v, np.ndarray)]
     if not lengths:
@@ -160,7 +160,7 @@ def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
 
 
 def _shortened(flat: Mapping[str, Node]) -> dict[str, Node]:
-    """Leaves by the last part of their names where that tells them apart."""
+    """Return leaves by the last part of their names if it is unique."""
     last = [key.rpartition(".")[2] for key in flat]
     return {
         key if last.count(short) > 1 else short: value
@@ -169,7 +169,7 @@ def _shortened(flat: Mapping[str, Node]) -> dict[str, Node]:
 
 
 def _flat(variables: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str, Node]]:
-    """Leaves by name; what lies in a struct has its name before."""
+    """Yield leaves by name; fields of a struct are prefixed by its name."""
     for key, value in variables.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")
@@ -201,13 +201,13 @@ def _load(file: Path) -> dict[str, Node]:
         ) from None
     except ValueError as error:
         raise ValueError(
-            f"read '{file.name}': expected a MATLAB file, got one that is damaged or none: {error}"
+            f"read '{file.name}': expected a MATLAB file, got a damaged or another file: {error}"
         ) from None
     return {key: _node(value) for key, value in loaded.items() if key and key[:2] != "__"}
 
 
 def _node(value: Any) -> Node:
-    """The same with arrays of floats, and fields of structured arrays as a dict."""
+    """Return the node with arrays of floats, and fields of structured arrays as a dict."""
     if isinstance(value, dict):
         return {str(key): _node(one) for key, one in value.items()}  # pyright: ignore[reportUnknownArgumentType]
     if isinstance(value, list):
@@ -240,7 +240,7 @@ def _number(where: str, found: Mapping[str, Node], name: str) -> float:
 
 
 def _emps(where: str, name: str, found: Mapping[str, Node]) -> Record:
-    """An EMPS file: force gtau*vir; pulses_N are volts, uint8, and already inside vir."""
+    """Return the record of an EMPS file: force gtau*vir; pulses_N (volts, uint8) are in vir."""
     t, x, command = (_vector(where, found, key) for key in ("t", "qm", "vir"))
     gain = _number(where, found, "gtau")
     signals, units = {"x": x, "force": gain * command}, {"x": "m", "force": "N"}
@@ -260,7 +260,7 @@ def _emps(where: str, name: str, found: Mapping[str, Node]) -> Record:
 
 
 def _found(where: str, content: Mapping[str, Node], path: str) -> Node:
-    """What stands under a path such as "run(2).log"."""
+    """Return the node at a path such as "run(2).log"."""
     node: Node = dict(content)
     for part in path.split("."):
         name, _, index = part.partition("(")

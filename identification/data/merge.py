@@ -1,4 +1,4 @@
-"""Two recorders of one experiment as one record, and the delay between them.
+"""Merging of two recorders of one experiment, and the delay between them.
 
     y1(t) = gain y2(t - shift - drift (t - middle)) + offset
 
@@ -20,30 +20,30 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 ALIKE = 0.8
-"""Least correlation of two recordings of one thing."""
+"""Least correlation of two recordings of one quantity."""
 OVERLAP = 0.5
-"""Share of the shorter record that both must have in common."""
+"""Least overlap of the records, over the shorter one."""
 RIVAL = 1.5
-"""A second shift whose unexplained part is at most so many times that of the best one rivals it."""
+"""Ratio of unexplained parts below which a second shift is as likely as the best one."""
 SMOOTHING = 2.0
 """Standard deviation of the smoothing window, in steps."""
 NEIGHBOURS = 2 * np.sqrt(np.pi) * SMOOTHING
-"""Samples that count as one after the smoothing."""
+"""Samples that count as one independent sample after smoothing."""
 SURE = 5.0
-"""Standard deviations that make a statement."""
+"""Significance level, in standard deviations."""
 FLATTEST = 50
-"""So many lags that explain as much as the best one, within its chance, tell no delay."""
+"""Number of equally likely lags above which the delay is undetermined."""
 ITERATIONS = 30
 
 
 @final
 @dataclass(frozen=True)
 class Delay:
-    """How the clock of one record stands to that of another.
+    """Offset and drift between the clocks of two records.
 
     Attributes:
-        shift: what is added to the times of the second [s], at the middle of the overlap.
-        drift: how much faster the first clock runs, relative.
+        shift: offset added to the times of the second [s], at the middle of the overlap.
+        drift: relative excess speed of the first clock.
         middle: time of the first at which `shift` holds [s].
         shift_error, drift_error: standard errors.
         correlation: of both signals at this delay.
@@ -57,21 +57,21 @@ class Delay:
     correlation: float
 
     def second(self, t: Array) -> Array:
-        """Times of the second record at times of the first."""
+        """Return the times of the second record at times of the first."""
         return t - self.shift - self.drift * (t - self.middle)
 
 
 def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: bool) -> Delay:
-    """The delay between `first[on[0]]` and `second[on[1]]`.
+    """Estimate the delay between `first[on[0]]` and `second[on[1]]`.
 
     Args:
-        first, second: two recordings that hold one quantity, up to a gain and an offset.
-        on: what it is called in each.
+        first, second: two recordings of one quantity, up to a gain and an offset.
+        on: its name in each.
         drift: whether the clocks may run at different speeds; else that is an error.
 
     Raises:
-        ValueError: recordings that have nothing in common at any shift, several shifts that
-            explain them as well, none that is determined, clocks that drift.
+        ValueError: recordings without correlation at any shift, several equally likely shifts,
+            an undetermined shift, clocks that drift.
     """
     where = f"data '{first.name}': merged with '{second.name}'"
     step = max(first.median_step, second.median_step)
@@ -85,7 +85,7 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
     if drifts and not drift:
         raise ValueError(
             f"{where}: expected clocks of one speed, got a drift of {1e6 * free.drift:.0f} "
-            f"ppm, {total:.3g} s over the record; write drift='estimate'"
+            f"ppm, {total:.3g} s over the record; pass drift='estimate'"
         )
     return free if drift else rigid
 
@@ -93,7 +93,7 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
 @final
 @dataclass(frozen=True, eq=False)
 class _Even:
-    """A signal at equal intervals; `there` is false inside gaps."""
+    """A signal at equal intervals; `there` is False inside gaps."""
 
     start: float
     step: float
@@ -122,7 +122,7 @@ class _Even:
 
 
 def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
-    """The lag in steps of the best correlation, and that."""
+    """Return the lag in steps of the best correlation, and that correlation."""
     size = 1 << int(np.ceil(np.log2(one.values.size + two.values.size)))
 
     def product(a: Array, b: Array) -> Array:
@@ -144,7 +144,7 @@ def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
         low = float(found.min())
         hint = "; one of them has the opposite sign" if low < -ALIKE else ""
         raise ValueError(
-            f"{where}: expected two recordings of one thing, got a correlation of at most "
+            f"{where}: expected two recordings of one quantity, got a correlation of at most "
             f"{found[best]:.2f} at any shift{hint}"
         )
     order = np.argsort(lags, kind="stable")
@@ -154,14 +154,14 @@ def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
     likely = lively[order] & (rest < rest[at] * (1 + 9 * NEIGHBOURS / n[best] + 9 / n[best] ** 0.5))
     if np.count_nonzero(likely) > FLATTEST:
         raise ValueError(
-            f"{where}: expected signals that tell their delay, got {np.count_nonzero(likely)} "
-            f"shifts of {one.step:.2g} s that explain as much; say shift= [s]"
+            f"{where}: expected signals that determine their delay, got {np.count_nonzero(likely)} "
+            f"shifts of {one.step:.2g} s that fit equally well; pass shift= [s]"
         )
     return int(lags[best]), float(found[best])
 
 
 def _check_single(where: str, values: Array, at: int, step: float) -> None:
-    """Refuse if another shift, beyond the hill of the best one, explains as much."""
+    """Raise ValueError if another shift, outside the peak of the best one, fits equally well."""
     peak = values[at]
     low = peak - max(0.02, 2 * RIVAL * (1 - peak))
     left, right = at, at
@@ -174,8 +174,8 @@ def _check_single(where: str, values: Array, at: int, step: float) -> None:
     if others.size and 1 - others.max() ** 2 < RIVAL * (1 - peak**2) + 1e-4:
         away = (int(places[int(np.argmax(others))]) - at) * step
         raise ValueError(
-            f"{where}: expected one delay, got a second one {abs(away):.4g} s away that explains "
-            f"as much (correlation {others.max():.4f} against {peak:.4f}); say shift= [s]"
+            f"{where}: expected one delay, got a second one {abs(away):.4g} s away that fits "
+            f"equally well (correlation {others.max():.4f} against {peak:.4f}); pass shift= [s]"
         )
 
 
@@ -190,7 +190,7 @@ def _smoothed(signal: _Even) -> Array:
 def _refined(
     where: str, one: _Even, two: _Even, lag: int, correlation: float, *, with_drift: bool
 ) -> tuple[Delay, float]:
-    """The delay by Gauss-Newton on shift, drift, gain and offset, and what it leaves."""
+    """Return the delay by Gauss-Newton on shift, drift, gain and offset, and its residual."""
     y1, y2 = _smoothed(one), _smoothed(two)
     t1 = one.start + one.step * np.arange(y1.size, dtype=np.float64)
     t2 = two.start + two.step * np.arange(y2.size, dtype=np.float64)
@@ -223,8 +223,8 @@ def _refined(
     error = float(np.sqrt(covariance[0, 0]))
     if not error < one.step or abs(shift - begin) > 20 * one.step:
         raise ValueError(
-            f"{where}: expected signals that tell their delay, got one known to {error:.2g} s only "
-            f"at samples of {one.step:.2g} s; say shift= [s]"
+            f"{where}: expected signals that determine their delay, got an error of {error:.2g} s "
+            f"at samples of {one.step:.2g} s; pass shift= [s]"
         )
     drift_error = float(np.sqrt(covariance[1, 1])) if with_drift else 0.0
     return Delay(shift, drift, middle, error, drift_error, correlation), rest
@@ -237,15 +237,15 @@ def merged(
     shift: float | Literal["estimate"] = "estimate",
     drift: float | Literal["estimate"] = 0.0,
 ) -> list[Record]:
-    """The signals of both at the times of the first, one record for each piece without a gap.
+    """Return the signals of both at the times of the first, one record for each piece.
 
     Args:
-        first: gives the times.
+        first: defines the times.
         second: is interpolated; where it has a gap, the record is split.
-        on: a quantity that both hold, by its name in each; of the second it is dropped, unless
-            it has a name of its own.
-        shift: what is added to the times of the second [s].
-        drift: how much faster the first clock runs, relative.
+        on: a quantity in both, by its name in each; that of the second is dropped, unless it has
+            a name of its own.
+        shift: offset added to the times of the second [s].
+        drift: relative excess speed of the first clock.
 
     Raises:
         ValueError: signals of one name in both, no common time, or see `estimated_delay`.
@@ -282,7 +282,7 @@ def _joined(
     kept = [slice(a, b) for a, b in runs(there) if b - a >= SHORTEST]
     if not kept:
         raise ValueError(
-            f"{where}: expected a time that both have in common, got {first.time[0]:g} ... "
+            f"{where}: expected a common time of both, got {first.time[0]:g} ... "
             f"{first.time[-1]:g} s and {t[0] + delay.shift:g} ... {t[-1] + delay.shift:g} s"
         )
     error = f" +- {delay.shift_error:.1g}" if delay.shift_error else ""

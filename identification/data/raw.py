@@ -1,4 +1,4 @@
-"""Columns as a file holds them, and how they become a record: names, units, time."""
+"""Raw columns of a file, and their conversion to a record: names, units, time."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,30 +23,30 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "a": ("a", "qdd", "ddq", "acc", "acceleration"),
     "force": ("force", "F", "f", "torque", "tau"),
 }
-"""Names that a column may have, by canonical channel; longer ones in any case of letters."""
+"""Aliases of columns by canonical channel; longer ones are case-insensitive."""
 POINTS: Mapping[str, tuple[str, ...]] = {
     "v": ALIASES["v"],
     "F": ("F", "f", "force", "friction", "torque", "tau"),
     "N": ("N", "normal", "normal_force"),
 }
-"""The same of points."""
+"""Aliases of columns of points."""
 OF_GAPS = "missing='drop' (--missing drop) leaves out rows without a number"
-"""What to do about cells that hold nothing."""
+"""Remedy for empty cells."""
 SKIPPED = ("", "-", "_")
-"""Names in `columns` of columns that are not wanted."""
+"""Names in `columns` for ignored columns."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One column of a file.
+    """A column of a file.
 
     Attributes:
-        label: what stands above it, without its unit.
-        unit: what the file says, "" for nothing.
-        values: its numbers, NaN where there is none, shape (n,).
-        problem: what its first bad cell is, with its place; "" where all are numbers.
-        gaps: whether cells that hold nothing (or NaN) are all that is wrong.
+        label: its header, without the unit.
+        unit: unit in the file, "" if there is none.
+        values: its numbers, NaN for missing ones, shape (n,).
+        problem: its first bad cell, with its place; "" if all cells are numbers.
+        gaps: True if empty cells (or NaN) are the only problem.
     """
 
     label: str
@@ -57,7 +57,7 @@ class Column:
 
     @classmethod
     def of(cls, label: str, unit: str, values: Array) -> "Column":
-        """A column of numbers, some of which may be NaN or infinite."""
+        """Return a column of numbers, some of which may be NaN or infinite."""
         bad, problem = np.flatnonzero(~np.isfinite(values)), ""
         if bad.size:
             problem = (
@@ -70,13 +70,13 @@ class Column:
 @final
 @dataclass(frozen=True, eq=False)
 class Raw:
-    """Columns of one record before anybody knows what they are.
+    """Columns of one record before their identification.
 
     Attributes:
         name: of the file, and of the record in it.
         columns: in their order; without a header their labels are "".
-        first_row: row of the first sample in the file; 0 where samples have no rows.
-        verb: what messages begin with.
+        first_row: row of the first sample in the file; 0 if samples have no rows.
+        verb: first word of messages.
     """
 
     name: str
@@ -88,16 +88,16 @@ class Raw:
 @final
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What the caller says about columns.
+    """Arguments of the caller on columns.
 
     Attributes:
         columns: channel -> column, or the names of all columns in their order; None: the header.
         units: channel or column -> unit, or the short form "rad, N m"; None: the header.
         step: sample interval of records without a time [s].
         points: whether the rows are points without time.
-        assumed: units of canonical channels about which nobody says anything.
-        missing: what happens to rows in which a channel has no number, and to those that repeat the
-            row before, "refuse" or "drop".
+        assumed: default units of canonical channels.
+        missing: treatment of rows in which a channel has no number, and of those that repeat the
+            previous row, "refuse" or "drop".
     """
 
     columns: Mapping[str, str] | Sequence[str] | None = None
@@ -112,7 +112,7 @@ class Wanted:
 
 
 def label(cell: str) -> tuple[str, str]:
-    """Name and unit of a header cell: `x [mm]`, `x (mm)`, `x / mm`; of anything else the cell."""
+    """Return name and unit of a header cell: `x [mm]`, `x (mm)`, `x / mm`; else the cell and ""."""
     cell = cell.strip()
     match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
     if match:
@@ -136,11 +136,11 @@ def _matches(name: str, names: Sequence[str]) -> bool:
 
 
 def record(raw: Raw, wanted: Wanted) -> Record:
-    """The record that the columns of `raw` are.
+    """Convert raw columns to a record.
 
     Raises:
-        ValueError: a channel asked for that is not there or no numbers, no unit or the wrong one,
-            no time; all problems at once.
+        ValueError: a requested channel that is absent or not numeric, no unit or a wrong one, no
+            time; all problems at once.
     """
     where = f"{raw.verb} '{raw.name}'"
     raw = _labelled(where, raw, wanted)
@@ -167,7 +167,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
         signals[key] = factor * values
     if problems:
         silent = any(problem.endswith("got none") for problem in problems)
-        hint = "; say it in the call: units='m, N', units='rad, N m' or units={'x': 'mm'}" * silent
+        hint = "; pass units='m, N', units='rad, N m' or units={'x': 'mm'}" * silent
         empty = any(named[key].gaps for key in named if key in needed)
         hint += f"; {OF_GAPS}" * (empty and wanted.missing == "refuse")
         raise ValueError(f"{where}: " + "; ".join(problems) + hint)
@@ -175,7 +175,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     signals.pop("t", None)
     if not signals and left_out:
         why = "; ".join(f"column '{name}', {bad}" for name, bad in left_out.items())
-        raise ValueError(f"{where}: expected a column of numbers beside the time, got none: {why}")
+        raise ValueError(f"{where}: expected a column of numbers besides time, got none: {why}")
     return Record(
         raw.name,
         t,
@@ -188,7 +188,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
 
 
 def _rows(where: str, raw: Raw, needed: Mapping[str, Column], wanted: Wanted) -> NDArray[np.bool_]:
-    """Which rows are taken: all, or new ones with a number in every needed channel."""
+    """Return the mask of used rows: all, or new ones with a number in every needed channel."""
     taken = np.ones(max((c.values.size for c in raw.columns), default=0), dtype=np.bool_)
     if wanted.missing == "refuse":
         return taken
@@ -209,11 +209,11 @@ def _shown(column: Column) -> str:
 
 
 def _labelled(where: str, raw: Raw, wanted: Wanted) -> Raw:
-    """The columns with the names of the call, where it names them all in their order."""
+    """Return the columns, with the names of the call if it names all of them in their order."""
     have = ", ".join(_shown(c) for c in raw.columns)
     if isinstance(wanted.columns, Mapping) or wanted.columns is None:
         if any(c.label == "" for c in raw.columns):
-            hint = "write columns=['t', 'x', 'force'], with '-' for a column that is not wanted"
+            hint = "write columns=['t', 'x', 'force'], with '-' for a column to ignore"
             raise ValueError(
                 f"{where}: expected names of {len(raw.columns)} columns, got a file without a "
                 f"header; {hint}"
@@ -224,19 +224,19 @@ def _labelled(where: str, raw: Raw, wanted: Wanted) -> Raw:
         raise ValueError(
             f"{where}: columns: expected {len(raw.columns)} names, one for each column"
             f"{f' ({have})' if any(c.label for c in raw.columns) else ''}, got {len(names)}; "
-            "write '-' for a column that is not wanted"
+            "write '-' for a column to ignore"
         )
     kept: list[Column] = []
     for name, column in zip(names, raw.columns, strict=True):
         text = "" if name is None else str(name).strip()
         if text not in SKIPPED:
-            new, said = label(text)
-            kept.append(replace(column, label=new, unit=said or column.unit))
+            new, given = label(text)
+            kept.append(replace(column, label=new, unit=given or column.unit))
     return replace(raw, columns=tuple(kept))
 
 
 def _places(where: str, raw: Raw, wanted: Wanted) -> dict[str, int]:
-    """Channel -> number of its column. Names of the call come first, then canonical ones."""
+    """Return channel -> index of its column. Names of the call come first, then canonical ones."""
     labels = [c.label for c in raw.columns]
     found: dict[str, int] = {}
     if isinstance(wanted.columns, Mapping):
@@ -256,7 +256,7 @@ def _places(where: str, raw: Raw, wanted: Wanted) -> dict[str, int]:
         if len(exact) > 1:
             shown = ", ".join(f"'{_shown(raw.columns[k])}'" for k in exact)
             raise ValueError(f"{where}: expected one column for {key}, got {shown}")
-        if exact or len(near) == 1:  # of several near ones the caller says which he means
+        if exact or len(near) == 1:  # the caller has to choose among several near ones
             found[key] = (exact or near)[0]
     for k, name in enumerate(labels):
         if k not in found.values():
@@ -267,7 +267,7 @@ def _places(where: str, raw: Raw, wanted: Wanted) -> dict[str, int]:
 
 
 def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str, str]:
-    """Units that the call says, by channel."""
+    """Return the units of the call by channel."""
     if wanted.units is None:
         return {}
     if isinstance(wanted.units, str):
@@ -278,7 +278,7 @@ def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str,
                 raise ValueError(
                     f"{where}: column '{_shown(named[key])}': expected its unit once, got "
                     f"'{own}' in the file and '{said}' in the call; units={{'{key}': '{said}'}} "
-                    "overrules the file"
+                    "overrides the file"
                 )
         return {key: said for key, said in given.items() if key in named and not named[key].unit}
     given = checks.named(f"{where}: units", wanted.units)
@@ -288,7 +288,7 @@ def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str,
 
 
 def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float, str]:
-    """Factor to SI and SI unit of a column."""
+    """Return the factor to SI and the SI unit of a column."""
     said = given or column.unit or (wanted.assumed or {}).get(key, "")
     kinds = KINDS.get(key, ()) if not wanted.points or key in ("v", "F", "N") else ()
     if key == "t" and not said and wanted.units is not None:
@@ -311,7 +311,7 @@ def _time(
     if wanted.step is not None:
         if "t" in signals:
             raise ValueError(
-                f"{where}: expected step= only where there is no time, got a column of times, too; "
+                f"{where}: expected step= only without a time, got also a column of times; "
                 "name it '-' in columns"
             )
         step = checks.number(f"{where}: step", wanted.step, unit="s", above=0.0)
@@ -322,19 +322,19 @@ def _time(
         name = timed[0] if len(timed) == 1 else "..."
         raise ValueError(
             f"{where}: expected a column of time 't [s]', got {have}; name it with "
-            f"columns={{'t': '{name}'}} (--column t={name}), give step= [s] (--step) for equally "
+            f"columns={{'t': '{name}'}} (--column t={name}), pass step= [s] (--step) for equally "
             "spaced samples, or points=True"
         )
     return signals["t"]
 
 
 def each(raws: Sequence[Raw], wanted: Wanted) -> tuple[Record, ...]:
-    """Records of all, with the problems of all in one error."""
+    """Return the records of all, with the problems of all in one error."""
     return tuple(gathered([lambda raw=raw: record(raw, wanted) for raw in raws]))
 
 
 def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
-    """Results of `works`; what they refuse becomes one error, a line each."""
+    """Return the results of `works`; their ValueErrors become one error, a line each."""
     found: list[T] = []
     problems: list[str] = []
     for work in works:

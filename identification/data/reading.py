@@ -1,4 +1,4 @@
-"""Columns from text files (CSV in its dialects), from other files and from Python objects."""
+"""Columns from text files (dialects of CSV), other files and Python objects."""
 
 import csv
 from collections.abc import Callable, Mapping, Sequence
@@ -20,17 +20,17 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_table
 
 ASSUMED = {"t": "s", "x": "m", "v": "m/s", "a": "m/s^2", "force": "N", "F": "N", "N": "N"}
-"""Units of arrays about which nobody says anything: numbers in Python are SI everywhere here."""
+"""Default units of arrays: numbers in Python are SI."""
 
 
 def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[Raw, bool]:
-    """The columns of `frame` and `arrays`, and whether they come from a frame.
+    """Return the columns of `frame` and `arrays`, and whether they come from a frame.
 
-    A frame is what has `columns` and gives one by its name: pandas, polars. A mapping holds
+    A frame has `columns` and returns one by its name: pandas, polars. A mapping holds
     arrays. Times with a date become seconds from the first one.
 
     Raises:
-        ValueError: neither, columns that are no vectors or of different lengths.
+        ValueError: neither, or columns that are not vectors of one length.
     """
     where = f"data '{name}'"
     given: dict[str, object] = {}
@@ -65,7 +65,7 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
 
 def _held(where: str, key: str, values: object) -> Column:
     name, said = label(key)
-    if isinstance(values, np.ma.MaskedArray):  # what is masked was not measured
+    if isinstance(values, np.ma.MaskedArray):  # masked values were not measured
         masked: Any = values  # pyright: ignore[reportUnknownVariableType]
         values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
     try:
@@ -95,24 +95,24 @@ def _held(where: str, key: str, values: object) -> Column:
 
 
 COMMENTS = ("#", "%", "//")
-"""What a line begins with that says something about the file."""
+"""First characters of comment lines."""
 DELIMITERS = ("\t", ";", ",", " ")
 EMPTY = ("", "-", "na", "n/a", "null")
-"""Cells that say that there is no number, beside NaN."""
+"""Cells without a number, in addition to NaN."""
 LOOKED_AT = 40
-"""Lines at the end of the file that tell the delimiter."""
+"""Lines at the end of the file from which the delimiter is deduced."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Lines as cells.
+    """Lines split into cells.
 
     Attributes:
-        delimiter: between the cells; a space stands for any number of spaces and tabs.
-        numbers: of the rows in the file.
+        delimiter: between the cells; a space is any number of spaces and tabs.
+        numbers: row numbers in the file.
         cells: of each row.
-        comments: rows that begin with a sign of comment, before the first other one.
+        comments: comment rows before the first other row.
     """
 
     delimiter: str
@@ -122,15 +122,15 @@ class Rows:
 
 
 def read_text(file: Path) -> Raw:
-    """The columns of a text file.
+    """Return the columns of a text file.
 
-    Comma, semicolon, tab or spaces separate the cells; decimal commas are understood where they
-    do not separate. Lines before the header and lines that begin with #, % or // are passed over,
-    but a last comment with as many words as there are columns is the header of a file without
-    another. A row of units may follow the header.
+    Comma, semicolon, tab or spaces separate the cells; decimal commas are accepted unless commas
+    separate cells. Lines before the header and lines that begin with #, % or // are ignored, except
+    that a last comment with as many words as columns is the header of a file without another one. A
+    row of units may follow the header.
 
     Raises:
-        ValueError: no file, no text, no rows of numbers, rows of different lengths.
+        ValueError: an absent file, no text, no rows of numbers, rows of different lengths.
     """
     rows = _rows(file)
     where = f"read '{file.name}'"
@@ -160,13 +160,13 @@ def read_text(file: Path) -> Raw:
 
 
 def _rows(file: Path) -> Rows:
-    """Lines that are not empty, as cells."""
+    """Return the lines that are not empty, split into cells."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raw = file.read_bytes()
         if not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-            text = raw.decode("latin-1")  # degrees and micro of older recorders
+            text = raw.decode("latin-1")  # degree and micro signs of older recorders
         else:
             try:
                 text = raw.decode("utf-16")
@@ -193,7 +193,7 @@ def _rows(file: Path) -> Rows:
 
 
 def _delimiter(lines: Sequence[str]) -> str:
-    """The delimiter that makes most of the last lines rows of as many numbers."""
+    """Return the delimiter with which most of the last lines have the same number of numbers."""
     last = lines[-LOOKED_AT:]
 
     def score(delimiter: str) -> tuple[float, int]:
@@ -210,7 +210,7 @@ def _delimiter(lines: Sequence[str]) -> str:
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """The cells of one line."""
+    """Return the cells of one line."""
     if delimiter == " ":
         return line.split()
     if '"' in line:
@@ -222,7 +222,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def _number(cell: str) -> float:
-    if "_" in cell:  # which Python takes for a number
+    if "_" in cell:  # Python accepts it in numbers
         raise ValueError
     return float(cell)
 
@@ -236,7 +236,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _decimal_comma(rows: Rows) -> bool:
-    """Whether numbers have decimal commas: cells of digits with one comma, and no point."""
+    """Return True if more cells are numbers with a decimal comma than with a point."""
     cells = [cell for row in rows.cells[-LOOKED_AT:] for cell in row]
     with_comma = sum(fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", c) is not None for c in cells)
     with_point = sum(fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", c) is not None for c in cells)
@@ -244,14 +244,14 @@ def _decimal_comma(rows: Rows) -> bool:
 
 
 def _numeric(row: Sequence[str], comma: bool) -> bool:
-    """Whether most of the cells are numbers, so that the row is no header."""
+    """Return True if at least half of the cells are numbers, so the row is not a header."""
     cells = [cell.replace(",", ".") if comma else cell for cell in row if cell]
     numbers = sum(map(_is_number, cells))
     return numbers > 0 and numbers >= len(cells) / 2
 
 
 def _first(rows: Rows, comma: bool) -> int | None:
-    """The first row of numbers: as wide as most of the last ones are."""
+    """Return the first row of numbers, at least as wide as most of the last ones."""
     widths = [_trimmed(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
     usual = max(set(widths), key=widths.count, default=0)
     return next(
@@ -260,7 +260,7 @@ def _first(rows: Rows, comma: bool) -> int | None:
 
 
 def _header(rows: Rows, first: int | None) -> tuple[int | None, list[str] | None, list[str] | None]:
-    """Number of the header row, names and units of the columns, as far as there are any."""
+    """Return the index of the header row, names and units of the columns, if there are any."""
     end = len(rows.cells) if first is None else first
     width = 0 if first is None else _trimmed(rows.cells[first])
     above = [k for k in range(end) if first is None or len(rows.cells[k]) >= width]
@@ -281,14 +281,14 @@ def _header(rows: Rows, first: int | None) -> tuple[int | None, list[str] | None
 
 
 def _trimmed(row: Sequence[str]) -> int:
-    """Number of cells up to the last that holds something."""
+    """Return the number of cells up to the last that is not empty."""
     return max((k + 1 for k, cell in enumerate(row) if cell), default=0)
 
 
 def _column(
     body: Sequence[Sequence[str]], numbers: Sequence[int], index: int, comma: bool
 ) -> tuple[Array, str, bool]:
-    """One column as numbers, a sentence about its first bad cell, whether all such are empty."""
+    """Return a column as numbers, a message on its first bad cell, True if all such are empty."""
     cells = [row[index] if index < len(row) else "" for row in body]
     if comma:
         cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
@@ -317,7 +317,7 @@ def _column(
 
 
 def to_csv(record: Record, path: Path) -> Path:
-    """Write a record with units in its header, and give the path back."""
+    """Write a record with units in its header, and return the path."""
     signals = {**({} if record.t is None else {"t": record.t}), **record.signals}
     units = {key: record.unit(key) for key in signals}
     header = [f"{key} [{units[key]}]" if units[key] else key for key in signals]
@@ -331,10 +331,10 @@ Paths = str | PathLike[str] | Sequence[str | PathLike[str]]
 
 
 def files(paths: Paths) -> tuple[Path, ...]:
-    """The files that a path, a pattern such as `run*.csv` or several of them mean, in order.
+    """Return the files of a path, a pattern such as `run*.csv` or several of them, in order.
 
     Raises:
-        ValueError: nothing there, a folder, a pattern that fits no file.
+        ValueError: an absent file, a folder, a pattern without a match.
     """
     several = paths if not isinstance(paths, str | PathLike) else (paths,)
     found: list[Path] = []
@@ -343,11 +343,11 @@ def files(paths: Paths) -> tuple[Path, ...]:
         if path.is_file():
             found.append(path)
         elif path.is_dir():
-            raise ValueError(f"read '{path}': expected a file, got a folder; write '{path}/*.csv'")
+            raise ValueError(f"read '{path}': expected a file, got a folder; pass '{path}/*.csv'")
         elif has_magic(str(path)):
             hits = [Path(hit) for hit in sorted(glob(str(path))) if Path(hit).is_file()]
             if not hits:
-                raise ValueError(f"read '{path}': expected files, got none that fit the pattern")
+                raise ValueError(f"read '{path}': expected files, got none that match the pattern")
             found.extend(hits)
         else:
             raise ValueError(f"read '{path}': expected a file, got nothing there; check the path")
@@ -357,7 +357,7 @@ def files(paths: Paths) -> tuple[Path, ...]:
 
 
 def read_records(paths: Paths, wanted: Wanted, variable: str | None) -> tuple[Record, ...]:
-    """The records of all files; what is wrong with any of them is one error."""
+    """Return the records of all files; the problems of all files are one error."""
     if variable is not None:
         checks.text("read: variable", variable, "the name of a variable")
     works = [partial(_read, file, wanted, variable) for file in files(paths)]
@@ -384,7 +384,7 @@ def _read(file: Path, wanted: Wanted, variable: str | None) -> tuple[Record, ...
             )
     except OSError as error:
         raise ValueError(
-            f"read '{file}': expected a file that can be read, got {error.strerror or error}"
+            f"read '{file}': expected a readable file, got {error.strerror or error}"
         ) from None
     if isinstance(found, Record):
         return (found,)

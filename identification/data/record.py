@@ -1,4 +1,4 @@
-"""One measured record: named signals over time, or points without time, and its controller."""
+"""A measured record: named signals over time, or points without time, and its controller."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -59,7 +59,7 @@ class PositionLoop:
             )
 
     def between(self, first: int, end: int) -> "PositionLoop":
-        """The controller over the samples `first` to `end` (not included)."""
+        """Return the controller over the samples `first` to `end` (not included)."""
         cut = slice(first, end)
         return PositionLoop(
             self.kp, self.kv, self.gain, self.limit, self.reference[cut], self.disturbance[cut]
@@ -67,13 +67,13 @@ class PositionLoop:
 
 
 GAP = 5.0
-"""An interval of more than so many median intervals is a gap."""
+"""Shortest gap, in median intervals."""
 JITTER = 0.01
 """Largest deviation of a sample interval from the mean one, relative, that counts as uniform."""
 
 
 def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First sample and end (not included) of each run of true ones."""
+    """Return first sample and end (not included) of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -83,19 +83,19 @@ def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
 class Record:
     """Signals of one experiment, all in SI units and of one length.
 
-    Canonical channels of a drive are x, v, a and force, also where it turns: then the units are
-    rad, rad/s, rad/s^2 and N m. Points of a friction curve are v and F. Every other signal keeps
-    the name of its column.
+    Canonical channels of a drive are x, v, a and force. If it is rotary, their units are rad,
+    rad/s, rad/s^2 and N m. Points of a friction curve are v and F. Every other signal keeps the
+    name of its column.
 
     Attributes:
-        name: where it comes from; every message starts with it.
+        name: origin of the record; every message starts with it.
         t: increasing sample times [s], shape (n,); None: points without time.
         signals: name -> values, shape (n,) each.
-        units: name -> SI unit; "" where nobody said one.
-        first_row: row of the first sample in its file, for messages; 0 counts samples instead.
-        loop: the position controller of the experiment, where it is known.
-        columns: name -> what the column is called in its file, where that differs.
-        left_out: column -> why it is no signal.
+        units: name -> SI unit; "" if unknown.
+        first_row: row of the first sample in its file, for messages; 0: samples are counted.
+        loop: the position controller of the experiment, if it is known.
+        columns: name -> name of the column in its file, if different.
+        left_out: column -> reason why it is not a signal.
 
     Raises:
         ValueError: unequal lengths, values that are not finite, times that do not increase, fewer
@@ -171,7 +171,7 @@ class Record:
             k = int(back[0])
             later = self._repeats(back)
             if back.size <= self.size // 20 and self.t[k + 1] <= self.t[0] + self.step:
-                later = "; the time starts again: one file for each record"
+                later = "; the time restarts: use one file for each record"
             problems.append(
                 f"column t, {self.place(k + 1)}: expected increasing times, "
                 f"got {self.t[k + 1]:.12g} s after {self.t[k]:.12g} s "
@@ -180,20 +180,20 @@ class Record:
         return problems
 
     def _repeats(self, back: NDArray[np.intp]) -> str:
-        """What to do where the times of samples `back + 1` are those of the samples before."""
+        """Return a hint if the times of samples `back + 1` equal those of the samples before."""
         if self.t is None or np.any(np.diff(self.t)[back] < 0):
             return ""
         alike = [values[back + 1] == values[back] for values in self.signals.values()]
         if alike and np.all(alike):
             return "; missing='drop' (--missing drop) leaves out rows that repeat the one before"
-        return "; several values at one time: is its clock too coarse? Then give step= (--step)"
+        return "; several values at one time: if its clock is too coarse, pass step= (--step)"
 
     def place(self, sample: int) -> str:
-        """Where a sample stands, for messages: its row in the file, else its number."""
+        """Return the place of a sample for messages: its row in the file, else its index."""
         return f"row {sample + self.first_row}" if self.first_row else f"sample {sample}"
 
     def __getitem__(self, name: str) -> Array:
-        """A signal by its name or that of its column; "t" gives the times."""
+        """Return a signal by its name or that of its column; "t" returns the times."""
         if name == "t" and self.t is not None:
             return self.t
         return self.signals[self.channel(name)]
@@ -204,10 +204,10 @@ class Record:
         )
 
     def channel(self, name: str) -> str:
-        """The name of a signal, given that or the name of its column.
+        """Return the name of a signal, given it or the name of its column.
 
         Raises:
-            ValueError: there is none; with the reason where it was left out.
+            ValueError: no such signal; with the reason if it was left out.
         """
         if name in self.signals:
             return name
@@ -221,7 +221,7 @@ class Record:
         )
 
     def unit(self, name: str) -> str:
-        """SI unit of a signal."""
+        """Return the SI unit of a signal."""
         return "s" if name == "t" else self.units[self.channel(name)]
 
     @property
@@ -239,7 +239,7 @@ class Record:
         if self.t is None:
             raise ValueError(
                 f"data '{self.name}': expected a record over time, got points without time; "
-                "fit them with Points(), or give step= [s]"
+                "fit them with Points(), or pass step= [s]"
             )
         return self.t
 
@@ -251,7 +251,7 @@ class Record:
 
     @property
     def median_step(self) -> float:
-        """Median sample interval [s], which gaps do not move."""
+        """Median sample interval [s], independent of gaps."""
         return float(np.median(np.diff(self.time)))
 
     @property
@@ -261,11 +261,11 @@ class Record:
         return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), self.size])]
 
     def uniform(self) -> "Record":
-        """The record itself, if its samples are equally spaced to 1 % of the interval.
+        """Return the record itself if its samples are equally spaced to 1 % of the interval.
 
         Raises:
-            ValueError: they are not. Filters and differences need equal intervals, and whether
-                interpolated samples may stand for measured ones is the user's decision.
+            ValueError: unequal intervals. Filters and differences need equal intervals, and the
+                user decides whether interpolated samples may replace measured ones.
         """
         t = self.time
         intervals = np.diff(t)
@@ -279,7 +279,7 @@ class Record:
         return self
 
     def at(self, rows: slice | NDArray[np.integer] | NDArray[np.bool_]) -> "Record":
-        """The record at some of its samples; a slice without step keeps the controller."""
+        """Return the record at some samples; a slice without step keeps the controller."""
         first, loop = 0, None
         if isinstance(rows, slice) and rows.step in (None, 1):
             begin, end, _ = rows.indices(self.size)
@@ -294,10 +294,10 @@ class Record:
         )
 
     def between(self, begin: float, end: float) -> "Record":
-        """The samples with begin <= t <= end [s]; the times stay what they are.
+        """Return the samples with begin <= t <= end [s]; the times are unchanged.
 
         Raises:
-            ValueError: fewer than two samples lie there.
+            ValueError: fewer than two samples in this interval.
         """
         where = f"data '{self.name}': between"
         begin = checks.number(where, begin, unit="s")
@@ -312,7 +312,7 @@ class Record:
         return self.at(slice(int(first), int(last)))
 
     def thinned(self, every: int) -> "Record":
-        """Every `every`-th sample, from the first on; noise is not filtered before.
+        """Return every n-th sample from the first on, n = `every`, without prior filtering.
 
         The controller is dropped: its reference belongs to all samples.
         """
@@ -320,7 +320,7 @@ class Record:
         return self if every == 1 else self.at(slice(None, None, every))
 
     def renamed(self, names: Mapping[str, str]) -> "Record":
-        """The record with other names of signals: {"old": "new"}."""
+        """Return the record with other names of signals: {"old": "new"}."""
         where = f"data '{self.name}': renamed"
         given = {self.channel(old): new for old, new in checks.named(where, names).items()}
         for new in given.values():

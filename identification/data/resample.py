@@ -1,4 +1,4 @@
-"""Records at equal intervals, moved in time, or repaired: nothing happens unless it is requested.
+"""Resampling, time shifts and repairs of records, only on request.
 
 A gap is never bridged silently.
 """
@@ -18,13 +18,13 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 SHORTEST = 10
-"""Samples of a piece between two gaps that is kept."""
+"""Fewest samples of a piece between two gaps that is kept."""
 MOST = 1e8
-"""Samples of a record."""
+"""Largest number of samples of a record."""
 
 
 def check_no_gap(record: Record, where: str) -> None:
-    """Refuse a record with gaps."""
+    """Raise ValueError for a record with gaps."""
     parts = record.pieces
     if len(parts) > 1:
         t, k = record.time, parts[0].stop
@@ -38,16 +38,16 @@ def check_no_gap(record: Record, where: str) -> None:
 def resampled(
     record: Record, step: float | None = None, gap: Literal["split", "refuse"] = "split"
 ) -> list[Record]:
-    """Records at equal intervals of `step` [s], one for each piece between gaps.
+    """Return records at equal intervals of `step` [s], one for each piece between gaps.
 
-    Positions by cubic Hermite, everything else by linear interpolation. Nothing is filtered: with
+    Positions are interpolated by cubic Hermite, all others linearly, without a filter: with
     a larger step noise is aliased, not averaged. The controller is dropped: its reference belongs
     to the old samples. Pieces of fewer than 10 samples, old or new, are dropped.
 
     Args:
         record: over time.
         step: default: the median interval.
-        gap: what to do where an interval is longer than 5 times the median one.
+        gap: treatment of intervals longer than 5 times the median one.
 
     Raises:
         ValueError: a step that is not positive, a gap with gap="refuse", no piece long enough.
@@ -89,7 +89,7 @@ def _at_step(record: Record, step: float) -> Record:
 
 
 def interpolated(record: Record, signal: str, at: Array) -> Array:
-    """A signal at other times: positions by cubic Hermite, everything else linearly."""
+    """Return a signal at other times: positions by cubic Hermite, others linearly."""
     values = record.signals[signal]
     if record.units[signal] in ("m", "rad"):
         return hermite(at, record.time, values)
@@ -97,12 +97,12 @@ def interpolated(record: Record, signal: str, at: Array) -> Array:
 
 
 def delayed(record: Record, delays: Mapping[str, float]) -> Record:
-    """The record with signals moved in time: new(t) = old(t - delay), the ends cut.
+    """Return the record with signals shifted in time: new(t) = old(t - delay), ends cut.
 
-    A recorder that writes the force 2 ms after it acted is put right by {"force": -0.002}.
+    A recorder that writes the force 2 ms late is corrected by {"force": -0.002}.
 
     Raises:
-        ValueError: an unknown signal, a delay that leaves nothing, a record with gaps.
+        ValueError: an unknown signal, a delay as long as the record, a record with gaps.
     """
     where = f"data '{record.name}': delayed"
     given = {
@@ -128,7 +128,7 @@ def delayed(record: Record, delays: Mapping[str, float]) -> Record:
 
 
 def hermite(at: Array, t: Array, y: Array) -> Array:
-    """Cubic Hermite interpolation with second-order slopes; third order at uneven samples."""
+    """Interpolate by cubic Hermite with second-order slopes; third order at uneven samples."""
     if t.size < 3:
         return np.interp(at, t, y)
     slope = np.gradient(y, t)
@@ -140,7 +140,7 @@ def hermite(at: Array, t: Array, y: Array) -> Array:
 
 
 def without_spikes(record: Record) -> Record:
-    """The record with samples far off their neighbours replaced by a line between those."""
+    """Return the record with spikes replaced by linear interpolation."""
     signals = dict(record.signals)
     for name, values in record.signals.items():
         far, _ = spike_samples(values, position=name == "x")
@@ -151,7 +151,7 @@ def without_spikes(record: Record) -> Record:
 
 
 def unwrapped(record: Record, periods: Mapping[str, float]) -> Record:
-    """The record with signals that were counted modulo a period counted through.
+    """Return the record with periodic signals unwrapped.
 
     Raises:
         ValueError: an unknown signal, a period that is not positive.
@@ -168,12 +168,12 @@ def unwrapped(record: Record, periods: Mapping[str, float]) -> Record:
 def scaled(
     record: Record, factors: Mapping[str, float], units: Mapping[str, str] | None = None
 ) -> Record:
-    """The record with signals times factors: a sign that was wrong, newtons from volts.
+    """Return the record with signals times factors: for a wrong sign, or newtons from volts.
 
     Args:
         record: to change.
         factors: signal -> factor.
-        units: signal -> its unit afterwards, where that changes.
+        units: signal -> its unit afterwards, if it changes.
 
     Raises:
         ValueError: an unknown signal, a factor of 0, no unit.
@@ -186,9 +186,9 @@ def scaled(
         if number == 0:
             raise ValueError(f"{where}: {name}: expected a factor other than 0, got 0")
         signals[key] = number * signals[key]
-    for name, said in checks.named(f"{where}: units", units).items():
-        key, meant = record.channel(name), unit(checks.text(f"{where}: units: {name}", said))
+    for name, given in checks.named(f"{where}: units", units).items():
+        key, meant = record.channel(name), unit(checks.text(f"{where}: units: {name}", given))
         if meant is None:
-            raise checks.refused(f"{where}: units: {name}", "a unit, such as N or N m", said)
+            raise checks.refused(f"{where}: units: {name}", "a unit, such as N or N m", given)
         signals[key], now[key] = meant.factor * signals[key], meant.si
     return replace(record, signals=signals, units=now)

@@ -1,11 +1,10 @@
-"""A rough model of any drive, to see whether a record can be one: no fit, a question.
+"""A rough model of any drive, used to check the plausibility of a record.
 
     force = m a + level sgn(v) + viscous v + stiffness x + offset
 
-and sin x, cos x where it turns, by robust linear regression on signals under a Gaussian window,
-which is as wide as the noise of
-the position asks for. Its signs and what it explains tell flipped signs, exchanged columns, dead
-time and drift; its numbers are no estimates.
+and sin x, cos x for a rotary drive, by robust linear regression on signals smoothed by a Gaussian
+window, whose width depends on the noise of the position. Its signs and its explained variance
+reveal wrong signs, exchanged columns, dead time and drift; its values are not estimates.
 """
 
 from dataclasses import dataclass
@@ -21,15 +20,15 @@ Array = NDArray[np.float64]
 WIDTHS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 100.0)
 """Standard deviations of the window, in samples."""
 CLEAN = 0.1
-"""Noise of the acceleration over the acceleration that is good enough."""
+"""Noise of the acceleration over the acceleration that is acceptable."""
 TURNED = 0.3
-"""Range of an angle [rad] from which on gravity may show."""
+"""Range of an angle [rad] above which gravity may be visible."""
 KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0])
 """Quantiles of the speed at which a free curve of friction has its knots."""
 HUBER = 2.5
 ROUNDS = 5
 MOVING = 0.02
-"""Share of the largest speed that is motion."""
+"""Share of the largest speed above which the drive moves."""
 
 
 @final
@@ -39,16 +38,16 @@ class Rough:
 
     Attributes:
         t: times of the rows [s].
-        x, v, a, force: under the window.
+        x, v, a, force: smoothed by the window.
         width: of the window, in samples.
         step: sample interval [s].
-        values, errors: m, level, viscous, stiffness, offset (and what turns with the angle), and
-            their standard errors.
-        columns: what they multiply.
+        values, errors: m, level, viscous, stiffness, offset (and coefficients of sin x, cos x),
+            and their standard errors.
+        columns: regressors of the values.
         explained: share of the variance of the force that the model explains, robust.
         residual: force minus model.
         independent: number of independent rows.
-        clean: whether the acceleration stands above its noise.
+        clean: whether the acceleration exceeds its noise.
     """
 
     t: Array
@@ -68,31 +67,31 @@ class Rough:
 
     @property
     def moving(self) -> NDArray[np.bool_]:
-        """Where the drive moves."""
+        """Mask of rows in which the drive moves."""
         return np.abs(self.v) > MOVING * np.abs(self.v).max()
 
     def sure(self, k: int) -> float:
-        """A value over its standard error."""
+        """Return a value over its standard error."""
         return float(self.values[k] / self.errors[k]) if self.errors[k] > 0 else 0.0
 
 
 def smoothed(y: Array, width: float, order: int = 0) -> Array:
-    """A signal under a Gaussian window, or its central differences by the sample."""
+    """Return a signal smoothed by a Gaussian window, or its central differences per sample."""
     from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
 
     found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
-    for _ in range(order):  # SciPy's own derivatives let a constant through
+    for _ in range(order):  # SciPy's derivatives do not remove a constant exactly
         found = np.gradient(found)
     return found
 
 
 def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> Rough | None:
-    """The rough model of a record; None where it has no position and force or is too short.
+    """Return the rough model of a record; None without position and force, or if it is too short.
 
     Args:
         view: the record.
-        exchanged: takes the force for the position and the position for the force.
-        curve: takes any function of the velocity for the friction, piecewise linear in each
+        exchanged: exchange force and position.
+        curve: use any function of the velocity as friction, piecewise linear in each
             direction, instead of level and viscous part, and a drift with time as the last column.
     """
     record, x, force = view.steady, view.roles.get("x"), view.roles.get("force")
@@ -142,7 +141,7 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
 
 
 def explained_when_late(model: Rough, late: float) -> float:
-    """What the same model explains of the force, were that late by a time [s]."""
+    """Return the explained share of the force if it were late by a time [s]."""
     every = max(1, int(2 * model.width))
     A = model.columns[::every]
     b = np.interp(model.t[::every] + late, model.t, model.force)
@@ -151,7 +150,7 @@ def explained_when_late(model: Rough, late: float) -> float:
 
 
 def with_column(model: Rough, column: Array) -> tuple[float, float]:
-    """Value and standard error of one more column, shape (rows,)."""
+    """Return value and standard error of an additional column, shape (rows,)."""
     every = max(1, int(2 * model.width))
     A = np.column_stack([model.columns, column])[::every]
     values, errors = _robust(A, model.force[::every])
@@ -159,13 +158,13 @@ def with_column(model: Rough, column: Array) -> tuple[float, float]:
 
 
 def one_way(model: Rough, share: float = 0.1) -> bool:
-    """Whether the drive goes back less than a share of its way."""
-    way = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
-    return min(way) <= share * max(way)
+    """Return True if the drive moves back by less than a share of its path."""
+    path = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
+    return min(path) <= share * max(path)
 
 
 def _explained(A: Array, b: Array, values: Array) -> float:
-    """Share of the variance of `b` that a regression explains; farthest samples count less."""
+    """Return the share of the variance of `b` that a regression explains; outliers count less."""
 
     def mean(squares: Array) -> float:
         return float(np.mean(np.minimum(squares, 25 * np.quantile(squares, 0.9))))
@@ -175,7 +174,7 @@ def _explained(A: Array, b: Array, values: Array) -> float:
 
 
 def _curve(v: Array, still: float, rows: slice) -> list[Array]:
-    """Hat functions of the speed in each direction, with their knots where there is motion."""
+    """Return hat functions of the speed in each direction, with knots at its quantiles."""
     found: list[Array] = []
     for side in (1.0, -1.0):
         speed = np.maximum(side * v, 0.0)
@@ -190,7 +189,7 @@ def _curve(v: Array, still: float, rows: slice) -> list[Array]:
 
 
 def _width(x: Array) -> tuple[float, bool]:
-    """The narrowest window under which the acceleration stands above its noise."""
+    """Return the narrowest window that lets the acceleration exceed its noise; False if none."""
     third = np.diff(x, 3)
     noise = max(float(np.std(third)) / np.sqrt(20), count_of(x) / np.sqrt(12))
     widest = x.size / 40
@@ -206,7 +205,7 @@ def _width(x: Array) -> tuple[float, bool]:
 
 
 def _robust(A: Array, b: Array) -> tuple[Array, Array]:
-    """Huber's regression by reweighting: values and standard errors."""
+    """Return values and standard errors of Huber's regression, by reweighting."""
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1.0
     B = A / scale
@@ -223,6 +222,6 @@ def _robust(A: Array, b: Array) -> tuple[Array, Array]:
     inverse = np.linalg.pinv((B * root[:, None]).T @ (B * root[:, None]), rcond=1e-10)
     rest = b - B @ values
     lag = float(np.corrcoef(rest[1:], rest[:-1])[0, 1]) if rest.size > 3 and rest.std() > 0 else 0.0
-    colour = (1 + min(max(lag, 0.0), 0.98)) / (1 - min(max(lag, 0.0), 0.98))
-    variance = colour * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
+    inflation = (1 + min(max(lag, 0.0), 0.98)) / (1 - min(max(lag, 0.0), 0.98))
+    variance = inflation * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
     return values / scale, np.sqrt(np.maximum(variance * np.diag(inverse), 0.0)) / scale

@@ -24,12 +24,12 @@ DRIVE = Drive(
 SPEEDS = (0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.12)
 """Speeds of the moves [m/s]."""
 RTOL = 1e-8
-"""Of the simulation: some 1e-13 m and 1e-6 N of the default drive."""
+"""Tolerance of the simulation: errors of about 1e-13 m and 1e-6 N for the default drive."""
 FORCES = ("sensor", "command")
 
 
 def trapezoids(speeds: Sequence[float], dwell: float, ramp: float, step: float) -> Array:
-    """Position reference [m]: out and back once at each speed, with linear ramps of velocity.
+    """Return a position reference [m]: out and back once at each speed, with velocity ramps.
 
     Args:
         speeds: top speeds [m/s].
@@ -64,16 +64,16 @@ def synthetic_drive_data(
     turning: bool = False,
     force: Literal["sensor", "command"] = "sensor",
 ) -> Dataset:
-    """A record of a drive moved back and forth by its position controller, with noise.
+    """Simulate a record of a drive moved back and forth by its position controller, with noise.
 
     The controller is that of `PositionLoop` with a bandwidth of 5 Hz in position and 40 Hz in
-    velocity. Its force is held between the samples; between them the motion is that of adaptive
+    velocity. Its force is held between the samples; between them the motion is computed by adaptive
     steps (`symfric.stepper`). White Gaussian noise is added to the finished record; it does not
     enter the loop.
 
     Args:
         law: a friction law, with states or without; default Stribeck with 28 N static and 20 N
-            dynamic friction. With states it starts where the law says.
+            dynamic friction. With states it starts as in the law.
         m, offset, normal_force: mass [kg], constant force [N], N [N].
         speeds, dwell, ramp: see `trapezoids`.
         rate: samples per second.
@@ -81,14 +81,13 @@ def synthetic_drive_data(
         force_noise: standard deviation [N].
         seed: of the noise; equal seeds give equal records.
         turning: the same numbers in rad, N m and kg m^2.
-        force: what the record has for the force: "sensor": the mean of the two forces that meet at
-            a sample, which is what inverse dynamics compares with the motion there; "command": the
-            force that is held after the sample, as a controller records it and `ClosedLoop` takes
-            it.
+        force: definition of the recorded force: "sensor": the mean of the forces before and after
+            a sample, which inverse dynamics compares with the motion there; "command": the force
+            held after the sample, as a controller records it and `ClosedLoop` expects it.
 
     Raises:
         ValueError: a parameter outside its bounds, an unknown `force`.
-        SolveError: a law that the simulation does not get through.
+        SolveError: a law that cannot be simulated.
     """
     checks.choice("synthetic_drive_data: force", force, FORCES)
     drive = Drive(
@@ -117,9 +116,9 @@ def synthetic_drive_data(
 
 
 def _simulated(model: Model, loop: PositionLoop, step: float) -> tuple[Array, Array]:
-    """Positions [m] at the samples, and the forces [N] held after them.
+    """Return positions [m] at the samples, and the forces [N] held after them.
 
-    The virtual machine takes the steps of compiled code, and a record is too short for compiling.
+    The virtual machine takes the same steps as compiled code; one record is too short to compile.
     """
     plant = stepper(model, step, rtol=RTOL, backend="vm")
     push = model.u[0].name

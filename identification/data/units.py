@@ -1,6 +1,6 @@
-"""Units of measured signals: those of the channels, and what a header or a call says.
+"""Units of measured signals, of channels, headers and calls.
 
-The grammar is that of `symfric.foundation.units`; recorders also write words (`sec`, `newton`),
+The grammar is that of `symfric.foundation.units`; recorders also use words (`sec`, `newton`),
 letters of any case, and speeds as `1/min`.
 """
 
@@ -12,7 +12,7 @@ from re import findall
 from symfric.foundation.units import WORDS, Unit, nearest, parsed, per_second, written
 
 SPEEDS = ("1/min", "min^-1")
-"""How recorders write revolutions per minute."""
+"""Spellings of revolutions per minute by recorders."""
 PURE = ("1", "%")
 """Units without a dimension; counts of a recorder have no size in SI units."""
 PREFIXED = {"s": "num", "m": "numck", "N": "umckM", "rad": "um", "V": "umk", "A": "um", "W": "mk"}
@@ -20,7 +20,7 @@ COMMON = {
     *WORDS, *PREFIXED, *(p + s for s, prefixes in PREFIXED.items() for p in prefixes), "1", "%",
     "min", "h", "deg", "rev", "arcmin", "arcsec", "in", "ft", "g", "kg", "kgf", "lbf", "K", "rpm",
 }  # fmt: skip
-"""Symbols that stand for units in a header even without brackets: `x_mm`, but not `tau_d`."""
+"""Symbols that denote units in a header even without brackets: `x_mm`, but not `tau_d`."""
 
 KINDS: Mapping[str, tuple[str, ...]] = {
     "t": ("s",),
@@ -31,7 +31,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     "F": ("N", "N m"),
     "N": ("N",),
 }
-"""SI units that the canonical channels may have; the first one is that of a slide."""
+"""SI units that the canonical channels may have; the first one is for linear drives."""
 
 EXAMPLES: Mapping[str, str] = {
     "t": "s, ms, us, min",
@@ -42,12 +42,12 @@ EXAMPLES: Mapping[str, str] = {
     "F": "N, mN, kN, N m, N mm, mN m",
     "N": "N, mN, kN",
 }
-"""Of the same, for messages."""
+"""Examples of these units, for messages."""
 
 
 @cache
 def unit(text: str) -> Unit | None:
-    """The unit that `text` means; None for what is no unit of a signal."""
+    """Return the unit that `text` denotes; None if it is not a unit of a signal."""
     plain = written(text)
     if plain.lower() in SPEEDS:
         plain = "rpm"
@@ -59,19 +59,19 @@ def unit(text: str) -> Unit | None:
 
 
 def is_common(text: str) -> bool:
-    """Whether `text` is a unit even where nothing says that it is one."""
+    """Return True if `text` denotes a unit even without brackets."""
     symbols = findall(r"[A-Za-z]+|[%1]", written(text))
     return unit(text) is not None and all(s in COMMON or s.lower() in WORDS for s in symbols)
 
 
 def by_channel(where: str, text: str) -> dict[str, str]:
-    """Units of the canonical channels from the short form `rad, N m`.
+    """Return the units of the canonical channels from the short form `rad, N m`.
 
     Each unit goes to the channel that can have it; velocity and acceleration follow the position
-    where they are not named: `mm, N` gives mm/s.
+    if they are not named: `mm, N` gives mm/s.
 
     Raises:
-        ValueError: no unit, one that belongs to no canonical channel, two for the same.
+        ValueError: not a unit, a unit of no canonical channel, two units for one channel.
     """
     found: dict[str, str] = {}
     for part in (p.strip() for p in text.split(",")):

@@ -1,1 +1,1 @@
-"""What a model leaves of the data: points, inverse dynamics, motion, closed loop."""
+"""Residuals of a model on data: points, inverse dynamics, shooting, closed loop."""

@@ -1,4 +1,4 @@
-"""Balance of forces of any model, with measured motion in the place of unknown motion."""
+"""Balance of forces of any model, with the measured motion inserted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ from symfric.model.contact import Contact
 Array = NDArray[np.float64]
 
 ALIKE = 1e-6
-"""Part of a direction of force, relative to it, that no other one has as well."""
+"""Share of a direction of force below which other directions reproduce it."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Coordinate:
-    """A degree of freedom as it is measured.
+    """A degree of freedom and its measured quantities.
 
     Attributes:
-        position: state of the model, or None where its equations know the rate only.
+        position: state of the model, or None if only its rate is a state.
         rate: state of the model.
         a: symbol of the acceleration.
     """
@@ -42,14 +42,14 @@ class Coordinate:
 @final
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One balance: the input it is solved for, else the coordinate that nothing drives.
+    """A balance of forces: for the input it is solved for, or for a coordinate without an input.
 
     Attributes:
         signal: name of the input, or "balance of <rate>".
         unit: of the input, or of the balance.
-        input: number of the input among those of the model, or None.
-        coordinate: number of the coordinate whose motion explains it.
-        slips: numbers of the contacts whose friction enters it.
+        input: index of the input among those of the model, or None.
+        coordinate: index of the coordinate whose motion determines it.
+        slips: indices of the contacts whose friction enters it.
     """
 
     signal: str
@@ -62,10 +62,10 @@ class Row:
 @final
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """What inverse dynamics evaluates.
+    """Equations of the inverse dynamics.
 
     Attributes:
-        rows: what the rows of `equations` are.
+        rows: descriptions of the rows of `equations`.
         slips: sliding velocities of the contacts, SX (contacts, 1) in w, y and p.
         equations: with w = (positions, rates, accelerations, inputs, time).
     """
@@ -76,7 +76,7 @@ class Balance:
 
 
 def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
-    """The degrees of freedom of `model`: pairs x' = v, and states that are rates alone.
+    """Return the degrees of freedom of `model`: pairs x' = v, and rates without a position.
 
     Raises:
         ValueError: an implicit model.
@@ -101,7 +101,7 @@ def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
 
 
 def measured(model: Model, found: Sequence[Coordinate]) -> ca.SX:
-    """The symbols w: positions (zero without one), rates, accelerations, inputs, time."""
+    """Return the symbols w: positions (zero without one), rates, accelerations, inputs, time."""
     q = [ca.SX.sym("none") if c.position is None else c.position.symbol for c in found]
     v, a = symbols_of(c.rate for c in found), stacked(c.a for c in found)
     return ca.vertcat(*q, v, a, model.vector("u"), model.t)
@@ -110,26 +110,26 @@ def measured(model: Model, found: Sequence[Coordinate]) -> ca.SX:
 def balance(
     model: Model, names: Sequence[str], found: Sequence[Coordinate], typical: Array, where: str
 ) -> Balance:
-    """The balance of forces of `model`, its parameters `names` as unknowns.
+    """Return the balance of forces of `model` with its parameters `names` as unknowns.
 
-        r = u needed for the measured motion - u measured          rows that an input drives
-        r = forces that the measured motion leaves unexplained     the others
+        r = u needed for the measured motion - u measured          rows with an input
+        r = unexplained force of the measured motion               other rows
 
-    Where each input drives one coordinate of its own, r is its balance over the gain of the input.
-    Else, and in mechanisms with constraints, the inputs are algebraic unknowns beside the
-    multipliers, and as many coordinates as nothing drives bear the rest. States of laws follow the
-    measured sliding velocity (`imposed_step`).
+    If each input drives one coordinate of its own, r is the coordinate's balance over the gain of
+    the input. Else, and in mechanisms with constraints, the inputs are algebraic unknowns like the
+    multipliers, and as many coordinates as have no input carry the remainder. States of laws follow
+    the measured sliding velocity (`imposed_step`).
 
     Args:
         model: explicit equations or a mechanism.
-        names: of its parameters that are free; the others have their start values.
+        names: of its free parameters; the others have their start values.
         found: `coordinates` of the model.
         typical: a value of w (`measured`), at which directions of force are compared.
-        where: begins the messages.
+        where: start of the messages.
 
     Raises:
-        ValueError: more inputs than the coordinates can bear; law states with modes that only a
-            simulation follows.
+        ValueError: more inputs than coordinates; law states with modes that only a simulation
+            can follow.
     """
     put = _Closed(model, [v for v in model.p if v.name not in names])
     w, z = measured(model, found), stacked(v.symbol for c in model.contacts for v in c.states)
@@ -178,7 +178,7 @@ def balance(
 
 
 def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
-    """Balances of the coordinates, the same with open contacts, other equations, units."""
+    """Return balances of the coordinates, the same with open contacts, other equations, units."""
     mechanics, opened = model.holonomic, model.open.holonomic
     if mechanics is None or opened is None:
         rates, open_rates = cast(ca.SX, model.ode), cast(ca.SX, model.open.ode)
@@ -219,7 +219,7 @@ def _states(
 
 @final
 class _Closed:
-    """Puts laws in the place of friction forces, and numbers in that of held parameters."""
+    """Substitution of laws for friction forces, and of numbers for held parameters."""
 
     def __init__(self, model: Model, held: Sequence[Variable]) -> None:
         self.force = stacked(c.force for c in model.contacts)
@@ -239,7 +239,7 @@ class _Closed:
 def _bearing(
     model: Model, gains: ca.SX, w: ca.SX, typical: Array, p: Array, where: str
 ) -> list[int]:
-    """Coordinates that bear what neither inputs nor constraints can."""
+    """Return the coordinates that carry the forces which neither inputs nor constraints balance."""
     directions = gains
     if model.holonomic is not None:
         q = model.vector("x")[: model.holonomic.n, 0]
@@ -250,7 +250,7 @@ def _bearing(
     n, count = pushes.shape
     if count > n or (count and np.linalg.svd(pushes, compute_uv=False)[-1] < ALIKE):
         raise ValueError(
-            f"{where}: expected inputs that the motion tells apart, got {len(model.u)} inputs and "
+            f"{where}: expected inputs with independent directions, got {len(model.u)} inputs and "
             f"{count - len(model.u)} constraints on {n} coordinates; hold or remove an input"
         )
     chosen = list[int]()
@@ -264,7 +264,7 @@ def _bearing(
 
 
 def _pattern(slopes: ca.SX) -> NDArray[np.bool_]:
-    """Where a matrix has entries at all."""
+    """Return a mask of the structural nonzeros of a matrix."""
     return np.array(ca.DM(slopes.sparsity(), 1).full() != 0).reshape(slopes.shape)
 
 

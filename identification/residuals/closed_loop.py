@@ -1,13 +1,13 @@
-"""A drive under its sampled controller, compared with what was measured in the loop.
+"""A drive under its sampled controller, compared with measurements in closed loop.
 
-At each sample the controller sees the simulated motion and gives the command that the drive then
-feels until the next one:
+At each sample the controller reads the simulated motion and sets the command of the drive until
+the next sample:
 
     (s, command)_k = controller(s_(k-1), x_k, reference_k)
     force_k = gain (command_k + disturbance_k),   m v' = force_k - F(v) - offset
 
-Residuals are those of the position and of the force. The controller holds the motion to the
-reference, so that errors do not drift as they do without it, and the force tells the friction.
+Residuals are those of the position and of the force. The controller keeps the motion near the
+reference, so errors do not drift as they do without it, and the force contains the friction.
 Source of the measure: Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks 2019.
 """
 
@@ -38,16 +38,16 @@ WHERE = "ClosedLoop"
 @final
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A controller of the user's, called once a sample.
+    """A user-defined controller, called once per sample.
 
         (state, command) = step(state, measured, reference),   force = gain (command + disturbance)
 
     Attributes:
         step: CasADi Function (state (n,), measured (1,) or (2,), reference (r,)) -> (state (n,),
             command (1,)); measured is the position, or the position and the velocity, of the
-            simulated drive at the sample. Without memory n = 0.
+            simulated drive at the sample. n = 0 without memory.
         reference: channels of the data that it follows.
-        disturbance: channel that is added to the command; None: nothing is.
+        disturbance: channel added to the command; None: no disturbance.
         gain: force per command [N or N m per command unit].
         start: its state before the first sample: numbers, or a Function of (x, v) there; None:
             zeros.
@@ -78,8 +78,8 @@ class Controller:
             fits = (self.start.n_in(), self.start.numel_in(0), self.start.numel_out(0))
             if fits != (1, 2, n):
                 raise ValueError(
-                    f"{where}: start: expected a Function of (x, v), 2 numbers, that gives {n}, "
-                    f"got one of {fits[1]} that gives {fits[2]}"
+                    f"{where}: start: expected a Function of (x, v), 2 numbers, returning {n}, "
+                    f"got one of {fits[1]} returning {fits[2]}"
                 )
         elif self.start is not None:
             start = checks.array(f"{where}: start", self.start)
@@ -98,7 +98,7 @@ class Controller:
         return self.step.numel_in(1)
 
     def feedback(self) -> Feedback:
-        """The controller with its slopes; rows hold the references and the disturbance."""
+        """Return the controller with its derivatives; rows hold references and the disturbance."""
         s, y, r = self.step.sx_in()
         after, command = self.step(s, y, r)
         both = ca.vertcat(after, command)
@@ -118,14 +118,14 @@ class Controller:
         return act
 
     def rows(self, record: Record) -> Array:
-        """References and disturbance at the samples."""
+        """Return references and disturbance at the samples."""
         columns = [record[name] for name in self.reference]
         none = np.zeros(record.size)
         columns.append(none if self.disturbance is None else record[self.disturbance])
         return np.column_stack(columns)
 
     def begin(self) -> ca.Function:
-        """(x, v) -> state at the first sample, and its slope."""
+        """Return a Function (x, v) -> state at the first sample, and its derivative."""
         x = ca.SX.sym("x", 2)
         if isinstance(self.start, ca.Function):
             state = self.start(x)
@@ -142,9 +142,9 @@ def _times(slopes: ca.SX, parts: Sequence[Tangent]) -> ca.SX:
 
 
 def position_controller(loop: PositionLoop, step: float) -> Controller:
-    """The controller that a `PositionLoop` describes, at a sample time of `step` [s].
+    """Return the controller of a `PositionLoop` at a sample time of `step` [s].
 
-    Before the first sample the drive has moved with the velocity that it has there.
+    Before the first sample the drive is assumed to have moved at its initial velocity.
     """
     xv = ca.SX.sym("xv", 2)
     before = ca.vertcat(xv[0] - step * xv[1], xv[0] - 1.5 * step * xv[1])
@@ -165,17 +165,17 @@ class ClosedLoop:
     """Simulate the drive under its controller and compare position and force.
 
     Attributes:
-        loop: the controller; None: that of each record (`Record.loop`).
-        signals: what is compared: "x", "v" and "force".
+        loop: the controller; None: the one of each record (`Record.loop`).
+        signals: compared signals: "x", "v" and "force".
         x0: "given": the motion starts at the first measured position, with the velocity of a cubic
             through the first ones; "estimate": both are unknowns of each record.
-        substeps: implicit steps a sample.
+        substeps: implicit steps per sample.
 
-    Limits: the controller sees the simulated position without noise, so that the noise that it
-    feeds back in the experiment stays in the residuals of the force. The measured force is to be
-    that held after its sample, as the controller records it; one that is the mean of the forces
-    that meet at a sample lags by half a sample, which is small where the force changes slowly (the
-    mass of `synthetic_drive_data` falls by .005 %) but shows in the residuals at each reversal. One
+    Limits: the controller reads the simulated position without noise, so the noise fed back in the
+    experiment remains in the residuals of the force. The measured force must be the one held after
+    its sample, as the controller records it. A mean of the forces before and after a sample lags by
+    half a sample. The error is small where the force changes slowly (the mass of
+    `synthetic_drive_data` decreases by .005 %) but visible in the residuals at each reversal. One
     mass with a law without states.
     """
 
@@ -198,11 +198,11 @@ class ClosedLoop:
     def prepare(
         self, subject: "Subject", data: "Dataset", start: Mapping[str, float] | None = None
     ) -> "LoopRows":
-        """The residuals of `data`.
+        """Return the residuals of `data`.
 
         Raises:
-            ValueError: a model that is not one mass with friction without states, a record whose
-                controller is not known, missing channels, unequal intervals.
+                ValueError: a model other than one mass with friction without states, a record with
+                an unknown controller, missing channels, unequal intervals.
         """
         del start
         mass = Mass.of(subject.model)
@@ -254,7 +254,7 @@ class ClosedLoop:
 
 
 def _first_velocity(record: Record) -> float:
-    """The first measured velocity, or that of a cubic through the first positions."""
+    """Return the first measured velocity, or that of a cubic through the first positions."""
     if "v" in record:
         return float(record["v"][0])
     x = record["x"]
@@ -262,10 +262,10 @@ def _first_velocity(record: Record) -> float:
 
 
 def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[str, Array]:
-    """References and disturbance, of which right residuals hold no trace.
+    """Return references and disturbance, on which correct residuals do not depend.
 
-    The measured velocity only where no motion is compared: residuals of a position would depend on
-    the noise that it brings with it. Tests take the simulated motion there.
+    The measured velocity is included only if no motion is compared: residuals of a position depend
+    on its noise. The tests use the simulated motion instead.
     """
     found = dict[str, Array]()
     if not {"x", "v"} & set(signals):
@@ -283,13 +283,13 @@ def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[st
 @final
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One record with its drive and controller.
+    """A record with its drive and controller.
 
     Attributes:
         number, name: of the record.
         chain: drive and controller, sample by sample.
         begin: (x, v) -> all states at the first sample, and their slopes.
-        rows: what the chain takes, shape (n, ...).
+        rows: inputs of the chain, shape (n, ...).
         t: sample times [s].
         first: measured position and velocity at the first sample.
         measured: signal -> samples.
@@ -309,7 +309,7 @@ class Run:
     regressors: Mapping[str, Array]
 
     def motion(self, p: Array, first: Array) -> Motion | str:
-        """The motion from position and velocity `first`."""
+        """Return the motion from position and velocity `first`."""
         state, slope = (np.asarray(a.full()) for a in self.begin(first))
         slopes = np.hstack([np.zeros((len(state), p.size)), slope])
         motion = self.chain(self.rows, p, state.ravel(), slopes)
@@ -317,7 +317,7 @@ class Run:
         return f"data '{self.name}': {why}" if why else motion
 
     def signal(self, motion: Motion, name: str) -> tuple[Array, Array]:
-        """A simulated signal (n,) and its slopes (n, parameters + 2)."""
+        """Return a simulated signal (n,) and its derivatives (n, parameters + 2)."""
         if name == "force":
             return motion.inputs[:, 0], motion.input_slopes[:, 0]
         k = ("x", "v").index(name)
@@ -335,7 +335,7 @@ class LoopRows:
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """Position and velocity at the start of each record, where they are fitted."""
+        """Position and velocity at the start of each record, if they are fitted."""
         if not self.estimated:
             return ()
         found = list[Unknown]()
@@ -364,7 +364,7 @@ class LoopRows:
         return tuple(found)
 
     def at(self, values: Array) -> Evaluation | str:
-        """Simulated minus measured signals, and their derivatives."""
+        """Return simulated minus measured signals, and their derivatives."""
         given = np.asarray(values, dtype=float)
         count = len(self.parameters)
         r, J = list[Array](), list[Array]()

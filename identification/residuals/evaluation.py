@@ -1,4 +1,4 @@
-"""What every kind of residuals looks like to those who minimise, test and draw them."""
+"""Common interface of all residuals for minimisation, tests and plots."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -16,19 +16,19 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One signal of one record among the rows, in order of time.
+    """A signal of a record among the rows, in order of time.
 
     Attributes:
         record: number of the record.
-        signal: name of what is compared, such as "force" or "x".
+        signal: name of the compared signal, such as "force" or "x".
         unit: its SI unit.
-        rows: where its residuals stand.
-        t: times of its rows [s]; of points, their velocities or 0, 1, 2 ...
+        rows: slice of its residuals.
+        t: times of its rows [s]; for points, their velocities or 0, 1, 2 ...
         measured: measured values, shape of `t`.
-        regressors: signals that a right model leaves no trace of in the residuals, by name, shape
-            of `t` each: inputs, velocity, its sign.
-        breaks: first rows, counted inside the channel, of windows after the first: residuals on
-            either side are no neighbours.
+        regressors: signals on which correct residuals do not depend, by name, each of the shape
+            of `t`: inputs, velocity, its sign.
+        breaks: first rows of the second and later windows, counted in the channel: residuals on
+            either side are not neighbours.
         ordered: whether neighbours in the rows are neighbours in time.
     """
 
@@ -57,7 +57,7 @@ class Residuals(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the values, in the order of the columns of J.
+        """Names of the values, in the order of the columns of J.
 
         All free parameters of the model, then the own unknowns (start values, dead times).
         """
@@ -65,15 +65,15 @@ class Residuals(Protocol):
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """Unknowns that the data bring with them, such as start values of each record."""
+        """Unknowns of the data set, such as start values of each record."""
         ...
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """What the rows are; they cover them all."""
+        """Channels that together cover all rows."""
         ...
 
     @abstractmethod
     def at(self, values: Array) -> Evaluation | str:
-        """The residuals at `values`; a sentence that says why there are none."""
+        """Return the residuals at `values`, or a message if they cannot be evaluated."""
         ...

@@ -1,9 +1,9 @@
 """Windows of records, and start values of a motion from measured signals.
 
-A measured state starts at a cubic through the samples around, and so does one that is the rate of a
-measured state. Whether a contact slides steadily at the start no signal tells: the bristle of a law
-with one is unknown, the many of others hold what the model says where the contact is fast, and are
-unstrained where it sticks. Everything else starts where the model says.
+A measured state starts at a cubic through the samples nearby, and so does the rate of a measured
+state. No signal shows whether a contact slides steadily at the start: the bristle of a law with one
+is unknown; several bristles keep the model's start if the contact is fast and are unstrained if it
+sticks. All other states start as the model states.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,17 +21,17 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 FEWEST = 8
-"""Samples of a window: fewer do not tell its start values."""
+"""Fewest samples of a window: fewer do not determine its start values."""
 MARGIN = 0.25
-"""How far a cut may move, over the length of a window."""
+"""Largest shift of a cut, over the length of a window."""
 
 
 def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[slice, ...]:
-    """Samples of consecutive windows of about `length` [s]; None is one window.
+    """Return the samples of consecutive windows of about `length` [s]; None is one window.
 
-    Windows are of one length that divides the record. Where `speed` (n,) is given, each cut moves
-    to the fastest sample within a quarter of a window: bristles slide steadily there, and their
-    start follows from the velocity.
+    Windows are of equal length, an integer fraction of the record. With `speed` (n,), each cut
+    moves to the fastest sample within a quarter of a window: bristles slide steadily there, so
+    their start follows from the velocity.
 
     Raises:
         ValueError: windows of fewer than eight samples.
@@ -62,9 +62,9 @@ def _fastest(t: Array, speed: Array, middle: float, reach: float) -> int:
 
 
 def turnaround(t: Array, y: Array) -> float:
-    """How long [s] a signal takes for a turn: the period, where it is a sine.
+    """Return the time scale [s] of a signal: the period of a sine.
 
-    That is six times the delay after which it differs by its standard deviation.
+    It is six times the delay after which the signal differs by its standard deviation.
     """
     size, lag = float(np.std(y)), 1
     while lag < y.size // 2 and np.sqrt(np.mean((y[lag:] - y[:-lag]) ** 2)) < size:
@@ -73,17 +73,17 @@ def turnaround(t: Array, y: Array) -> float:
 
 
 ORDERS = 6
-"""Highest differences that look for the noise of a signal."""
+"""Highest order of the differences that estimate the noise of a signal."""
 LEAST, MOST = 4, 512
-"""Samples on either side of a start that its cubic goes through."""
+"""Samples on either side of a start used for its cubic."""
 MISFIT = 3.0
 """Standard deviations by which the misfit of a cubic may exceed the noise."""
 REST = 0.02
-"""Sliding velocity over its usual size in the record below which a contact counts as resting."""
+"""Sliding velocity over its usual size in the record below which a contact counts as sticking."""
 
 
 def noise_of(y: Array) -> float:
-    """Standard deviation of white noise on a smooth signal, at most: that of its high differences.
+    """Return an upper bound of the standard deviation of white noise, from high differences.
 
     White noise of variance s^2 has k-th differences of variance binomial(2k, k) s^2.
     """
@@ -106,7 +106,7 @@ class Local:
 
 
 def local(t: Array, y: Array, k: int, noise: float) -> Local:
-    """The signal at sample k: a cubic through as many samples around as noise alone explains."""
+    """Fit a cubic around sample k, through as many samples as noise alone explains."""
     found, reach = _cubic(t, y, k, LEAST)[0], LEAST
     while reach < min(MOST, y.size):
         reach *= 2
@@ -118,7 +118,7 @@ def local(t: Array, y: Array, k: int, noise: float) -> Local:
 
 
 def _cubic(t: Array, y: Array, k: int, reach: int) -> tuple[Array, float, int]:
-    """Value, rate and their errors over the noise; mean square misfit and degrees of freedom."""
+    """Return value, rate, their errors over the noise; mean square misfit, degrees of freedom."""
     rows = slice(max(0, k - reach), min(t.size, k + reach + 1))
     s = t[rows] - t[k]
     scale = max(float(np.abs(s).max()), 1e-300)
@@ -133,7 +133,7 @@ def _cubic(t: Array, y: Array, k: int, reach: int) -> tuple[Array, float, int]:
 
 
 def rates(model: Model) -> dict[str, str]:
-    """State -> the state whose rate it is, where the equations say just that."""
+    """Return state -> the state whose rate it is, if an equation is exactly x' = v."""
     if model.ode is None:
         return {}
     states = {v.symbol.element_hash(): v.name for v in model.x}
@@ -145,9 +145,9 @@ def rates(model: Model) -> dict[str, str]:
 
 
 def hidden(model: Model) -> set[str]:
-    """States whose value within a motion only the data can tell.
+    """Return the states whose value within a motion only the data determine.
 
-    Not those that a law keeps of its contact, and not those that events set.
+    States of contact laws and states reset by events are excluded.
     """
     own = {v.name for contact in model.contacts for v in contact.states}
     reset = {name for event in model.events for name in event.reset}
@@ -157,10 +157,10 @@ def hidden(model: Model) -> set[str]:
 @final
 @dataclass(frozen=True)
 class Begin:
-    """The start value of one state.
+    """Start value of one state.
 
     Attributes:
-        value: number, from which an estimate starts; None: as the model says.
+        value: number, start of the estimate; None: as in the model.
         scale: its typical magnitude; 0: the nominal value.
         estimated: whether it is an unknown.
     """
@@ -173,15 +173,15 @@ class Begin:
 @final
 @dataclass(frozen=True, eq=False)
 class Sensed:
-    """What the signals of one record tell of the states of a model.
+    """Measured information on the states of a model in one record.
 
     Attributes:
         t: times [s], shape (n,).
         measured: state -> its samples, shape (n,).
         noise: state -> standard deviation of the noise on them.
-        told: state -> the measured state that tells it, and whether it is the rate of that.
-        slips: contact with bristles -> its sliding velocity as a Function of the told states, and
-            the names of the bristles.
+        told: observed state -> the measured state it follows from, and whether it is its rate.
+        slips: contact with bristles -> its sliding velocity as a Function of the observed states,
+            and the names of the bristles.
     """
 
     t: Array
@@ -192,7 +192,7 @@ class Sensed:
 
     @classmethod
     def of(cls, model: Model, t: Array, measured: Mapping[str, Array]) -> "Sensed":
-        """Those of `model`, with its contacts."""
+        """Return the information on `model`, with its contacts."""
         told = {r: (s, True) for r, s in rates(model).items() if s in measured}
         told |= {name: (name, False) for name in measured}
         slips = dict(_slips(model, list(told)))
@@ -200,7 +200,7 @@ class Sensed:
         return cls(t, measured, noise, told, slips)
 
     def at(self, k: int) -> dict[str, Begin]:
-        """Start values at sample k; of bristles where they are unknown or unstrained."""
+        """Return the start values at sample k; for bristles if they are unknown or unstrained."""
         here = {
             name: local(self.t, self.measured[source], k, self.noise[source])
             for name, (source, _) in self.told.items()
@@ -217,16 +217,16 @@ class Sensed:
             value, slope = (np.ravel(np.array(a)) for a in slip(np.array(values)))
             usual = float(np.linalg.norm(slope * scales))
             error = float(np.linalg.norm(slope * errors))
-            rests = abs(value[0]) <= max(REST * usual, MISFIT * error)
-            if len(names) == 1:  # before a record nobody knows which way it went
-                found[names[0]] = Begin(0.0 if rests or k == 0 else None)
-            elif rests:
+            sticks = abs(value[0]) <= max(REST * usual, MISFIT * error)
+            if len(names) == 1:  # the direction before a record is unknown
+                found[names[0]] = Begin(0.0 if sticks or k == 0 else None)
+            elif sticks:
                 found |= dict.fromkeys(names, Begin(0.0, estimated=False))
         return found
 
     @property
     def speed(self) -> Array:
-        """How fast the measured states change, each over its usual pace, shape (n,)."""
+        """Rate of the measured states, each over its usual rate, summed, shape (n,)."""
         found = np.zeros(self.t.size)
         for y in self.measured.values():
             pace = self._pace(y)
@@ -235,7 +235,7 @@ class Sensed:
         return found
 
     def _pace(self, y: Array) -> float:
-        """Usual rate of a signal: root mean square over fiftieths of the record."""
+        """Return the usual rate of a signal: root mean square over fiftieths of the record."""
         every = max(1, y.size // 50)
         return float(np.sqrt(np.mean((np.diff(y[::every]) / np.diff(self.t[::every])) ** 2)))
 
@@ -243,10 +243,10 @@ class Sensed:
 def _slips(
     model: Model, told: list[str]
 ) -> Iterator[tuple[str, tuple[ca.Function, tuple[str, ...]]]]:
-    """Sliding velocities that the told states give, of contacts whose laws have bristles.
+    """Yield sliding velocities in the observed states, for contacts whose laws have bristles.
 
-    Bristles are the states that turn round with the velocity; others, such as the age of a
-    contact, start where the model says.
+    Bristles are the states that change sign with the velocity; others, such as the age of a
+    contact, start as in the model.
     """
     others = [v for v in model.x if v.name not in told]
     symbols = {v.name: v.symbol for v in model.x}
@@ -263,7 +263,7 @@ def _slips(
 
 
 def _smoothed_rate(t: Array, y: Array) -> Array:
-    """Rate of a signal over fiftieths of the record."""
+    """Return the rate of a signal over fiftieths of the record."""
     k = max(1, t.size // 100)
     a, b = np.arange(t.size) - k, np.arange(t.size) + k
     a, b = np.maximum(a, 0), np.minimum(b, t.size - 1)

@@ -1,4 +1,4 @@
-"""Inverse dynamics: the force that the measured motion needs, against the measured force."""
+"""Inverse dynamics: force needed for the measured motion, minus the measured force."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,33 +32,34 @@ class InverseDynamics:
 
         r = D (force needed for x, v, a - force measured)
 
-    with v, a by zero-phase filtering and differences of the measured position and D a common low
-    pass and decimation of all terms. Of a drive: D (m a + F(v, N) + offset - force). States of laws
-    follow the measured sliding velocity, z' = rate(z, v(t), N(t)). Of a model with several
-    coordinates, one row for each input and one for each coordinate that nothing drives; reactions
-    and normal forces that friction depends on are solved for at every sample.
+    with v, a by zero-phase filtering and differences of the measured position and D a common
+    low-pass filter and decimation of all terms. For a drive: D (m a + F(v, N) + offset - force).
+    States of laws follow the measured sliding velocity, z' = rate(z, v(t), N(t)). A model with
+    several coordinates has one row for each input and one for each coordinate without an input;
+    reactions and normal forces that depend on friction are solved for at every sample.
 
-    Equations of static laws near a reversal are left out (`Filter.v_min`): there the low pass
-    mixes both directions, and a static law does not say what holds at rest.
+    Equations of static laws near a reversal are left out (`Filter.v_min`): there the low-pass
+    filter mixes both directions, and a static law does not determine the force at rest.
 
     Attributes:
         force, x: channels of a drive.
-        v: channel of its measured velocity; None: "v" where the records have it. It is mixed with
-            that of the position by the noise of both, frequency by frequency (`Velocity`): one that
-            is noisy, late or of another scale does not count where the position says more.
+        v: channel of its measured velocity; None: "v" if the records have it. It is combined with
+            the velocity from the position according to the noise of both, frequency by frequency
+            (`Velocity`): a noisy, delayed or wrongly scaled one has no weight where the position
+            is more accurate.
         filter: cut-off and decimation of all records; None: from force and motion of each record.
-        dead_time: bounds of the time [s] by which the measured force is ahead of the one that
-            acts, an own unknown of each record; None: there is none.
+        dead_time: bounds of the time [s] by which the measured force leads the acting one, an own
+            unknown of each record; None: no dead time.
 
     Limits: a force that is held for a sample leads by half of it, which lowers the viscous
     coefficient by about m w^2 h / 2 for motion at w [rad/s]; dead_time=(0, h) finds it. The motion
-    is taken as known: what noise is left in it lowers the mass, which is why the decimation follows
-    the band in which the motion stands out (`choose_filter`); a filter of your own may not. Errors
-    are those of the force up to the cut-off of the record's own filter: a force of pulses is wide,
-    so that all its noise and every resonance counts, and its percentage cannot be compared with
-    that of a slow record (EMPS: 10.9 % of the pulses, 5.9 % with the filter of the slow record;
-    the mass is the same within .2 %). Channels of a model are called as its states and inputs;
-    velocities without a channel come from the positions.
+    is taken as exact: its remaining noise lowers the mass. Therefore the decimation follows the
+    band in which the motion exceeds its noise (`choose_filter`); a user's filter may not. Errors
+    are those of the force up to the cut-off of the record's own filter: a force of pulses is
+    wide-band and includes all its noise and every resonance, so its percentage cannot be compared
+    with that of a slow record (EMPS: 10.9 % of the pulses, 5.9 % with the filter of the slow
+    record; the mass is the same within .2 %). Channels of a model are named like its states and
+    inputs; velocities without a channel come from the positions.
     Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
     """
 
@@ -84,11 +85,11 @@ class InverseDynamics:
     def prepare(
         self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
     ) -> "InverseRows":
-        """The residuals of `data`.
+        """Return the residuals of `data`.
 
         Raises:
             ValueError: an implicit model, missing channels, unequal intervals, records too short
-                for the filter, law states that only a simulation follows.
+                for the filter, law states that only a simulation can follow.
         """
         del start
         model = subject.model
@@ -109,9 +110,9 @@ class InverseDynamics:
 
 
 def _check_dead_time(made: Balance, model: Model, where: str) -> None:
-    """Refuse laws that see the force at its instant."""
+    """Raise ValueError for laws that depend on the instantaneous force."""
     if ca.depends_on(ca.vertcat(made.equations.g, made.equations.step), model.vector("u")):
-        raise ValueError(f"{where}: dead_time: expected laws that do not take the applied force")
+        raise ValueError(f"{where}: dead_time: expected laws without the applied force")
 
 
 @final
@@ -127,7 +128,7 @@ class InverseRows:
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """The dead time of each record, where one is asked for."""
+        """The dead time of each record, if it is requested."""
         if self.dead_time is None:
             return ()
         low, high = self.dead_time
@@ -180,7 +181,7 @@ class InverseRows:
         return tuple(found)
 
     def at(self, values: Array) -> Evaluation | str:
-        """Residuals D (force needed - force measured), and their derivatives."""
+        """Return the residuals D (force needed - force measured), and their derivatives."""
         given = np.asarray(values, float)
         count = len(self.parameters)
         p, delays = given[:count], given[count:]
@@ -201,7 +202,7 @@ class InverseRows:
         return Evaluation(np.concatenate(residuals), np.vstack(slopes))
 
     def _shifted(self, motion: Motion, delay: float | None) -> tuple[Array, Array]:
-        """`w` with the force that acts, u(t - delay), and du/dt there (inputs, n)."""
+        """Return `w` with the acting force u(t - delay), and du/dt there (inputs, n)."""
         if delay is None:
             return motion.w, np.zeros((0, 0))
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)

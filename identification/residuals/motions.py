@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 FEWEST, ENOUGH = 10, 100
-"""Equations that a signal must leave, and that it is to leave where the filter is changed."""
+"""Least number of equations of a signal, and the target if the filter is adapted."""
 
 Raw = tuple[Array | None, Array | None]
 """Measured position and rate of a coordinate."""
@@ -28,7 +28,7 @@ Raw = tuple[Array | None, Array | None]
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What one record says about a model.
+    """Measured motion and inputs of one record.
 
     Attributes:
         name: of the record.
@@ -36,9 +36,9 @@ class Motion:
         step: sample interval [s].
         w: positions, rates, accelerations, inputs, time, shape (nw, n).
         inputs: rows of `w` with the inputs.
-        inside: samples that the ends of the filter do not disturb.
+        inside: samples away from the end effects of the filter.
         noise: standard deviations of the filtered rates.
-        filter: what was used.
+        filter: the filter used.
     """
 
     name: str
@@ -52,13 +52,13 @@ class Motion:
 
     @property
     def begin(self) -> Array:
-        """The first sample, with rates near rest at rest."""
+        """The first sample, with rates near rest set to zero."""
         first, count = self.w[:, 0].copy(), self.noise.size
         first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
         return first
 
     def of(self, coordinate: int) -> tuple[Array, Array, Array]:
-        """Position, rate and acceleration of a coordinate."""
+        """Return position, rate and acceleration of a coordinate."""
         count = self.noise.size
         return self.w[coordinate], self.w[count + coordinate], self.w[2 * count + coordinate]
 
@@ -75,8 +75,8 @@ def measure(
     Args:
         model: its `found` coordinates.
         record: equally spaced samples.
-        called: name in the model -> channel, where they differ.
-        filter: None: that for the fastest input, without one for the fastest motion.
+        called: name in the model -> channel, if they differ.
+        filter: None: chosen for the fastest input, or without inputs for the fastest motion.
 
     Raises:
         ValueError: missing channels, unequal intervals.
@@ -89,11 +89,11 @@ def measure(
         names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
         x, v = (record[n] if n is not None and n in record else None for n in names)
         raw.append((x, v))
-    told = [Velocity.of(x, v, step) for x, v in raw]
-    chosen = filter or _filter_of(forces, raw, told, step)
+    velocities = [Velocity.of(x, v, step) for x, v in raw]
+    chosen = filter or _filter_of(forces, raw, velocities, step)
     motion: list[tuple[Array, Array, Array]] = []
     noise: list[float] = []
-    for (x, v), velocity in zip(raw, told, strict=True):
+    for (x, v), velocity in zip(raw, velocities, strict=True):
         motion.append(derivatives(x, v, step, chosen, velocity))
         noise.append(velocity.deviation(chosen, step))
     cut = chosen.trim(step)
@@ -116,7 +116,7 @@ def measure(
 def _check_channels(
     model: Model, found: Sequence[Coordinate], record: Record, called: Mapping[str, str]
 ) -> None:
-    """Refuse a record in which the motion or an input of the model is missing."""
+    """Raise ValueError if the record lacks the motion or an input of the model."""
     known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
     missing: list[str] = []
     for c in found:
@@ -135,13 +135,13 @@ def _check_channels(
 
 
 def _filter_of(
-    forces: Sequence[Array], raw: Sequence[Raw], told: Sequence[Velocity], step: float
+    forces: Sequence[Array], raw: Sequence[Raw], velocities: Sequence[Velocity], step: float
 ) -> Filter:
-    """The filter for the fastest force; without one, for the fastest motion."""
+    """Return the filter for the fastest force; without forces, for the fastest motion."""
     signals = list(forces)
     for x, v in () if signals else raw:
         signals += [v] if v is not None else [np.gradient(x, step)] if x is not None else []
-    bands = [t.band(x, v, step) for t, (x, v) in zip(told, raw, strict=True)]
+    bands = [t.band(x, v, step) for t, (x, v) in zip(velocities, raw, strict=True)]
     each = (choose_filter(signal, step, bands) for signal in signals)
     return max(each, key=lambda f: f.cutoff)
 
@@ -149,11 +149,11 @@ def _filter_of(
 @final
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One record with its decimation.
+    """A record with its decimation.
 
     Attributes:
-        motion: what was measured.
-        decimation: low pass and thinning of its samples.
+        motion: the measured motion.
+        decimation: low-pass filter and decimation of its samples.
         kept: for each row of the balance the decimated samples in use.
     """
 
@@ -162,24 +162,24 @@ class Piece:
     kept: tuple[Numbers, ...]
 
     def equations(self, row: int, signals: Array) -> Array:
-        """Columns of `signals`, shape (n, k), thinned to the equations in use."""
+        """Return the columns of `signals`, shape (n, k), decimated to the equations in use."""
         return self.decimation.columns(signals[self.motion.inside])[self.kept[row]]
 
     def times(self, row: int) -> Array:
-        """Times of the equations in use [s]."""
+        """Return the times of the equations in use [s]."""
         return self.decimation.centres(self.motion.t[self.motion.inside])[self.kept[row]]
 
 
 def piece(made: Balance, motion: Motion, model: Model, adapts: bool = False) -> Piece:
-    """Decide which equations of a record are used.
+    """Select the equations of a record that are used.
 
     Args:
-        made, motion, model: what they are of.
-        adapts: the filter is not the user's; where it leaves too few equations, as of a motion
-            that often turns round, they are thinned less.
+        made, motion, model: balance, measured motion and model.
+        adapts: the filter was chosen automatically; if it leaves too few equations, as for a
+            motion with many reversals, the decimation is lowered.
 
     Raises:
-        ValueError: too few are left.
+        ValueError: too few equations remain.
     """
     slow = _slow(made, motion, model)
     found = _piece(made, motion, slow)
@@ -200,7 +200,7 @@ def _fewest(found: Piece) -> int:
 
 
 def _piece(made: Balance, motion: Motion, slow: Sequence[NDArray[np.bool_]]) -> Piece:
-    """The equations whose low pass touches no `slow` sample."""
+    """Return the equations whose low-pass filter includes no `slow` sample."""
     n = motion.t[motion.inside].size
     decimation = Decimation(n, motion.filter.decimation)
     kept: list[Numbers] = []
@@ -214,7 +214,7 @@ def _piece(made: Balance, motion: Motion, slow: Sequence[NDArray[np.bool_]]) -> 
 
 
 def _slow(made: Balance, motion: Motion, model: Model) -> list[NDArray[np.bool_]]:
-    """For each contact the samples at which its law cannot be asked: none for laws with states."""
+    """Return a mask for each contact: samples where its (static) law is undetermined."""
     w, p = made.equations.w, made.equations.p
     count, n = motion.noise.size, motion.t.size
     start = np.array([float(v.start) for v in model.p if v.symbol.is_leaf() and _in(v.symbol, p)])
@@ -244,5 +244,5 @@ def _too_short(motion: Motion, signal: str, left: int) -> ValueError:
         f"data '{motion.name}': expected at least {FEWEST} equations of {signal} after the filter "
         f"({f.cutoff:g} Hz, decimation {f.decimation}, v_min {limit}), got {left}; raise the "
         "cut-off, lower the decimation or v_min in InverseDynamics(filter=Filter(...)), or leave "
-        "a short piece out by data.between(begin, end)"
+        "out a part with few equations by data.between(begin, end)"
     )

@@ -1,7 +1,7 @@
-"""The motion of one mass under its measured force by the sampled engine, without feedback.
+"""Motion of one mass under its measured force by the sampled engine, without feedback.
 
-Shooting simulates so where friction has no states: some hundred times faster than error control,
-with exact sensitivities, and as right as the samples of the inputs are; see `stepper`.
+Shooting uses it if friction has no states: about a hundred times faster than error control, with
+exact sensitivities, and as accurate as the samples of the inputs; see `stepper`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,10 +25,10 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Hold = Literal["linear", "held"]
 HOLDS: tuple[Hold, ...] = ("linear", "held")
-"""Between two samples an input is linear (the step takes its mean), or held from the first one."""
+"""Between two samples an input is linear (the step uses its mean) or held from the first one."""
 
 KEY = "identification.sampled"
-"""Of the chain in the memory of a model."""
+"""Key of the chain in the memory of a model."""
 
 __all__ = ["HOLDS", "Hold", "sampled_motion", "why_not_sampled"]
 
@@ -37,23 +37,23 @@ def sampled_motion(
     model: Model, t: Array, inputs: Array, p: Array, start: Array,
     *, hold: Hold = "linear", substeps: int = 2,
 ) -> Motion | str:  # fmt: skip
-    """The motion at the instants `t`, with its slopes; a sentence where there is none.
+    """Return the motion at the instants `t` with its derivatives, or a message if there is none.
 
     Args:
-        model: two states x' = v and v' = a(x, v, u, p), such as that of a `Drive` with a static
-            law (`why_not_sampled` says what is wrong with others); all of `model.p` are free.
+        model: two states x' = v and v' = a(x, v, u, p), such as a `Drive` with a static law
+            (`why_not_sampled` explains why others are unsuitable); all of `model.p` are free.
         t: instants [s], shape (n,); not necessarily equidistant.
         inputs: of the model at these instants, shape (n, inputs) or (n,).
         p: values of `model.p`.
         start: position and velocity at t[0].
-        hold: what inputs do between samples: "linear", or "held" as a digital amplifier does.
-        substeps: equal steps a sample, each with the mean of the input over it.
+        hold: inputs between samples: "linear", or "held" as by a digital amplifier.
+        substeps: equal steps per sample, each with the mean of the input over it.
 
     Returns:
         A `Motion`: states (n, 2) and slopes (n, 2, parameters + 2), the last two by the start.
 
     Raises:
-        ValueError: a model that is none of these, or arrays that do not fit.
+        ValueError: an unsuitable model, or arrays of the wrong size.
     """
     checks.choice("sampled_motion: hold", hold, HOLDS)
     chain = _chain(model)
@@ -71,13 +71,13 @@ def sampled_motion(
 
 
 def refined(t: Array, substeps: int) -> Array:
-    """The instants `t` with `substeps` equal steps from each to the next."""
+    """Return the instants `t` with `substeps` equal steps between consecutive ones."""
     shares = np.arange(substeps) / substeps
     return np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
 
 
 def stepped(model: Model, t: Array, between: Array, p: Array, start: Array) -> Motion | str:
-    """`sampled_motion` with the mean inputs from each instant to the next, (n - 1, inputs)."""
+    """Return `sampled_motion` for mean inputs from each instant to the next, (n - 1, inputs)."""
     chain = _chain(model)
     rows = np.column_stack([np.diff(t), between])
     start_slopes = np.hstack([np.zeros((2, p.size)), np.eye(2)])
@@ -86,7 +86,7 @@ def stepped(model: Model, t: Array, between: Array, p: Array, start: Array) -> M
 
 
 def means(t: Array, samples: Array, at: Array, held: bool) -> Array:
-    """Mean of a sampled input from each of the instants `at` to the next one.
+    """Return the mean of a sampled input from each of the instants `at` to the next one.
 
     Args:
         t: sample times [s], shape (n,).
@@ -105,7 +105,7 @@ def means(t: Array, samples: Array, at: Array, held: bool) -> Array:
 
 
 def _chain(model: Model) -> Chain:
-    """The chain of a model, built once."""
+    """Return the chain of a model, built once."""
     if KEY not in model.memory:
         mass = Mass.of(model)
         count = len(mass.inputs)
@@ -114,13 +114,13 @@ def _chain(model: Model) -> Chain:
 
 
 SUBSTEPS = (1, 2, 4, 8, 16, 32)
-"""Steps a sample to choose from."""
+"""Candidate numbers of steps per sample."""
 SHARE = 1e-5
-"""Error over the spread of a signal that is taken where the engine is asked for: laws err more."""
+"""Tolerable error over the spread of a signal if the engine is requested: laws err more."""
 
 
 def why_not(model: Model, signals: Sequence[str], inputs: Mapping[str, object]) -> str:
-    """Why the windows of a model are not for the sampled engine; "" where they are."""
+    """Return the reason why the sampled engine does not suit the windows; "" if it does."""
     why = why_not_sampled(model)
     states = [v.name for v in model.x]
     others = [name for name in signals if name not in states]
@@ -128,18 +128,20 @@ def why_not(model: Model, signals: Sequence[str], inputs: Mapping[str, object]) 
         why = f"expected signals among the states {', '.join(states)}, got {', '.join(others)}"
     odd = [n for n, given in inputs.items() if not isinstance(given, str) and not is_number(given)]
     if not why and odd:
-        why = f"expected inputs that are channels or numbers, got another one for {', '.join(odd)}"
+        why = f"expected inputs that are channels or numbers, got another type for {', '.join(odd)}"
     return why
 
 
 def choose_substeps(
     predicted: Callable[[int], Array | str], tolerable: Sequence[tuple[slice, float]]
 ) -> int | None:
-    """Steps a sample that are enough; None: the most are not, or there is no motion.
+    """Return the smallest sufficient number of steps per sample.
+
+    None means that the largest number is not sufficient, or that there is no motion.
 
     Args:
-        predicted: steps a sample -> simulated values of all rows.
-        tolerable: rows of a channel and the root mean square error that it may have.
+        predicted: steps per sample -> simulated values of all rows.
+        tolerable: rows of a channel and their tolerable root mean square error.
     """
     coarse = predicted(SUBSTEPS[0])
     for substeps in SUBSTEPS:

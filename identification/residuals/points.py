@@ -32,21 +32,21 @@ class Points:
 
     A static law is a curve through the points, and so is a law with states in steady sliding. Over
     time, its states follow the measured velocity instead, z' = rate(z, v(t), N(t)), from steady
-    sliding at the first sample, or relaxed where that is slower than a twentieth of the usual
-    speed. A record that begins slowly and loaded is modelled wrongly until it has slid once; the
-    verdict says so where it shows. Points without time at v = 0 exactly are break-away forces: they
-    are compared with the static level of the law.
+    sliding at the first sample, or relaxed if it is slower than a twentieth of the usual speed. A
+    record that begins slowly under load is modelled wrongly until the contact has slid once; the
+    verdict reports it if it is visible. Points without time at exactly v = 0 are break-away forces,
+    compared with the static level of the law.
 
     Attributes:
-        v, F: channels of the sliding velocity and of the friction force, of one sign in sliding.
-        N: channel of the normal force, or a number [N]; None: the channel "N" where there is one,
+        v, F: channels of the sliding velocity and of the friction force, of equal sign in sliding.
+        N: channel of the normal force, or a number [N]; None: the channel "N" if there is one,
             else the normal force of the fit.
-        weight: channel of weights, such as numbers of samples behind a mean: rows are multiplied by
-            sqrt(weight / mean weight). None: all alike.
-        states: of a law that has some: "steady" sliding, "imposed" velocity over time, or "auto":
-            imposed where every record has a time.
-        offset: fit a constant force beside friction, too, such as the zero of a load cell: an own
-            unknown "offset" of all records together. It takes motion in both directions.
+        weight: channel of weights, such as the number of samples of a mean: rows are multiplied by
+            sqrt(weight / mean weight). None: equal weights.
+        states: of a law with states: "steady" sliding, "imposed" velocity over time, or "auto":
+            imposed if every record has a time.
+        offset: also fit a constant force, such as the zero of a load cell: an own unknown
+            "offset" of all records together. It requires motion in both directions.
     """
 
     v: str = "v"
@@ -67,7 +67,7 @@ class Points:
         checks.flag("Points: offset", self.offset)
 
     def imposed(self, law: Law, data: Dataset) -> bool:
-        """Whether the states of `law` follow the velocity over time."""
+        """Return True if the states of `law` follow the velocity over time."""
         timed = all(record.t is not None for record in data)
         if self.states == "imposed" and not timed:
             raise ValueError(
@@ -79,16 +79,16 @@ class Points:
     def prepare(
         self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
     ) -> "PointRows":
-        """The residuals of `data`.
+        """Return the residuals of `data`.
 
         Raises:
             ValueError: a subject without a law, missing channels, a law that needs an applied force
-                or whose static level break-away needs and it does not know.
+                or whose static level is unknown although break-away needs it.
         """
         del start
         law = subject.law
         if law is None:
-            raise ValueError("Points: expected a law to fit to points, got a model; give its law")
+            raise ValueError("Points: expected a law to fit to points, got a model; pass its law")
         imposed = self.imposed(law, data)
         load = float(subject.model.u[1].start) if len(subject.model.u) > 1 else 1.0
         further = [i.name for i in law.inputs]
@@ -139,7 +139,7 @@ class Points:
 @final
 @dataclass(frozen=True, eq=False)
 class Table:
-    """One record: what is imposed (2 + inputs, n), measured forces, weights, break-away points."""
+    """A record: imposed values (2 + inputs, n), measured forces, weights, break-away points."""
 
     t: Array | None
     w: Array
@@ -163,7 +163,7 @@ class PointRows:
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """The offset of the force, where one is asked for."""
+        """The offset of the force, if it is requested."""
         if self.shift is None:
             return ()
         size = max(float(np.abs(table.F).max(initial=0.0)) for table in self.tables)
@@ -191,7 +191,7 @@ class PointRows:
         return tuple(found)
 
     def at(self, values: Array) -> Evaluation | str:
-        """Residuals weight (F(v, N) + offset - F_measured) [N], and their derivatives."""
+        """Return residuals weight (F(v, N) + offset - F_measured) [N], and their derivatives."""
         given = np.asarray(values, float)
         p, shift = given[: len(self.parameters)], given[len(self.parameters) :]
         residuals, slopes = list[Array](), list[Array]()
@@ -205,7 +205,7 @@ class PointRows:
         return Evaluation(np.concatenate(residuals), np.vstack(slopes))
 
     def _forces(self, table: Table, p: Array) -> tuple[Array, Array] | str:
-        """Predicted forces (n,) and their derivatives by p (n, n_p)."""
+        """Return predicted forces (n,) and their derivatives by p (n, n_p)."""
         F, J = np.zeros(table.F.size), np.zeros((table.F.size, p.size))
         h = np.diff(table.t) if table.t is not None and self.imposed else 1.0
         side = np.sign(table.F)
@@ -229,7 +229,7 @@ class PointRows:
 
 
 def _equations(law: Law, p: ca.SX, imposed: bool) -> Equations:
-    """The force at one sample; `p` are symbols in `law`."""
+    """Return the force at one sample; `p` are symbols in `law`."""
     where = f"Points: {type(law).__name__}"
     w = ca.SX.sym("w", 2 + len(law.inputs))
     given = {i.name: w[2 + k] for k, i in enumerate(law.inputs)}
@@ -247,7 +247,7 @@ def _equations(law: Law, p: ca.SX, imposed: bool) -> Equations:
 
 
 def _break_away(law: Law, p: ca.SX) -> Equations:
-    """The force at which it breaks away, with the side of the pull as last of `w`."""
+    """Return the break-away force, with the direction of the pull as the last entry of `w`."""
     w = ca.SX.sym("w", 3 + len(law.inputs))
     given = {i.name: w[2 + k] for k, i in enumerate(law.inputs) if i.name != FORCE}
     side = w[w.numel() - 1]
@@ -259,12 +259,12 @@ def _break_away(law: Law, p: ca.SX) -> Equations:
 
 
 def _middle(tables: list[Table]) -> float:
-    """Force half-way between both directions [N]."""
+    """Return the force half-way between both directions [N]."""
     v, F = (np.concatenate(part) for part in zip(*((t.w[0], t.F) for t in tables), strict=True))
     if not v.min() < 0 < v.max():
         raise ValueError(
-            "Points: offset: expected motion in both directions, got one: an offset cannot be told "
-            "from friction"
+            "Points: offset: expected motion in both directions, got one: an offset cannot be "
+            "separated from friction"
         )
     return float(np.median(F[v > 0]) + np.median(F[v < 0])) / 2
 

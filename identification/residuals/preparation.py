@@ -1,4 +1,4 @@
-"""From a model and data to the simulations that are compared: names, windows, start values."""
+"""Setup of the compared simulations from a model and data: names, windows, start values."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -22,15 +22,15 @@ from symfric.integrator import Hold, Linear
 from symfric.model import Model
 
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
-"""Tolerances to choose from, and that of what they are compared with."""
+"""Candidate tolerances, and the reference tolerance."""
 BIAS = 0.1
-"""Standard errors by which the simulation may move an estimate."""
+"""Shift of an estimate by simulation errors that is tolerated, in standard errors."""
 LEAST_WINDOWS, FEWEST_SAMPLES = 5, 20
-"""Windows of a record for starts far off, and samples of each window."""
+"""Windows of a record for distant starts, and samples of each window."""
 MOST_STARTS = 60
-"""Start values of such windows: more make steps slow, and a part of the data is enough."""
+"""Largest number of start values of such windows: a part of the data is sufficient."""
 NOISELESS = 1e-9
-"""Noise over the size of a signal below which it has none."""
+"""Noise over the size of a signal below which the signal counts as noise-free."""
 
 
 @final
@@ -38,11 +38,11 @@ class Preparation:
     """Make the residuals of a model on data.
 
     Args:
-        kind: a `Shooting`, whose fields say how; `Shooting.prepare` is the only caller.
+        kind: a `Shooting`, with the settings; `Shooting.prepare` is the only caller.
         model: of the motion.
         data: whose records are compared.
         start: parameter -> value where simulations choose tolerances.
-        every: take every this many windows of a record.
+        every: use every n-th window of a record.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Preparation:
         self.first = len(model.p)
 
     def shots(self) -> Shots:
-        """The residuals of all records, cut into windows."""
+        """Return the residuals of all records, cut into windows."""
         given = self.kind.dead_time
         tau = None if isinstance(given, tuple) else given
         if isinstance(given, tuple):
@@ -102,9 +102,9 @@ class Preparation:
         return shots
 
     def easier(self) -> tuple[float, int] | None:
-        """Length of windows [s] that hardly part from the data, and every which of them is enough.
+        """Return a window length [s] in which motions stay near the data, and a stride of windows.
 
-        None where the windows are as short already.
+        None if the windows are already that short.
         """
         spans = [float(r.time[-1] - r.time[0]) for r in self.records]
         found = [
@@ -120,10 +120,10 @@ class Preparation:
         count = sum(max(1, round(span / length)) for span in spans)
         return length, max(1, count * len(self.states) // MOST_STARTS)
 
-    # ---- what is compared, and what drives
+    # ---- compared signals and inputs
 
     def _signals(self) -> dict[str, str]:
-        """Signal of the model -> channel, of all signals that some record has."""
+        """Return signal of the model -> channel, for all signals in some record."""
         where, given = "Shooting: signals", self.kind.signals
         driven = {v.name for v in self.model.u}
         known = [n for n in self.model.signals if n not in driven]
@@ -153,11 +153,11 @@ class Preparation:
             if unit and there and unit != there:
                 raise ValueError(
                     f"{where}: expected {name} in {unit}, got {channel} of '{record.name}' in "
-                    f"{there}; say units= when the data are read"
+                    f"{there}; pass units= when reading the data"
                 )
 
     def _inputs(self) -> dict[str, Any]:
-        """Input of the model -> channel, or what `simulate` takes."""
+        """Return input of the model -> channel, or an input for `simulate`."""
         where = "Shooting: inputs"
         units = {v.name: v.unit for v in self.model.u}
         given = checks.named(where, self.kind.inputs, units)
@@ -176,7 +176,7 @@ class Preparation:
         return found
 
     def _timeless(self) -> bool:
-        """Whether the motion is the same at any time, so that no step need resolve 1e9 s."""
+        """Return True if the motion is independent of the time origin (no step resolves 1e9 s)."""
         given = [u for u in self.inputs.values() if not isinstance(u, str)]
         model, outputs = self.model, [self.model.outputs[n].expression for n in self.signals
                                       if n in self.model.outputs]  # fmt: skip
@@ -185,7 +185,7 @@ class Preparation:
         return not timed and not model.events and all(map(is_number, given))
 
     def _check_span(self, where: str, source: object) -> None:
-        """Refuse samples that end before a record does: what holds then is nobody's measurement."""
+        """Raise ValueError for input samples that do not cover a record."""
         if not isinstance(source, Hold | Linear):
             return
         t = np.ravel(np.asarray(source.t, dtype=float))
@@ -215,10 +215,10 @@ class Preparation:
             else:
                 checks.number(f"{where}: {name}", value)
 
-    # ---- pieces of records
+    # ---- windows of records
 
     def _cut(self, number: int, record: Record, row: int) -> Iterator[Shot]:
-        """The windows of one record; residuals begin at `row`, a signal after the other."""
+        """Yield the windows of one record; residuals begin at `row`, one signal after the other."""
         origin = float(record.time[0]) if self.timeless else 0.0
         t = record.time - origin
         measured = {s: record[c] for s, c in self.signals.items() if c in record}
@@ -264,12 +264,12 @@ class Preparation:
     def _start(
         self, number: int, sensed: Sensed, k: int, label: str
     ) -> tuple[dict[str, float], dict[str, int]]:
-        """Start values that are held, and columns of those that are estimated."""
+        """Return the held start values, and the columns of the estimated ones."""
         given = self.kind.x0
         if given == "given" and k == 0:
             return {}, {}
         begin = sensed.at(k)
-        if k > 0:  # what the model says of the start says nothing of a time in between
+        if k > 0:  # the model's start values do not apply to later times
             begin |= {n: Begin(None) for n in self.hidden if n not in begin}
         held, free = dict[str, float](), dict[str, int]()
         for v in self.model.x:
@@ -289,7 +289,7 @@ class Preparation:
         return held, free
 
     def _unknown(self, v: Variable, here: Begin, label: str, begin: Mapping[str, Begin]) -> Unknown:
-        """The start value of a state; without data it begins as the model says."""
+        """Return the unknown start value of a state; without data it starts as in the model."""
         value = here.value
         if value is None:
             known = {n: b.value for n, b in begin.items() if b.value is not None}
@@ -319,10 +319,10 @@ class Preparation:
             )
             row += t.size
 
-    # ---- how exactly
+    # ---- accuracy
 
     def _substeps(self, shots: Shots) -> int:
-        """Steps a sample of the sampled engine; 0 where `simulate` runs."""
+        """Return the steps per sample of the sampled engine; 0 if `simulate` runs."""
         engine = self.kind.engine
         why = "" if engine == "simulate" else why_not(self.model, list(self.signals), self.inputs)
         if engine == "sampled" and why:
@@ -334,7 +334,7 @@ class Preparation:
         tolerable = list[tuple[slice, float]]()
         for c in shots.channels:
             noise, share = noise_of(c.measured), SHARE * float(np.std(c.measured))
-            exact = BIAS * noise / np.sqrt(shots.rows)  # as `_rtol` asks of `simulate`
+            exact = BIAS * noise / np.sqrt(shots.rows)  # as `_rtol` requires of `simulate`
             tolerable.append((c.rows, exact if engine == "auto" else max(noise, share)))
         found = choose_substeps(lambda n: replace(shots, substeps=n).predicted(values), tolerable)
         if found is None:
@@ -342,10 +342,10 @@ class Preparation:
         return found
 
     def _rtol(self, shots: Shots) -> float:
-        """The loosest tolerance whose error biases no estimate by a tenth of its standard error.
+        """Return the loosest tolerance that biases no estimate by a tenth of its standard error.
 
         An error e of the simulation moves estimates by at most |e / noise| standard errors,
-        however many samples there are. It is looked at for the start values.
+        independent of the number of samples. It is evaluated at the start values.
         """
         values = np.array([*self.values.values(), *(u.start for u in self.own)])
         fine = replace(shots, rtol=FINEST).predicted(values)

@@ -31,25 +31,25 @@ def imposed_step(
     h: Scalar,
     where: str,
 ) -> ca.SX:
-    """States of `law` one sample later, (nz, 1).
+    """Return the states of `law` one sample later, (nz, 1).
 
         z' = rate(z, v(t), N(t)),   v, N and further inputs linear between the samples
 
-    Two steps with the mean velocity and load of each held: exact exponentials for bristles, exact
-    event steps for elements that yield, second order elsewhere
+    Two steps, each with its mean velocity and load held: exact exponentials for bristles, exact
+    event steps for yielding elements, second order otherwise
     (`symfric.codegen.blocks.held_step`). They meet in the middle, or where the velocity passes
-    through zero, so that no step sees two directions. The smooth form of GMS takes the step of its
-    event form, which slips later by up to the share rho of the limit.
+    through zero, so that no step includes two directions. The smooth form of GMS takes the step of
+    its event form, which slips later by up to the share rho of the limit.
 
     Args:
         law: with states; its parameters may be symbols.
         z: SX symbols of its states.
         before, after: velocity, normal force and further inputs at the two samples.
         h: sample interval [s].
-        where: begins the message of an error.
+        where: start of the error message.
 
     Raises:
-        ValueError: a law whose modes or states act on each other: only a simulation follows.
+        ValueError: a law whose modes or states are coupled: only a simulation can follow it.
     """
     v, N, size = (ca.SX.sym(name) for name in ("v", "N", "h"))
     names = list(before[2])
@@ -79,7 +79,7 @@ def _held(
     h: ca.SX,
     where: str,
 ) -> ca.SX:
-    """States after a step with everything held."""
+    """Return the states after a step with constant inputs."""
     from symfric.codegen.blocks.held_step import advanced  # noqa: PLC0415 (slow to import)
     from symfric.laws import GMS  # noqa: PLC0415 (slow to import)
 
@@ -90,7 +90,7 @@ def _held(
     except ValueError:
         raise ValueError(
             f"{where}: expected a law with a step for imposed velocity, got {type(law).__name__}, "
-            "whose modes or states act on each other; use Shooting(), which simulates"
+            "whose modes or states are coupled; use Shooting(), which simulates"
         ) from None
 
 
@@ -100,9 +100,9 @@ def _stacked(point: tuple[Scalar, Scalar, Mapping[str, Scalar]], names: list[str
 
 
 def moving_start(v: Array) -> float:
-    """Velocity from which states start in steady sliding: the first one, 0 where it is near rest.
+    """Return the initial velocity of the states: the first one, or 0 if it is near rest.
 
-    A bristle that has slid far is bent fully at the smallest speed; at rest it is taken as relaxed.
+    A bristle that has slid far is fully bent at the smallest speed; at rest it is taken as relaxed.
     """
     return float(v[0]) if abs(v[0]) > NEAR_REST * float(np.sqrt(np.mean(v**2))) else 0.0
 
@@ -110,25 +110,25 @@ def moving_start(v: Array) -> float:
 NEWTON = 20
 """Newton steps for the algebraic unknowns of all samples together."""
 ROUNDS = 40
-"""Passes between algebraic unknowns and states along the record."""
+"""Largest number of passes between algebraic unknowns and states along the record."""
 SETTLED = 1e-9
-"""Change of the algebraic unknowns, over their size, from which on they count as found."""
+"""Change of the algebraic unknowns, over their size, below which they are converged."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """What holds at each sample of a record, in symbols.
+    """Equations at each sample of a record, in symbols.
 
         0 = g(w, z, y, p)                 algebraic unknowns y: reactions, normal forces
         z_{k+1} = step(z_k, w_k, y_k, w_{k+1}, y_{k+1}, h, p),   z_0 = start(w_0, y_0, p)
         r = rows(w, z, y, p)
 
     Attributes:
-        w, z, y, p: SX symbols of what is measured, of states of laws, of unknowns, of parameters.
+        w, z, y, p: SX symbols of measured quantities, law states, unknowns, parameters.
         rows, g, start: SX expressions in them.
         step: SX expression in z, w, y, p, `h` and `later`, the symbols of w_{k+1} and y_{k+1}.
-        guess: values of y to start from, shape (ny,).
+        guess: start values of y, shape (ny,).
     """
 
     w: ca.SX
@@ -144,7 +144,7 @@ class Equations:
     guess: tuple[float, ...] = ()
 
     def compiled(self) -> "Sampled":
-        """The same as Functions, which can be evaluated and pickled."""
+        """Return the equations as Functions, which can be evaluated and pickled."""
         here, along = ca.vertcat(self.w, self.y), ca.vertcat(self.z, self.y, self.p)
 
         def with_slopes(name: str, of: ca.SX) -> ca.Function:
@@ -161,9 +161,9 @@ class Equations:
         )
 
     def _steps(self, here: ca.SX) -> tuple[ca.Function, ca.Function]:
-        """The step, and the same with the derivatives S of the states by p.
+        """Return the step, and the step with the derivatives S of the states by p.
 
-        Those of y are Y at the sample and Y_later at the next one.
+        The derivatives of y are Y at the sample and Y_later at the next one.
         """
         nw, nz, ny, count = (x.numel() for x in (self.w, self.z, self.y, self.p))
         later = self.later if nz else ca.SX.sym("later", nw + ny)
@@ -186,7 +186,7 @@ class Equations:
 @final
 @dataclass(frozen=True, eq=False)
 class Path:
-    """What was found along a record of n samples.
+    """Rows along a record of n samples.
 
     Attributes:
         rows: (n, m).
@@ -200,9 +200,9 @@ class Path:
 @final
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """`Equations` as Functions of numbers; sizes are those of w, z, y and p.
+    """`Equations` as numeric Functions; `sizes` are those of w, z, y and p.
 
-    Laws with states run in compiled code where there is a compiler, all else in CasADi's virtual
+    Laws with states run in compiled code if there is a compiler, all others in CasADi's virtual
     machine; both give the same bits.
     """
 
@@ -215,7 +215,7 @@ class Sampled:
     guess: Array
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields; a copy compiles or loads for itself."""
+        """Return the fields; a copy compiles or loads its own code."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
@@ -234,11 +234,11 @@ class Sampled:
         return columns(rows, first, "vm")
 
     def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
-        """Rows at all samples of a record and their derivatives by p; a sentence if there are none.
+        """Return rows at all samples and their derivatives by p, or a message on a failure.
 
         Args:
             w: measured, shape (nw, n).
-            begin: measured, for the start of the states, shape (nw,); None: the first sample.
+            begin: values of w for the start of the states, shape (nw,); None: the first sample.
             h: sample interval [s], one or (n - 1,); not used without states.
             p: parameters, shape (n_p,).
         """
@@ -257,7 +257,7 @@ class Sampled:
             if not (nz and ny) or _settled(old, y):
                 break
         else:
-            return "friction and the reactions that press it did not settle"
+            return "friction and the reactions that load it did not converge"
         dz, dy = self._tangents(w, z, y, h, p, first)
         r, at = self._at("rows", w, z, y, p)
         slopes = at[:, :, nz + ny :].copy()
@@ -270,29 +270,29 @@ class Sampled:
         return Path(r, slopes)
 
     def _at(self, name: str, w: Array, z: Array, y: Array, p: Array) -> tuple[Array, Array]:
-        """Values (n, m) and slopes (n, m, k) of a function at all samples."""
+        """Return values (n, m) and derivatives (n, m, k) of a function at all samples."""
         n = w.shape[0]
         value, slopes = self._run(name, [np.hstack([w, y]), z, _same(p, n)])
         return value, slopes.reshape(n, -1, value.shape[1]).transpose(0, 2, 1)
 
     def _solve(self, w: Array, z: Array, y: Array, p: Array) -> Array | str:
-        """Algebraic unknowns of all samples by Newton's method."""
+        """Solve for the algebraic unknowns of all samples by Newton's method."""
         nz, ny = self.sizes[1:3]
         for _ in range(NEWTON):
             g, slopes = self._at("g", w, z, y, p)
             try:
-                way = np.linalg.solve(slopes[:, :, nz : nz + ny], g[:, :, None])[:, :, 0]
+                step = np.linalg.solve(slopes[:, :, nz : nz + ny], g[:, :, None])[:, :, 0]
             except np.linalg.LinAlgError:
-                return "reactions cannot be told from the motion at some samples"
-            if not np.isfinite(way).all():
+                return "the motion does not determine the reactions at some samples"
+            if not np.isfinite(step).all():
                 return "the equations of the reactions are not finite at some samples"
-            y = y - way
-            if _settled(y + way, y):
+            y = y - step
+            if _settled(y + step, y):
                 return y
         return "the reactions were not found by Newton's method at some samples"
 
     def _states(self, w: Array, y: Array, h: float | Array, p: Array, begin: Array) -> Array:
-        """States of the laws along the record, (n, nz)."""
+        """Return the states of the laws along the record, (n, nz)."""
         n = w.shape[0]
         here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
         first = self._at("start", begin[None], np.zeros((1, self.sizes[1])), y[:1], p)[0]
@@ -302,7 +302,7 @@ class Sampled:
     def _tangents(
         self, w: Array, z: Array, y: Array, h: float | Array, p: Array, begin: Array
     ) -> tuple[Array, Array]:
-        """Derivatives of states (n, nz, n_p) and of unknowns (n, ny, n_p) by the parameters."""
+        """Return derivatives of states (n, nz, n_p) and unknowns (n, ny, n_p) by the parameters."""
         n, (_, nz, ny, count) = w.shape[0], self.sizes
         dz, dy = np.zeros((n, nz, count)), np.zeros((n, ny, count))
         by_z, by_p = np.zeros((n, ny, nz)), np.zeros((n, ny, count))
@@ -329,7 +329,7 @@ class Sampled:
         p: Array,
         begin: Array,
     ) -> Array:
-        """Derivatives of the states by the parameters, those of y being dy."""
+        """Return the derivatives of the states by the parameters, given those of y, dy."""
         n, (_, nz, ny, count) = w.shape[0], self.sizes
         first = self._at("start", begin[None], z[:1], y[:1], p)[1][0]
         S = first[:, nz + ny :] + first[:, nz : nz + ny] @ dy[0]
@@ -344,12 +344,12 @@ class Sampled:
 
 
 def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
-    """One row for all samples."""
+    """Return one parameter row shared by all samples."""
     return p[None, :], np.zeros(n, np.intp)
 
 
 def _settled(old: Array, new: Array) -> bool:
-    """Whether nothing has changed but rounding."""
+    """Return True if only rounding has changed."""
     if not new.size:
         return True
     size = max(float(np.abs(new).max()), 1e-12)

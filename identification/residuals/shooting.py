@@ -2,18 +2,18 @@
 
     r_s(t_i) = y_s(t_i; p, x0, tau) - measured_s(t_i),    x' = f(x, u(t - tau), p),  x(t_0) = x0
 
-with the derivatives of the steps that the simulation took by parameters p, start values x0 of every
-record and window, and the dead time tau of the inputs. It takes any model: laws with states,
-several bodies, friction from reactions, laws by modes.
+with the derivatives of the simulation's steps by parameters p, start values x0 of every record and
+window, and the dead time tau of the inputs. Any model is supported: laws with states, several
+bodies, friction from reactions, laws by modes.
 
-Short windows forgive a model what it gets wrong slowly, long ones show it what it gets wrong in the
-long run. Each length is tried (`choose`):
+Short windows limit the effect of slow model errors; long windows expose them. Candidate lengths are
+compared (`choose`):
 
     for each quarter of every record: fit to the others in windows of that length,
-    simulate the quarter freely, from the start that the data tell;
+    simulate the quarter freely, from the start that the data determine;
     error^2 = mean over signals and quarters of  mean r^2 / variance of the signal
 
-and the length of the least error is taken. Nothing is drawn by chance.
+The length of the least error is used. The procedure is deterministic.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,17 +31,18 @@ from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 
 Solve = Callable[["Shooting", Dataset], Mapping[str, float] | None]
-"""Fits parameters to data by windows; None where that fails."""
+"""Fit parameters to data by windows; None on failure."""
 BLOCKS = 4
 RTOL = 1e-6
-"""Tolerance of simulations where nobody gave one."""
+"""Default tolerance of simulations."""
 LENGTHS, LEAST = 5, 2.5
-"""Lengths to try besides whole records, each half the one before; windows of fewer samples than
-`LEAST` times the fewest tell their start values badly."""
+"""Lengths to try in addition to whole records, each half the previous one; windows of fewer
+samples than `LEAST` times the fewest determine their start values poorly.
+"""
 
 
 def lengths(data: Dataset) -> list[float | None]:
-    """Lengths to try [s]; None is whole records."""
+    """Return the lengths to try [s]; None is whole records."""
     span = max(float(r.time[-1] - r.time[0]) for r in data)
     least = LEAST * FEWEST * max(r.median_step for r in data)
     shorter = [span / 2 ** (k + 1) for k in range(LENGTHS)]
@@ -49,21 +50,21 @@ def lengths(data: Dataset) -> list[float | None]:
 
 
 def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "Shooting":
-    """The kind with windows of the length that predicts left-out quarters best.
+    """Return `kind` with windows of the length that predicts left-out quarters best.
 
     Args:
-        kind: whose windows are to be chosen.
-        subject: what is fitted.
+        kind: residuals whose windows are chosen.
+        subject: fitted law, machine or model.
         data: records; each is divided in time.
         solve: fits parameters to some of the data.
 
     Raises:
         ValueError: no length gives a fit that can be simulated.
     """
-    # what is left of a record begins anywhere; a tolerance as of usual data saves looking for one
+    # parts of a record begin anywhere; the tolerance of usual data saves a search
     x0 = "data" if kind.x0 == "data" else "estimate"
-    asked = replace(kind, x0=x0, rtol=kind.rtol or RTOL)
-    errors = {s: _left_out(replace(asked, windows=s), subject, data, solve) for s in lengths(data)}
+    fixed = replace(kind, x0=x0, rtol=kind.rtol or RTOL)
+    errors = {s: _left_out(replace(fixed, windows=s), subject, data, solve) for s in lengths(data)}
     best = min(errors, key=lambda s: errors[s])
     if not np.isfinite(errors[best]):
         raise ValueError(
@@ -74,20 +75,20 @@ def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "
 
 
 def _left_out(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> float:
-    """Mean square error of predicted quarters over the variance of each signal."""
+    """Return the mean square error of predicted quarters over the variance of each signal."""
     found = list[float]()
     for block in range(BLOCKS):
         rest, other = _divided(data, block)
         try:
             values = solve(kind, rest)
             found.append(np.inf if values is None else _free_run(kind, subject, other, values))
-        except ValueError:  # a rest whose windows are too short, or that does not move
+        except ValueError:  # a remainder with short windows or without motion
             found.append(np.inf)
     return float(np.mean(found))
 
 
 def _divided(data: Dataset, block: int) -> tuple[Dataset, Dataset]:
-    """All but a quarter of each record, and these quarters."""
+    """Return all but a quarter of each record, and these quarters."""
     rest, other = list[Record](), list[Record]()
     for record in data:
         a, b = (record.size * k // BLOCKS for k in (block, block + 1))
@@ -99,7 +100,7 @@ def _divided(data: Dataset, block: int) -> tuple[Dataset, Dataset]:
 def _free_run(
     kind: "Shooting", subject: Subject, data: Dataset, values: Mapping[str, float]
 ) -> float:
-    """Mean square error of simulated records over the variance of each signal."""
+    """Return the mean square error of simulated records over the variance of each signal."""
     shots = replace(kind, windows=None, x0="data").prepare(subject, data, values)
     own = {u.name: values[u.name] if u.name == DEAD_TIME else u.start for u in shots.own}
     predicted = shots.predicted(np.array([{**values, **own}[name] for name in shots.names]))
@@ -123,39 +124,39 @@ class Shooting:
     """Simulate the motion and compare named signals.
 
     Attributes:
-        signals: of the model (states, outputs) that are compared: names, or signal -> channel of
-            the data; None: all that the data have. A record may lack some of them.
+        signals: compared states and outputs of the model: names, or signal -> channel of the data;
+            None: all in the data. A record may lack some of them.
         windows: None: each record is simulated from its start; a length [s]: it is cut into windows
-            of about that length, each with its own start values, so that motions that part from the
-            measured ones do not drift away; "choose": the length that predicts best on the data at
-            hand (`residuals.choice`).
-        x0: "estimate": start values of states that are measured, or are rates of measured ones, are
-            unknowns of their own, "x0.v[2]" of record 2, "x0.v[2,3]" of its window 3, and so is the
-            bristle of a law with one; the many of others start in steady sliding or, where the
-            contact rests, unstrained; other states as the model says at the start of a record, and
-            unknown at that of later windows. "data": those that the data tell are held there.
-            "given": records start as the model says. Or, of records, state -> number, numbers (one
-            a record) or "estimate"; others as "estimate".
-        inputs: input of the model -> channel, or an input as `simulate` takes it (a number,
-            samples, a function of time); by default the channel of the same name.
+            of about that length, each with its own start values, so that motions do not drift away
+            from the measured ones; "choose": the length that predicts best on the given data
+            (`choose`).
+        x0: "estimate": start values of measured states and of rates of measured states are own
+            unknowns, "x0.v[2]" of record 2, "x0.v[2,3]" of its window 3, and so is the bristle of
+            a law with one; several bristles start in steady sliding or, if the contact sticks,
+            unstrained; other states start as in the model at the start of a record, and are
+            unknown at the start of later windows. "data": start values determined by the data are
+            held there. "given": records start as in the model. Or, for records, state -> number,
+            numbers (one per record) or "estimate"; others as "estimate".
+        inputs: input of the model -> channel, or an input for `simulate` (a number, samples, a
+            function of time); by default the channel of the same name.
         interpolation: of sampled inputs: "linear" for a measured one, "hold" for one that a
             controller holds from each sample to the next.
-        dead_time: the motion feels sampled inputs this much later [s]; (low, high): estimated
-            between these bounds, as "dead_time". Needs linear inputs; a held input is about a
-            linear one that comes half a sample later.
-        every: compare every this many samples; inputs are sampled in full.
-        engine: "simulate" takes any model; "sampled" steps one mass under friction without states,
-            such as a `Drive` with a static law, from sample to sample (`stepper`), some hundred
-            times faster and right to 1e-5 of the signals or to their noise; "auto": the latter
-            where it is for the model and as right as `simulate` has to be (`rtol`).
+        dead_time: delay of sampled inputs [s]; (low, high): estimated between these bounds, as
+            "dead_time". Requires linear inputs; a held input is approximately a linear one delayed
+            by half a sample.
+        every: compare every n-th sample; inputs are sampled in full.
+        engine: "simulate" supports any model; "sampled" steps one mass under friction without
+            states, such as a `Drive` with a static law, from sample to sample (`stepper`), about a
+            hundred times faster and accurate to 1e-5 of the signals or to their noise; "auto": the
+            latter if it supports the model and is as accurate as `simulate` has to be (`rtol`).
         rtol: of the simulation; None: the loosest of 1e-6, 1e-7, 1e-8 whose error moves no estimate
             by more than a tenth of its standard error.
 
     Raises:
         ValueError: bad input.
 
-    Limits: over a long record the motion of a wrong start may part from the measured one for good
-    (chaos, a contact that sticks in one and slides in the other): take windows, or many starts.
+    Limits: over a long record the motion from a wrong start may diverge from the measured one
+    (chaos, a contact that sticks in one and slides in the other): use windows, or many starts.
     Dead time is common to all inputs and records.
     """
 
@@ -220,19 +221,19 @@ class Shooting:
 
     @property
     def seconds(self) -> float | None:
-        """Length of windows [s], once it is known; None: whole records.
+        """Length of windows [s]; None: whole records.
 
         Raises:
-            ValueError: it is still to be chosen.
+            ValueError: the length is not chosen yet.
         """
         if isinstance(self.windows, str):
             raise ValueError(
-                "Shooting: windows: expected a length [s] by now, got 'choose', which Fit does"
+                "Shooting: windows: expected a length [s] at this point, got 'choose'; use Fit"
             )
         return self.windows
 
     def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Shots:
-        """The residuals of `data`; simulations that choose the tolerance run at `start`.
+        """Return the residuals of `data`; simulations that select the tolerance run at `start`.
 
         Raises:
             ValueError: names that model or data do not have, windows that are too short.

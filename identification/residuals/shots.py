@@ -1,12 +1,12 @@
 """Simulations of windows of records, and their difference from the data.
 
-Dead time of inputs: a model is driven by what was recorded a while earlier,
+Dead time of inputs: a model is driven by the input recorded a time tau earlier,
 
     u(t) = recorded(t - tau),     du/dtau = -recorded'(t - tau)
 
-Between samples an input is linear, so its rate is constant there and jumps at the samples. With a
-further parameter theta, which stays 0, the model is driven by u - theta u_rate: its derivative by
-theta is that of the motion by tau, whatever the model.
+Between samples an input is linear, so its rate is constant there and jumps at the samples. With an
+additional parameter theta = 0, the model is driven by u - theta u_rate: the derivative by theta
+equals the derivative of the motion by tau, for any model.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,11 +30,11 @@ Array = NDArray[np.float64]
 DEAD_TIME = "dead_time"
 """Name of the unknown and of the parameter of a delayed model."""
 RATE = "_rate"
-"""Behind the name of an input: its rate."""
+"""Suffix of an input's name for its rate."""
 
 
 def delayed(model: Model, inputs: Sequence[str]) -> Model:
-    """The model with a parameter `dead_time` (0) and the rates of `inputs` as inputs."""
+    """Return the model with a parameter `dead_time` (0) and the rates of `inputs` as inputs."""
     theta = Variable(DEAD_TIME, "s", nominal=1e-3, doc="0; derivatives by it are by the dead time")
     driven = [v for v in model.u if v.name in inputs]
     rates = [Variable(v.name + RATE, f"{v.unit}/s", nominal=v.nominal) for v in driven]
@@ -66,13 +66,13 @@ def delayed(model: Model, inputs: Sequence[str]) -> Model:
 
 
 def rate(t: Array, values: Array) -> Hold:
-    """Rate of linear samples, 0 before the first and after the last one."""
+    """Return the rate of linear samples, 0 before the first and after the last one."""
     begin = np.concatenate([[t[0] - (t[1] - t[0])], t])
     return Hold(begin, np.concatenate([[0.0], np.diff(values) / np.diff(t), [0.0]]))
 
 
 def plain(model: Model, signals: Iterable[str] | None = None) -> Model:
-    """The equations of `model` with the outputs among `signals` alone; None keeps them all."""
+    """Return the equations of `model` with the outputs in `signals` only; None keeps them all."""
     wanted = model.signals if signals is None else set(signals)
     outputs = {name: output for name, output in model.outputs.items() if name in wanted}
     return replace(
@@ -81,12 +81,13 @@ def plain(model: Model, signals: Iterable[str] | None = None) -> Model:
 
 
 METHOD = "radau5"
-"""What `simulate` takes for derivatives; without them it would take another one."""
+"""Method of `simulate` for derivatives; without them it would choose another one."""
 LEAST_STEPS, STEPS = 20_000, 50
-"""Steps that a simulation may take, in all and for each sample: with values far off, a motion may
-take a million, and is no way to go on."""
+"""Largest number of simulation steps, in total and for each sample: with distant values a motion
+may need a million.
+"""
 LISTED = 6
-"""Values that a sentence about a failure shows."""
+"""Largest number of values in a failure message."""
 
 
 @final
@@ -97,7 +98,7 @@ class Drives:
     Attributes:
         t: sample times from the origin of the shots [s], shape (n,).
         sampled: input -> samples, shape (n,).
-        others: input -> what `simulate` takes.
+        others: input -> input for `simulate`.
         held: samples are held until the next one; else linear between them.
     """
 
@@ -107,10 +108,10 @@ class Drives:
     held: bool
 
     def over(self, begin: float, end: float, tau: float, rates: bool) -> dict[str, Input]:
-        """Inputs from `begin` to `end` [s], `tau` [s] late, and their `rates`."""
+        """Return the inputs from `begin` to `end` [s], delayed by `tau` [s], and their `rates`."""
         first = max(0, int(np.searchsorted(self.t, begin - tau, "right")) - 2)
         last = min(self.t.size, int(np.searchsorted(self.t, end - tau)) + 2)
-        if last - first < 2:  # a window that lies before the first sample, or behind the last one
+        if last - first < 2:  # a window before the first or after the last sample
             first, last = (0, 2) if last < 2 else (self.t.size - 2, self.t.size)
         late = self.t[first:last] + tau
         found = dict(self.others)
@@ -125,17 +126,17 @@ class Drives:
 @final
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One simulation: a window of a record, or a whole one.
+    """A simulation: a window of a record, or a whole one.
 
     Attributes:
         record: its name.
         origin: time of the record from which the others are counted [s].
-        t: times that are compared [s], shape (m,); the simulation starts at the first.
-        end: last time that is simulated [s].
+        t: compared times [s], shape (m,); the simulation starts at the first.
+        end: end of the simulation [s].
         measured: signal -> values at `t`.
-        places: signal -> where its residuals stand among the rows.
+        places: signal -> slice of its residuals among the rows.
         drives: inputs of the record.
-        held: state -> start value that is known.
+        held: state -> known start value.
         free: state -> column of its start value among the values.
     """
 
@@ -153,7 +154,7 @@ class Shot:
 @final
 @dataclass(frozen=True, eq=False)
 class SampledRun:
-    """A motion of one window at the times that are compared."""
+    """A motion of one window at the compared times."""
 
     signals: Mapping[str, Array]
     sensitivities: Mapping[str, Mapping[str, Array]]
@@ -165,15 +166,15 @@ class SampledRun:
 def sampled_run(
     model: Model, shot: Shot, x0: Mapping[str, float], p: Array, tau: float, substeps: int
 ) -> SampledRun | str:
-    """The motion of one window from `x0`, with all its derivatives; why there is none.
+    """Return the motion of one window from `x0`, with all its derivatives, or a failure message.
 
     Args:
-        model: one mass; plain, perhaps with a dead time.
+        model: one mass; plain, possibly with a dead time.
         shot: the window.
-        x0: start values that are known.
+        x0: known start values.
         p: values of `model.p`.
         tau: dead time of the inputs [s].
-        substeps: steps a sample.
+        substeps: steps per sample.
     """
     drives = shot.drives
     first, last = np.searchsorted(drives.t, [shot.t[0], shot.end])
@@ -218,15 +219,15 @@ class Shots:
     """Residuals of simulated motions; see `Residuals`.
 
     Attributes:
-        model: plain equations, with a parameter for the dead time where that is estimated.
+        model: plain equations, with a parameter for the dead time if it is estimated.
         parameters: free parameters of the user's model.
         own: start values and dead time.
-        channels: what the rows are.
+        channels: groups of rows.
         shots: the simulations.
         dead_time: of the inputs [s]; None: it is the first of the own unknowns.
         rtol, backend: as `simulate` takes them.
-        substeps: steps a sample of the sampled engine; 0: `simulate` runs.
-        easier: the same data in short windows, for starts far off.
+        substeps: steps per sample of the sampled engine; 0: `simulate` runs.
+        easier: the same data in short windows, for distant starts.
     """
 
     model: Model
@@ -251,7 +252,7 @@ class Shots:
         return self.channels[-1].rows.stop
 
     def at(self, values: Array) -> Evaluation | str:
-        """Residuals and derivatives; a sentence where a motion cannot be simulated."""
+        """Return residuals and derivatives, or a message if a motion cannot be simulated."""
         r, J = np.empty(self.rows), np.zeros((self.rows, len(self.names)))
         columns = {name: i for i, name in enumerate(self.parameters)}
         if self.dead_time is None:
@@ -274,7 +275,7 @@ class Shots:
         return Evaluation(r, J)
 
     def predicted(self, values: Array) -> Array | str:
-        """Simulated values alone, shape (rows,)."""
+        """Return the simulated values alone, shape (rows,)."""
         found = np.empty(self.rows)
         for shot in self.shots:
             try:
@@ -290,7 +291,7 @@ class Shots:
     def _run(
         self, shot: Shot, values: Array, names: tuple[str, ...]
     ) -> Trajectory | SampledRun | str:
-        """The motion of one window; why there is none."""
+        """Return the motion of one window, or a failure message."""
         estimated = self.dead_time is None
         tau = float(values[len(self.parameters)]) if self.dead_time is None else self.dead_time
         begin = float(shot.t[0])

@@ -1,22 +1,22 @@
-"""The sampled motion of one mass under friction, with exact sensitivities, sample by sample.
+"""Sampled motion of one mass under friction, with exact sensitivities.
 
-One step of length H solves an implicit equation for the velocity, and stretches itself by what it
-found (friction of slope -a_v is a decay, which one implicit step would underrate):
+One step of length H solves an implicit equation for the velocity, with a length stretched by the
+result (friction of slope -a_v is a decay, which one implicit step would underestimate):
 
     vb = v + H a(vb),   v1 = v + S a(v1),   S = H phi(-H a_v(vb)),   x1 = x + H (v + v1)/2
 
-phi(z) = (e^z - 1)/z for z within +-1. The step is of second order where the mass slides, and exact
-under constant force for Coulomb with viscous friction. A friction law that takes power out never
-turns the velocity round by itself, so v1 lies between 0 and v + S a(0): a guarded Newton iteration
-finds it for any slope at rest. Friction that holds the mass at rest is found at once, at the speed
-`CREEP`: a jump at v = 0 is the exact impulse clamp, and sticking needs no events and small steps.
+phi(z) = (e^z - 1)/z for z within +-1. The step is of second order in sliding, and exact under
+constant force for Coulomb with viscous friction. A dissipative friction law does not reverse the
+velocity by itself, so v1 lies between 0 and v + S a(0): a guarded Newton iteration finds it for any
+slope at rest. Friction that holds the mass at rest is detected directly, at the speed `CREEP`: a
+jump at v = 0 is the exact impulse clamp, and sticking needs no events and no small steps.
 
 The iteration is not differentiated: by the implicit function theorem
 
     (1 - S a_v) dv1 = dv + S (a_x dx + a_u du + a_p dp) + a dS,
 
-and dv1 = 0 where the mass is held. All is one CasADi Function of a sample, whose chain runs as
-compiled C where there is a compiler, else in CasADi's virtual machine: both give the same bits.
+and dv1 = 0 if the mass is held. The step is one CasADi Function of a sample, whose chain runs as
+compiled C if there is a compiler, else in CasADi's virtual machine: both give the same bits.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,11 +35,11 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 SEARCH, POLISH = 9, 5
-"""Evaluations of the law to find vb, and from there v1; two or three do the work."""
+"""Evaluations of the law to find vb, and v1 from it; two or three are usually sufficient."""
 CREEP = 1e-12
-"""Speed over the model's typical velocity below which a mass that friction holds is at rest."""
+"""Speed over the model's typical velocity below which a mass held by friction is at rest."""
 LOOSE = 2e-2
-"""Largest gap of the implicit equation, over the velocities in it, that is taken for solved."""
+"""Largest residual of the implicit equation, over its velocities, that counts as solved."""
 
 
 @final
@@ -68,11 +68,11 @@ class Mass:
 
     @classmethod
     def of(cls, model: Model) -> "Mass":
-        """The mass of `model`.
+        """Return the mass of `model`.
 
         Raises:
-            ValueError: other states than a position and its velocity (a law with states of its
-                own), algebraic variables, events, or equations with time.
+            ValueError: states other than a position and its velocity (a law with own states),
+                algebraic variables, events, or equations with time.
         """
         wrong = why_not_sampled(model)
         if wrong:
@@ -98,7 +98,7 @@ def _equations(model: Model) -> ca.SX:
 
 
 def why_not_sampled(model: Model) -> str:
-    """Why a model cannot be stepped as one mass; "" where it can."""
+    """Return the reason why a model cannot be stepped as one mass; "" if it can."""
     states = [variable.name for variable in model.x]
     if len(states) != 2 or model.z or model.ode is None:
         return (
@@ -116,14 +116,14 @@ def why_not_sampled(model: Model) -> str:
         if not ca.is_equal(slip, model.x[1].symbol, 2):
             return f"expected friction at the velocity {model.x[1].name} alone, got it at {slip}"
     if ca.depends_on(model.ode, model.t):
-        return "expected equations without time, got some that hold it; give it as an input"
+        return "expected equations without time, got some with it; make it an input"
     return ""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """How a quantity moves with the start and the parameters: a row (1, n) of SX."""
+    """A value with its derivatives by the start and the parameters: a row (1, n) of SX."""
 
     value: ca.SX
     slope: ca.SX
@@ -132,7 +132,7 @@ class Tangent:
 def advance(
     mass: Mass, at: Sequence[Tangent], p: Tangent, H: ca.SX
 ) -> tuple[Tangent, Tangent, ca.SX]:
-    """Position, velocity after one step from (x, v, u), and the gap left in the equation."""
+    """Return position and velocity after one step from (x, v, u), and the equation's residual."""
     x, v, u = at
     middle = Tangent(x.value + H / 2 * v.value, x.slope + H / 2 * v.slope)
     here = (middle.value, u.value, p.value)
@@ -160,13 +160,13 @@ def advance(
 
 
 def _along(slopes: Any, sides: Sequence[ca.SX]) -> ca.SX:
-    """a_x dx + a_u du + a_p dp, where `slopes` are those by x, v, u, p."""
+    """Return a_x dx + a_u du + a_p dp, where `slopes` are those by x, v, u, p."""
     by_x, _, by_u, by_p = slopes
     return sum((ca.mtimes(s, d) for s, d in zip((by_x, by_u, by_p), sides, strict=True)), ca.SX(0))
 
 
 def _phi(z: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """phi(z) = (e^z - 1)/z and its derivative, by their series near 0."""
+    """Return phi(z) = (e^z - 1)/z and its derivative, by their series near 0."""
     small = ca.fabs(z) < 1e-2
     safe = ca.if_else(small, 1, z)
     phi = ca.if_else(
@@ -183,10 +183,10 @@ def _phi(z: ca.SX) -> tuple[ca.SX, ca.SX]:
 def _velocity(
     mass: Mass, here: Sequence[ca.SX], v: ca.SX, S: ca.SX, guess: ca.SX, evaluations: int
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Whether friction holds the mass; w = v + S a(w), between 0 and v + S a(0); and the latter.
+    """Return if friction holds the mass; w = v + S a(w), between 0 and v + S a(0); and the latter.
 
-    Newton's method inside a bracket. A step that leaves the bracket towards rest goes on from
-    there, where friction is steep and bends away from the step; only then the bracket is halved.
+    Newton's method inside a bracket. A step that leaves the bracket towards rest continues there,
+    where friction is steep and curves away from the step; otherwise the bracket is halved.
     """
     x, u, p = here
     free = v + S * mass.a(x, 0, u, p)
@@ -223,7 +223,7 @@ Feedback = Callable[[Sequence[Tangent], ca.SX, ca.SX], tuple[list[Tangent], list
 
 
 def given_inputs(count: int) -> Feedback:
-    """No controller: the inputs are what the rows bring."""
+    """Return a feedback without controller: the inputs come from the rows."""
 
     def feedback(
         state: Sequence[Tangent], row: ca.SX, length: ca.SX
@@ -237,14 +237,14 @@ def given_inputs(count: int) -> Feedback:
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion at n + 1 instants, the inputs in the n samples between, and all their slopes.
+    """A motion at n + 1 instants, the inputs in the n samples between, and all their derivatives.
 
     Attributes:
         states: x, v and the states of the controller, shape (n + 1, states).
         slopes: by the parameters and the unknowns of the start, shape (n + 1, states, unknowns).
         inputs: of the mass, shape (n, inputs).
         input_slopes: shape (n, inputs, unknowns).
-        gap: of the implicit equations over the velocities in them, in the norm of power 4.
+        gap: residual of the implicit equations over their velocities, in the 4-norm.
     """
 
     states: Array
@@ -254,7 +254,7 @@ class Motion:
     gap: float
 
     def every(self, k: int) -> "Motion":
-        """The motion at every k-th instant, and the inputs that begin there."""
+        """Return the motion at every k-th instant, and the inputs that begin there."""
         return Motion(
             self.states[::k], self.slopes[::k], self.inputs[::k], self.input_slopes[::k], self.gap
         )
@@ -267,9 +267,9 @@ class Chain:
 
     Attributes:
         sample: (state, row, p) -> (state after the sample, inputs in it). The state holds x, v,
-            those of the controller, the gaps so far, and the slopes of all but the gaps; the row
-            the length of the sample [s] and what the feedback takes.
-        inputs, states, slopes: their numbers; without slopes none are carried.
+            the controller's states, the gaps so far, and the derivatives of all but the gaps; the
+            row holds the length of the sample [s] and the arguments of the feedback.
+        inputs, states, slopes: their numbers; `slopes` is 0 without derivatives.
     """
 
     sample: ca.Function
@@ -282,15 +282,15 @@ class Chain:
         cls, mass: Mass, feedback: Feedback, *, row: int, memory: int = 0, starts: int = 2,
         substeps: int = 2, sensitivities: bool = True,
     ) -> "Chain":  # fmt: skip
-        """The chain of `mass`.
+        """Return the chain of `mass`.
 
         Args:
-            feedback: what acts on it.
-            row: how many numbers a sample brings besides its length.
+            feedback: its controller or inputs.
+            row: count of numbers per sample in addition to its length.
             memory: states of the controller.
             starts: unknowns of the start.
-            substeps: steps a sample.
-            sensitivities: whether slopes are carried.
+            substeps: steps per sample.
+            sensitivities: whether derivatives are computed.
         """
         count, n = len(mass.parameters), 2 + memory
         many = count + starts if sensitivities else 0
@@ -303,7 +303,7 @@ class Chain:
         x, v, most = before[0], before[1], gap
         for _ in range(substeps):
             x, v, left = advance(mass, (x, v, u), Tangent(p, by_p), length / substeps)
-            most = most + left**4  # a norm that NaN does not pass
+            most = most + left**4  # a norm that keeps NaN
         new = _stacked([x, v, *after], many)
         arguments = [ca.vertcat(values, gap, ca.vec(slope)), ca.vertcat(length, given), p]
         results = [ca.vertcat(new.value, most, ca.vec(new.slope))]
@@ -319,13 +319,13 @@ class Chain:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __call__(self, rows: Array, p: Array, start: Array, start_slopes: Array) -> Motion:
-        """The motion from `start`.
+        """Return the motion from `start`.
 
         Args:
-            rows: length of each sample [s] and what the feedback takes, shape (n, 1 + row).
+            rows: length of each sample [s] and arguments of the feedback, shape (n, 1 + row).
             p: parameters.
             start: states at the first instant, shape (states,).
-            start_slopes: theirs, shape (states, slopes).
+            start_slopes: their derivatives, shape (states, slopes).
         """
         n, k, many = self.states, self.inputs, self.slopes
         first = np.concatenate([start, [0.0], start_slopes.ravel("F")])
@@ -342,24 +342,24 @@ class Chain:
 
 
 def _stacked(parts: Sequence[Tangent], many: int) -> Tangent:
-    """Values and dense slopes below each other."""
+    """Stack values and dense derivatives."""
     slopes = ca.vertcat(*(part.slope for part in parts)) if many else ca.SX(len(parts), 0)
     return Tangent(ca.vertcat(*(part.value for part in parts)), ca.densify(slopes))
 
 
 def backend() -> str:
-    """Compiled code wherever there is a compiler: never a question of elapsed time."""
+    """Return "compiled" if there is a compiler, else "vm", independent of elapsed time."""
     return "vm" if find_compiler() is None else "compiled"
 
 
 def why_no_motion(motion: Motion) -> str:
-    """Why a motion is not to be used; "" where it is."""
+    """Return the reason why a motion is unusable; "" if it is usable."""
     finite = np.isfinite(motion.states).all(axis=1)
     if not finite.all():
         return f"the simulated motion is not finite from sample {int(np.argmin(finite))} on"
     if not motion.gap < LOOSE:
         return (
-            f"steps were not solved (gap {motion.gap:.1e} of the velocity): friction that feeds "
-            "power in, or that jumps or falls too steeply with speed for this sample time"
+            f"steps did not converge (gap {motion.gap:.1e} of the velocity): friction that "
+            "supplies power, or that jumps or falls too steeply with speed for this sample time"
         )
     return ""

@@ -1,1 +1,1 @@
-"""What a fit found, and its numbers as text, JSON and pictures."""
+"""Result of a fit, and its numbers as text, JSON and figures."""

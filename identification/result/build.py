@@ -1,4 +1,4 @@
-"""The result of a fit, put together from the end of the search and the verdict on the residuals."""
+"""Assembly of the result of a fit from the end of the search and the verdict on the residuals."""
 
 import platform
 from collections.abc import Mapping, Sequence
@@ -38,14 +38,14 @@ from symfric.model import Model
 from symfric.scenes import Drive
 
 SHOWN = 6
-"""Numbers of an array that are written out."""
+"""Longest array that is written out."""
 
 
 def written(value: object) -> str:
-    """Python that says `value`, without what is as by default; data and models by a name.
+    """Return Python code for `value`, without defaults; data and models by a name.
 
-    Long arrays are three dots.
-    Fields without a default stand first, without their names.
+    Long arrays become three dots.
+    Fields without a default come first, without their names.
     """
     if isinstance(value, Dataset):
         return "data"
@@ -78,7 +78,7 @@ def _same(value: object, default: object) -> bool:
 
 
 def _rule(rule: Range | Above | Tied) -> str:
-    """What `log`, `linear`, `above` or `tied` was called with."""
+    """Return the call of `log`, `linear`, `above` or `tied` that made the rule."""
     if isinstance(rule, Tied):
         name, factor = (getattr(rule.rule, n, None) for n in ("name", "factor"))
         return f"tied({name!r}, {factor!r})" if name else f"tied({written(rule.rule)})"
@@ -93,7 +93,7 @@ def _rule(rule: Range | Above | Tied) -> str:
 
 
 MOST = 40
-"""Values of which all correlations are kept; of more, start values of records are left out."""
+"""Number of values above which correlations with start values of records are left out."""
 
 
 def fitted(
@@ -108,18 +108,18 @@ def fitted(
     call: str = "",
     asked: Asked | None = None,
 ) -> Fitted:
-    """The result.
+    """Return the result.
 
     Args:
-        live: the problem with the noise levels at the end, and the end of the best start.
+        live: the problem with the final noise levels, and the end of the best start.
         starts: all of them.
-        verdict: what the residuals say there.
-        findings: what is doubtful about the data.
-        status: how the fit ended in view of the verdict.
-        message: more about the end; the sentence of `status` stands before it.
+        verdict: assessment of the residuals at the best end.
+        findings: warnings on the data.
+        status: of the fit, verdict included.
+        message: more about the end; the sentence of `status` precedes it.
         seconds: of all starts.
-        call: how it was called, as Python.
-        asked: what puts the problem again, from a file.
+        call: Python code of the call.
+        asked: restores the problem, also from a file.
     """
     task, certain, kind = live.task, live.covariance, written(live.kind)
     records = tuple(r.name for r in live.data)
@@ -154,14 +154,14 @@ def fitted(
 
 
 def _estimates(live: Live) -> dict[str, Estimate]:
-    """Every parameter in the order of the subject, then what belongs to records."""
+    """Return the estimates of every parameter in the order of the subject, then of the records."""
     subject, task, made, found = live.subject, live.task, live.covariance, live.values
     own = {u.name: u for u in (*task.unknowns.unknowns, *task.residuals.own)}
     notes = dict(made.notes) | dict.fromkeys(made.at_bound, "at its bound")
     for group in made.undetermined:
         for name in group:
             others = ", ".join(n for n in group if n != name)
-            notes[name] = f"not told from {others}" if others else "without influence"
+            notes[name] = f"not separable from {others}" if others else "without influence"
     columns = (made.standard_errors, made.low, made.high, made.white_errors)
     estimates: dict[str, Estimate] = {}
     for name in dict.fromkeys([*subject.variables, *task.residuals.names]):
@@ -174,7 +174,7 @@ def _estimates(live: Live) -> dict[str, Estimate]:
             continue
         i = made.names.index(name)
         error, low, high, white = (_known(column[i]) for column in columns)
-        other = "tied" if name in subject.ties else "not told by the data" * (error is None)
+        other = "tied" if name in subject.ties else "not identifiable" * (error is None)
         note, nuisance = notes.get(name, other), unknown is not None and unknown.nuisance
         value = found[name]
         estimates[name] = Estimate(value, unit, error, low, high, white, False, note, nuisance)
@@ -182,7 +182,7 @@ def _estimates(live: Live) -> dict[str, Estimate]:
 
 
 def _correlated(task: Task, made: Covariance) -> list[int]:
-    """Numbers of the values whose correlation is kept: of many, what is asked for."""
+    """Return the indices of the values whose correlation is kept: of many, the requested ones."""
     every = range(len(made.names))
     if len(made.names) <= MOST:
         return list(every)
@@ -195,7 +195,7 @@ def _known(value: float) -> float | None:
 
 
 def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
-    """The unit of a coefficient under a load of 1 N, which is a force then."""
+    """Return the unit of a coefficient under a load of 1 N, where it is a force."""
     whole = subject.scene or subject.law
     known = {} if whole is None else parameters(whole)
     if load_of(subject) != 1.0 or name not in known or not is_coefficient(known[name]):
@@ -204,12 +204,12 @@ def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
 
 
 def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels | None:
-    """The friction levels of a law under a known load; None where there are other forces, too."""
+    """Return the friction levels of a law under a known load; None if there are other forces."""
     whole, load = subject.drive or subject.law, load_of(subject)
     if whole is None or load is None or largest is None or subject.law is None:
         return None
     if subject.law.inputs:
-        return None  # its levels are by loads of which the friction alone says nothing
+        return None  # the loads of its levels are not known from the friction alone
     force = turned("N") if turning else "N"
     levels = {n: p for n, p in parameters(whole).items() if p.role == "level"}
     loads = {n: load if is_coefficient(p) else 1.0 for n, p in levels.items()}
@@ -219,7 +219,7 @@ def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels 
 
 
 def load_of(subject: Subject) -> float | None:
-    """The normal force of a drive or of points [N]; None where there are other loads."""
+    """Return the normal force of a drive or of points [N]; None if there are other loads."""
     if subject.drive is not None:
         return float(subject.drive.N)
     loads = [v.start for v in subject.model.u if v.name == "N"] if subject.scene is None else []
@@ -227,7 +227,7 @@ def load_of(subject: Subject) -> float | None:
 
 
 def _tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
-    """Where the starts ended, best first."""
+    """Return the ends of the starts, best first."""
     best = min([s.objective for s in starts if isfinite(s.objective)], default=0.0)
     return tuple(
         Tried(
@@ -256,7 +256,7 @@ def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Serie
 
 
 def _curve(live: Live) -> Curve | None:
-    """Friction over velocity, of a law that acts in a drive or was fitted to points."""
+    """Return friction over velocity for a law in a drive or fitted to points."""
     law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
         return of_drive(machine, data.records)
@@ -271,7 +271,7 @@ def _curve(live: Live) -> Curve | None:
 
 
 def _made(call: str, kind: str) -> dict[str, str]:
-    """Versions, and how the fit was called."""
+    """Return the versions and the call of the fit."""
     import scipy  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
     return {

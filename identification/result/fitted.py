@@ -1,4 +1,4 @@
-"""What a fit found: parameters with intervals, a verdict, errors, the law and the model."""
+"""Result of a fit: parameters with intervals, verdict, errors, law and model."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -35,56 +35,56 @@ Array = NDArray[np.float64]
 class Fitted(Outcome):
     """The result of a fit.
 
-    `print(fit)` is a report of a page; `fit.to_html("out.html")` one with pictures; `fit.plot()`
-    the pictures alone. `fit.save("fit.npz")` keeps all of it, data included, and `load_fit` reads
-    it; a pickle does the same. A fit from JSON has neither data nor the model of a machine that is
-    no `Drive`.
+    `print(fit)` prints a one-page report; `fit.to_html("out.html")` writes one with figures;
+    `fit.plot()` returns the figures. `fit.save("fit.npz")` stores everything, data included, and
+    `load_fit` reads it; a pickle does the same. A fit from JSON has neither data nor the model of
+    a machine other than a `Drive`.
 
     Attributes:
         name: of the law or the model.
-        kind: of residuals, as it was written.
+        kind: Python code of the residuals.
         records: their names.
-        parameters: name -> estimate of everything: fitted, held, start values, dead times.
-        names, correlation: what was fitted, and the correlation of the estimates, shape (n, n);
-            NaN where one is not determined. Start values are left out where there are many.
-        undetermined: groups of parameters that the data cannot tell apart, and `directions`, the
-            same in words.
-        status, message: how the fit ended. Only SOLVED says that residuals are what noise leaves.
+        parameters: name -> estimate: fitted, held, start values, dead times.
+        names, correlation: fitted values, and the correlation of their estimates, shape (n, n);
+            NaN where undetermined. Start values are left out if there are many.
+        undetermined: groups of parameters that the data do not separate, and `directions`, the
+            same as messages.
+        status, message: end of the fit. Only SOLVED means that the residuals are noise.
         verdict: tests of the residuals.
-        errors: (record, signal) -> what is left.
-        validation: the same on other data with the same parameters; None without them.
+        errors: (record, signal) -> size of the residuals.
+        validation: the same for other data with the same parameters; None without them.
         noise: signal -> standard deviation of the noise that weighted it.
-        starts: of each start, best first, how it ended.
-        findings: what is doubtful about the data.
-        series: signals as they are drawn.
-        curve: friction over velocity; None of a model without a law.
-        law: with the fitted numbers; None of a model with none or several.
-        machine: the drive or scene with them; None of a law alone or a model.
+        starts: ends of the starts, best first.
+        findings: warnings on the data.
+        series: signals for plots.
+        curve: friction over velocity; None for a model without a law.
+        law: with the fitted numbers; None for a model with none or several.
+        machine: the drive or scene with them; None for a law alone or a model.
         seconds, evaluations: of all starts together.
-        made: versions and how it was called.
-        live: its problem and its minimum; of a stored fit they are put again from `asked`.
-        asked: the question and where it ended; None from JSON.
+        made: versions and the call.
+        live: problem and minimum; a stored fit restores them from `asked`.
+        asked: arguments of the fit and its end; None from JSON.
     """
 
     def to_pack(self) -> dict[str, Any]:
-        """The fields; without the question where that holds functions that no file takes."""
+        """Return the fields; without `asked` if it holds functions that a file cannot store."""
         asked = self.asked if packed.holds(self.asked) else None
         return packed.state_of(self) | {"live": None, "asked": asked}
 
     def __copy__(self) -> "Fitted":
-        """One with the same fields."""
+        """Return a fit with the same fields."""
         return packed.shallow(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what a file does."""
+        """Return the arguments of pickle; a pickle holds the same as a file."""
         return packed.loads, (packed.dumps(self),)
 
     def save(self, path: str | Path) -> None:
-        """Write all of it to one file, its data, too, which `identification.load_fit` reads.
+        """Write the fit with its data to one file, which `identification.load_fit` reads.
 
-        Numbers come back to the bit. A loaded fit does all that this one does: `validate`,
-        `profile` and `model` put the problem again. They cannot where it was asked with functions
-        that no file takes, such as a lambda in `tied`.
+        Numbers are stored exactly. A loaded fit does everything that this one does: `validate`,
+        `profile` and `model` restore the problem. They cannot if the fit was called with functions
+        that a file cannot store, such as a lambda in `tied`.
 
         Raises:
             ValueError: the file cannot be written.
@@ -95,26 +95,26 @@ class Fitted(Outcome):
         return f"<Fitted {self.name}: {self.status.name}>"
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
-        """What a notebook shows: verdict, what was fitted, the pictures."""
+        """Return the notebook view: verdict, fitted values, figures."""
         named = [(n, e) for n, e in self.parameters.items() if not (e.fixed or e.nuisance)]
-        rows = tuple((n, *map(_told, (e.value, e.low, e.high)), e.unit) for n, e in named)
+        rows = tuple((n, *map(_six_digits, (e.value, e.low, e.high)), e.unit) for n, e in named)
         table = Table(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
         title = f"{self.name} fitted by {self.kind}: {self.status.name}"
         return Shown(title, tuple(sentences(self)), table).html(self.plot())
 
     @property
     def model(self) -> Model:
-        """The model with the fitted numbers; yours keeps its parameters, which start at them.
+        """The model with the fitted numbers; your model keeps its parameters, starting at them.
 
         Raises:
-            ValueError: of a fit from JSON, unless it is one of a drive.
+            ValueError: for a fit from JSON, except one of a drive.
         """
         if isinstance(self.machine, Scene):
             return self.machine.model()
         return self.alive("model").model
 
     def validate(self, data: Dataset) -> Errors:
-        """What the fitted parameters leave of other data; start values are estimated there.
+        """Return the errors on other data with these parameters; start values are estimated there.
 
         Raises:
             ValueError: data without the signals of the fit, or a fit from JSON.
@@ -122,11 +122,11 @@ class Fitted(Outcome):
         return self.alive("validate").errors_on(data)
 
     def profile(self, name: str, points: int = 5) -> Profile:
-        """How badly the model fits with one parameter held elsewhere, see `verdict.profile`.
+        """Return the profile likelihood of one parameter, see `verdict.profile`.
 
         Args:
             name: of a fitted parameter.
-            points: about how many to each side.
+            points: approximate number of points to each side.
 
         Raises:
             ValueError: a parameter that was not fitted, or a fit from JSON.
@@ -135,26 +135,26 @@ class Fitted(Outcome):
         return profile(live.task, live.point, live.covariance, name, points)
 
     def alive(self, what: str) -> Live:
-        """The problem and its minimum, for `what`.
+        """Return the problem and its minimum, for the operation `what`.
 
         Raises:
-            ValueError: a fit from JSON, or one that was asked with functions, from a file.
+            ValueError: a fit from JSON, or a stored one that was called with functions.
         """
         if self.live is not None:
             return self.live
         if self.asked is None:
             raise ValueError(
                 f"fit of {self.name}: {what}: expected a fit of this process or of fit.save(path), "
-                "got one from JSON, or one that was asked with functions, which no file takes; fit "
+                "got one from JSON, or one called with functions, which a file cannot store; fit "
                 "again, or use fit.values"
             )
         return self.asked.live
 
     def plot(self, path: str | Path | None = None, names: Sequence[str] = ()) -> "Figure":
-        """Friction over velocity; data and fit, what is left and its correlation.
+        """Plot friction over velocity; data and fit, residuals and their autocorrelation.
 
         Args:
-            path: image file, its format taken from the ending.
+            path: image file; its extension selects the format.
             names: signals to show, of all records; the first ones if none is given.
         """
         from identification.result.picture import picture  # noqa: PLC0415  (matplotlib is slow)
@@ -162,7 +162,7 @@ class Fitted(Outcome):
         return picture(self, names, path)
 
     def to_html(self, path: str | Path, ranking: "Ranking | None" = None) -> None:
-        """Write one HTML page with everything, self-contained: no network, no scripts.
+        """Write one self-contained HTML page with everything: no network, no scripts.
 
         Args:
             path: of the page.
@@ -173,7 +173,7 @@ class Fitted(Outcome):
         write_text(path, page_of(self, ranking))
 
     def to_dataframe(self) -> Any:
-        """The parameters as a pandas table: value, unit, standard error, interval, note.
+        """Return the parameters as a pandas table: value, unit, standard error, interval, note.
 
         Raises:
             ImportError: no pandas.
@@ -188,7 +188,7 @@ class Fitted(Outcome):
         return frame
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but `live` as plain data, ready for JSON."""
+        """Return all fields but `live` as plain data, ready for JSON."""
         from identification.result.stored import to_dict  # noqa: PLC0415 (slow to import)
 
         return to_dict(self)
@@ -199,14 +199,14 @@ class Fitted(Outcome):
 
     @staticmethod
     def from_json(path: str | Path, own: Mapping[str, type[Parametric]] | None = None) -> "Fitted":
-        """The fit that `to_json` wrote, without its data.
+        """Read the fit that `to_json` wrote, without its data.
 
         Args:
             path: of the file.
-            own: classes of your own laws by their names; a law of an unknown class is None.
+            own: classes of user-defined laws by name; a law of an unknown class is None.
 
         Raises:
-            ValueError: no such file, one that something else wrote, or one of a later version.
+            ValueError: no such file, another file format, or a later version.
         """
         from identification.result.stored import read  # noqa: PLC0415 (slow to import)
 
@@ -217,19 +217,19 @@ FIT = Format("symfric fit", 2, "load_fit", "a saved fit", Fitted)
 
 
 def load_fit(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Fitted:
-    """The fit that `fit.save(path)` wrote, to the bit.
+    """Read the fit that `fit.save(path)` wrote, exactly.
 
     Args:
         path: the file.
-        own: your classes and functions in it, such as a law of yours.
+        own: user-defined classes and functions in it, such as a law.
 
     Raises:
-        ValueError: no such file, one that something else wrote, a damaged one, one of a newer
-            version, or classes that are not known.
+        ValueError: no such file, another file format, a damaged file, a newer version, or
+            unknown classes.
     """
     return FIT.load(path, own)
 
 
-def _told(value: float | None) -> str:
-    """Six digits; a dash for none."""
+def _six_digits(value: float | None) -> str:
+    """Return six digits; a dash for None."""
     return "–" if value is None else f"{value:.6g}"

@@ -1,4 +1,4 @@
-"""What a fit is besides its numbers: its problem, its minimum, its model."""
+"""Live part of a fit: its problem, its minimum, its model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 
 
 class Kind(Protocol):
-    """A kind of residuals: points, inverse dynamics, shooting, closed loop."""
+    """A type of residuals: points, inverse dynamics, shooting, closed loop."""
 
     def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Residuals:
-        """The residuals of `subject` on `data`; start values are guessed near `start`."""
+        """Return the residuals of `subject` on `data`; start values are guessed near `start`."""
         ...
 
 
@@ -41,26 +41,26 @@ class Constant:
     value: float
 
     def __call__(self, values: Mapping[str, object]) -> float:
-        """The number."""
+        """Return the number."""
         del values
         return self.value
 
 
 class Question(Protocol):
-    """What was asked of data, `identification.fit.Fit`."""
+    """Arguments of a fit, `identification.fit.Fit`."""
 
     def live(self, noise: dict[str, float], w: Array) -> "Live":
-        """The problem with its end at the coordinates `w`."""
+        """Return the problem with its end at the coordinates `w`."""
         ...
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """A fit as a question and where it ended: the problem is put again when it is needed.
+    """Arguments of a fit and its end, from which the problem is restored on demand.
 
     Attributes:
-        question: with its data.
+        question: the fit with its data.
         noise: signal -> standard deviation at the end.
         w: coordinates of the minimum.
     """
@@ -81,7 +81,7 @@ class Live:
     """The problem of a fit and its end.
 
     Attributes:
-        kind, subject, data: what was asked.
+        kind, subject, data: arguments of the fit.
         task: with the noise levels at the end.
         point: the minimum.
         covariance: of the values there.
@@ -101,7 +101,7 @@ class Live:
         cls, kind: Kind, subject: Subject, data: Dataset, task: Task, point: Point,
         covariance: Covariance,
     ) -> "Live":  # fmt: skip
-        """The problem with the numbers of `point`."""
+        """Return the problem with the numbers of `point`."""
         found = dict(zip(task.residuals.names, point.values.tolist(), strict=True))
         return cls(kind, subject, data, task, point, covariance, subject.close(found))
 
@@ -117,12 +117,12 @@ class Live:
         return dict(zip(names, self.point.values.tolist(), strict=True))
 
     def errors_on(self, data: Dataset) -> Errors:
-        """What the parameters leave of other data, see `left_on`."""
+        """Return the errors of the parameters on other data, see `left_on`."""
         residuals, r = self.left_on(data)
         return errors_of(residuals, [r.name for r in data], r)
 
     def left_on(self, data: Dataset) -> tuple[Residuals, Array]:
-        """Residuals of other data with these parameters, and their values [SI].
+        """Return the residuals of other data with these parameters, and their values [SI].
 
         Start values of the other data are estimated there.
 
@@ -148,7 +148,7 @@ class Live:
 
 
 def settled(kind: Any, residuals: Any, data: Dataset) -> Any:
-    """The kind with the filter that it chose on the data of the fit: other data are seen alike."""
+    """Return `kind` with the filter chosen on the data of the fit, to filter other data alike."""
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind
     if kind.filter is not None:
@@ -164,7 +164,7 @@ def errors_of(
     r: Array,
     effective: Mapping[str, float] | None = None,
 ) -> Errors:
-    """(record, signal) -> what is left [SI]; `effective` samples by label of the channel."""
+    """Return (record, signal) -> errors [SI]; `effective` samples by label of the channel."""
     known = effective or {}
     names = labels(residuals)
     return {
@@ -174,6 +174,6 @@ def errors_of(
 
 
 def labels(residuals: Residuals) -> list[str]:
-    """What verdict and covariance call the channels: "force", of several records "force[0]"."""
+    """Return the labels of the channels: "force", or with several records "force[0]"."""
     several = len({c.record for c in residuals.channels}) > 1
     return [f"{c.signal}[{c.record}]" if several else c.signal for c in residuals.channels]

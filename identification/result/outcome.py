@@ -1,4 +1,4 @@
-"""Numbers of a fit, and their text: the verdict first, then estimates and their uncertainty."""
+"""Fields of a fit and their text: the verdict first, then estimates and their uncertainty."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -23,18 +23,18 @@ Array = NDArray[np.float64]
 
 WIDTH = 80
 CLOSE = 0.9
-"""Magnitude of a correlation of two estimates that is worth a line."""
+"""Magnitude of the correlation of two estimates above which it is listed."""
 SAME = 1.0
-"""Difference of minus twice the log-likelihood below which two starts ended at one minimum."""
+"""Difference of -2 log-likelihood below which two starts ended at the same minimum."""
 NOTHING = 1e8
-"""Ratio of the ends of an interval, of what is tied to a value that is lost, that says nothing."""
+"""Ratio of the ends of an interval above which a value is not identifiable."""
 MANY = 12
-"""Start values and dead times that are listed; of more only how many there are."""
+"""Largest number of listed start values and dead times."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcome:
-    """The fields of a fit, which `Fitted` describes, and their text."""
+    """Fields of a fit, described in `Fitted`, and their text."""
 
     name: str
     kind: str
@@ -67,22 +67,22 @@ class Outcome:
 
     @property
     def values(self) -> dict[str, float]:
-        """Every parameter by name, fitted or held."""
+        """Values of the parameters by name, fitted or held."""
         return {name: e.value for name, e in self.parameters.items()}
 
     @property
     def drive(self) -> Drive | None:
-        """The machine, where it is a mass with a force input."""
+        """The machine, if it is a mass with a force input."""
         return self.machine if isinstance(self.machine, Drive) else None
 
     def check_fields(self) -> None:
-        """Refuse estimates that do not belong to the names; for files."""
+        """Raise an error if the estimates do not match the names; for files."""
         n = len(self.names)
         agree("Fitted", self.correlation.shape == (n, n), {*self.names} <= self.parameters.keys())
 
 
 def text_of(fit: Outcome) -> str:
-    """What `print(fit)` shows, within 80 columns."""
+    """Return the text of `print(fit)`, within 80 columns."""
     blocks = [
         [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
         [*_head(fit)],
@@ -96,26 +96,26 @@ def text_of(fit: Outcome) -> str:
 
 
 def sentences(fit: Outcome) -> list[str]:
-    """What there is to say of the whole, most important first, each once."""
-    said = [*fit.verdict.sentences, *fit.directions]
+    """Return the messages on the whole fit, most important first, without repetition."""
+    messages = [*fit.verdict.sentences, *fit.directions]
     message = fit.message
-    for sentence in said:  # those of the verdict stand in the message, too
+    for sentence in messages:  # the message repeats those of the verdict
         message = message.replace(sentence, "")
-    return [text for text in dict.fromkeys([" ".join(message.split()), *said]) if text]
+    return [text for text in dict.fromkeys([" ".join(message.split()), *messages]) if text]
 
 
 def number(value: float | None, digits: int = 6) -> str:
-    """So many significant digits; a dash for none."""
+    """Return a value with significant digits; a dash for None."""
     return "-" if value is None or not isfinite(value) else f"{value:.{digits}g}"
 
 
 def count_of(value: float) -> str:
-    """About so many; a dash for nobody knows."""
+    """Return a rounded count; a dash if unknown."""
     return f"{value:.0f}" if value >= 10.0 else number(value, 2)
 
 
 def rounded(value: float, error: float | None) -> str:
-    """`value` with the digits that its standard error leaves, two of them uncertain."""
+    """Return `value` with the digits that its standard error allows, two of them uncertain."""
     if error is None or not isfinite(error) or error <= 0.0 or value == 0.0:
         return number(value)
     digits = floor(log10(abs(value))) - floor(log10(error)) + 2
@@ -123,22 +123,22 @@ def rounded(value: float, error: float | None) -> str:
 
 
 def interval(e: Estimate) -> str:
-    """The 95 % interval, with the digits of the value; "" without one."""
+    """Return the 95 % interval, with the digits of the value; "" without one."""
     if e.low is None or e.high is None:
         return ""
     if e.high > NOTHING * e.low > 0.0:
-        return "not told"
+        return "not identifiable"
     return f"{_end(e.low, e)} ... {_end(e.high, e)}"
 
 
 def _end(value: float, e: Estimate) -> str:
-    """An end of an interval: with few digits where it is of another order than the value."""
+    """Return an end of an interval, with few digits if its magnitude differs from the value's."""
     far = not 1e-2 * abs(e.value) < abs(value) < 1e2 * abs(e.value)
     return number(value, 3) if far and e.value else rounded(value, e.standard_error)
 
 
 def percent(value: float | None, digits: int = 2) -> str:
-    """A share in percent without an exponent; "" of none."""
+    """Return a share in percent without an exponent; "" for None."""
     if value is None or not isfinite(value):
         return ""
     if value > 1e4:
@@ -147,27 +147,27 @@ def percent(value: float | None, digits: int = 2) -> str:
 
 
 def unit_of(unit: str) -> str:
-    """A unit as it is written; "" of pure numbers."""
+    """Return a unit as text; "" for pure numbers."""
     return "" if unit == "1" else unit
 
 
 def with_unit(text: str, unit: str) -> str:
-    """A number and its unit, where it has one."""
+    """Return a number with its unit, if it has one."""
     return f"{text} {unit_of(unit)}".rstrip()
 
 
 def remark(e: Estimate) -> str:
-    """Why a parameter is held or has no interval."""
+    """Return the reason why a parameter is held or has no interval."""
     return f"held: {e.note}" if e.fixed and e.note else ("held" if e.fixed else e.note)
 
 
 def best_starts(fit: Outcome) -> int:
-    """How many starts ended at the lowest cost."""
+    """Return the number of starts that ended at the lowest cost."""
     return sum(s.above < SAME for s in fit.starts)
 
 
 def correlated(fit: Outcome) -> list[tuple[str, str, float]]:
-    """Pairs of estimates with a correlation above `CLOSE`, the closest first."""
+    """Return the pairs of estimates with a correlation above `CLOSE`, the largest first."""
     n = len(fit.names)
     pairs = [
         (fit.names[i], fit.names[j], float(fit.correlation[i, j]))
@@ -179,7 +179,7 @@ def correlated(fit: Outcome) -> list[tuple[str, str, float]]:
 
 
 def columns(rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> Iterator[str]:
-    """Lines of padded columns; those in `right` stand at the right."""
+    """Yield lines of padded columns; the columns in `right` are right-aligned."""
     lines = [list(row) for row in rows]
     widths = [max(map(len, column)) for column in zip_longest(*lines, fillvalue="")]
     for line in lines:
@@ -196,13 +196,13 @@ def _indented(texts: Iterable[str]) -> Iterator[str]:
 
 
 def _head(fit: Outcome) -> Iterator[str]:
-    """Data, effort, noise."""
+    """Yield the lines on data, effort and noise."""
     rows = sum(e.rows for e in fit.errors.values())
     named = fit.records[:4]
     more = f" and {len(fit.records) - 4} more" if len(fit.records) > 4 else ""
     count = sum(not e.fixed for e in fit.parameters.values())
-    told = f"{', '.join(named)}{more}; {rows} rows, {count} fitted"
-    yield from wrap(f"data    {told}", WIDTH, subsequent_indent=" " * 8)
+    text = f"{', '.join(named)}{more}; {rows} rows, {count} fitted"
+    yield from wrap(f"data    {text}", WIDTH, subsequent_indent=" " * 8)
     if fit.starts:
         n = len(fit.starts)
         reached = f"{best_starts(fit)} of {n} starts at the lowest cost" if n > 1 else "one start"
@@ -216,11 +216,11 @@ def _head(fit: Outcome) -> Iterator[str]:
 
 
 def _parameters(fit: Outcome) -> Iterator[str]:
-    asked = {n: e for n, e in fit.parameters.items() if not e.nuisance and not e.fixed}
+    requested = {n: e for n, e in fit.parameters.items() if not e.nuisance and not e.fixed}
     held = {n: e for n, e in fit.parameters.items() if e.fixed}
     nuisance = {n: e for n, e in fit.parameters.items() if e.nuisance and not e.fixed}
-    if asked:
-        yield from _table("parameter", asked)
+    if requested:
+        yield from _table("parameter", requested)
     if held:
         yield ""
         rows = [(n, with_unit(number(e.value), e.unit), e.note) for n, e in held.items()]
@@ -252,7 +252,7 @@ def _correlations(fit: Outcome) -> Iterator[str]:
 
 
 def errors_table(title: str, errors: Errors) -> Iterator[str]:
-    """One line for each signal of each record."""
+    """Yield one line for each signal of each record."""
     if errors:
         rows = [(title, "signal", "rms", "of the signal", "largest")]
         for (record, signal), e in errors.items():

@@ -29,9 +29,9 @@ from symfric.page import html
 from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
 
 WINDOWS = 60
-"""Beginnings of windows that are drawn."""
+"""Largest number of drawn starts of windows."""
 FLOOR = 1e-3
-"""Smallest difference that the waterfall shows."""
+"""Smallest difference shown in the waterfall."""
 
 
 def _across(one: Series) -> Axis:
@@ -43,14 +43,14 @@ def _across(one: Series) -> Axis:
 
 
 def _windows(one: Series) -> list[Mark]:
-    """Where windows begin; of many none, they would be a hatching."""
+    """Return marks where windows start; none if there are too many to distinguish."""
     if one.breaks.size > WINDOWS:
         return []
     return [Level("window", float(t), upright=True) for t in one.breaks]
 
 
 def data_and_fit(one: Series) -> str:
-    """Measured and fitted signal."""
+    """Return the chart of the measured and fitted signal."""
     shape = Path if one.ordered else Dots
     y = around(one.signal, one.unit, [one.measured.y, one.predicted.y])
     marks = [
@@ -63,7 +63,7 @@ def data_and_fit(one: Series) -> str:
 
 
 def left(one: Series) -> str:
-    """Residuals."""
+    """Return the chart of the residuals."""
     shape = Path if one.ordered else Dots
     y = around("difference", one.unit, [one.residual.y, np.zeros(1)])
     marks = [
@@ -73,12 +73,12 @@ def left(one: Series) -> str:
     ]
     size = float(np.abs(one.residual.y).max(initial=0.0))
     says = f"fitted minus measured {one.signal}, at most {number(size, 3)} {one.unit}"
-    title = f"{one.record}: what is left of {one.signal}"
+    title = f"{one.record}: residuals of {one.signal}"
     return chart(title, _across(one), y, marks, height=170.0, says=says)
 
 
 def lags(one: Series) -> str:
-    """Autocorrelation of the residuals with the limits of white ones; "" without order."""
+    """Return the chart of the autocorrelation with the limits of white noise; "" without order."""
     if not one.correlation.size:
         return ""
     x = Axis("lag", "samples", 0.0, float(one.lags.max()) + 0.5, whole=True)
@@ -91,12 +91,12 @@ def lags(one: Series) -> str:
     ]
     outside = int(((one.correlation > one.high) | (one.correlation < one.low)).sum())
     says = f"{outside} of {one.lags.size} autocorrelations lie outside the limits of white noise"
-    title = f"{one.record}: autocorrelation of what is left of {one.signal}"
+    title = f"{one.record}: autocorrelation of the residuals of {one.signal}"
     return chart(title, x, y, marks, height=190.0, says=says)
 
 
 def friction(curve: Curve, name: str) -> str:
-    """Friction over velocity: dots of the data, line of the law."""
+    """Return the chart of friction over velocity: dots of the data, line of the law."""
     dots = [Dots("measured", line.t, line.y) for line in curve.measured.values()]
     low, high = limits(curve)
     x = around("v", curve.v_unit, [curve.law.t, *(line.t for line in curve.measured.values())])
@@ -112,7 +112,7 @@ def friction(curve: Curve, name: str) -> str:
 
 
 def waterfall(fit: Outcome) -> str:
-    """How far the starts ended from the best one; "" for a single start."""
+    """Return the chart of the starts' costs above the best one; "" for a single start."""
     above = np.sort([s.above for s in fit.starts if isfinite(s.above)])
     if above.size < 2:
         return ""
@@ -146,15 +146,15 @@ WORDS = {"good": "Good", "doubtful": "Doubtful", "bad": "No result"}
 
 
 class Ranking(Protocol):
-    """What `select` returns, as far as it is shown here."""
+    """Result of `select`, as far as it is shown here."""
 
     def to_dict(self) -> dict[str, Any]:
-        """With "rows": for each law a dictionary of what is known of it."""
+        """Return a dictionary with "rows": for each law a dictionary of its results."""
         ...
 
 
 def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
-    """The page as text."""
+    """Return the page as text."""
     parts = {
         "parameters": html.section("parameters", "Parameters", *_parameters(fit)),
         "data": html.section("data", "Data and fit", *_data(fit)),
@@ -162,7 +162,7 @@ def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
         "residuals": html.section("residuals", "Residuals", *_residuals(fit)),
         "starts": html.section("starts", "Starts", *_starts(fit)),
         "ranking": html.section("ranking", "Ranking of laws", *_ranking(ranking)),
-        "findings": html.section("findings", "What is doubtful in the data", *_findings(fit)),
+        "findings": html.section("findings", "Data warnings", *_findings(fit)),
         "made": html.section("made", "How it was made", *_made(fit)),
     }
     kind = kind_of(fit)
@@ -181,7 +181,7 @@ def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
 
 
 def kind_of(fit: Outcome) -> str:
-    """What the box of the verdict looks like: "good", "doubtful" or "bad"."""
+    """Return the style of the verdict box: "good", "doubtful" or "bad"."""
     if not fit.status.ok:
         return "bad"
     return "good" if fit.status.name == "SOLVED" else "doubtful"
@@ -210,7 +210,7 @@ def _parameters(fit: Outcome) -> Iterator[str]:
     close = correlated(fit)
     if close:
         pairs = ", ".join(f"{a} and {b} ({c:+.3f})" for a, b, c in close[:8])
-        yield html.paragraph(f"Hard to tell apart: {pairs}.", "soft")
+        yield html.paragraph(f"Strongly correlated: {pairs}.", "soft")
 
 
 def _estimates(caption: str, estimates: dict[str, Estimate]) -> str:
@@ -228,7 +228,7 @@ def _estimates(caption: str, estimates: dict[str, Estimate]) -> str:
 
 
 def _unit(unit: str) -> str:
-    """A unit that stays on one line."""
+    """Return a unit that stays on one line."""
     return unit_of(unit).replace(" ", "\N{NO-BREAK SPACE}")
 
 
@@ -245,7 +245,7 @@ def _errors(caption: str, errors: Errors, records: Sequence[str]) -> str:
 
 
 def _data(fit: Outcome) -> Iterator[str]:
-    yield _errors("What the fit leaves of each signal", fit.errors, fit.records)
+    yield _errors("Residuals of each signal", fit.errors, fit.records)
     yield _errors("The same parameters on other data", fit.validation or {}, ())
     for one in fit.series:
         yield html.figure(data_and_fit(one) + left(one))
@@ -313,7 +313,7 @@ def _starts(fit: Outcome) -> Iterator[str]:
 
 
 def above(value: float) -> str:
-    """How far a start ended from the best one; rounding is nothing."""
+    """Return how far a start ended above the best one; rounding errors count as 0."""
     return "0" if abs(value) < 1e-6 else number(value, 3)
 
 
@@ -325,8 +325,8 @@ def _ranking(ranking: Ranking | None) -> Iterator[str]:
         texts = [n for n in names if any(isinstance(row.get(n), str) for row in rows)]
         numbers = [j for j, n in enumerate(names) if n not in texts]
         yield html.table("Laws fitted to the same data, best first", names, cells, numbers)
-        said = [(row["law"], row.get("sentence")) for row in rows]
-        yield html.bullets(f"{law}: {sentence}" for law, sentence in said if sentence)
+        messages = [(row["law"], row.get("sentence")) for row in rows]
+        yield html.bullets(f"{law}: {sentence}" for law, sentence in messages if sentence)
 
 
 def _cell(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of a fit, and of a ranking of laws."""
+"""Figures of a fit, and of a ranking of laws."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,14 +15,14 @@ from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
 
 SHOWN = 4
-"""Signals that are drawn if none is named; each takes three panels."""
+"""Number of signals drawn by default; each takes three panels."""
 
 
 def picture(fit: Outcome, names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
-    """Data and fit, what is left and its correlation, for each signal; friction over velocity.
+    """Plot data, fit, residuals and their autocorrelation for each signal; friction over velocity.
 
     Args:
-        fit: what is drawn.
+        fit: the fit.
         names: signals; of all records. None: the first ones.
         path: image file.
     """
@@ -100,7 +100,7 @@ def _lags(axis: Axes, one: Series) -> None:
 
 
 def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> Figure:
-    """Errors and BIC of several laws, a bar for each, the best one on top."""
+    """Plot errors and BIC of several laws as bars, the best law on top."""
     rows = [row for row in found["rows"] if row["status"]]
     figure, ((errors, criterion),) = grid(1, 2, 8.5, 1.2 + 0.42 * max(1, len(rows)), sharey=True)
     places = np.arange(len(rows))[::-1]

@@ -1,4 +1,4 @@
-"""Parts of a result: estimates, errors, signals as they are drawn, friction over velocity."""
+"""Parts of a result: estimates, errors, signals for plots, friction over velocity."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -24,19 +24,19 @@ from symfric.scenes import Drive
 @final
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter, start value or dead time.
+    """A parameter, start value or dead time.
 
     Attributes:
         value, unit: the estimate, in the unit of the user.
-        standard_error: right for the colour that the residuals have; None where the parameter is
-            held, stands at a bound or cannot be told from others.
-        low, high: 95 % interval; of what is fitted by its logarithm it is symmetric there, so that
-            a stiffness stays positive. None with `standard_error`.
-        white_error: what the standard error would be if residuals were white: much less than
-            `standard_error` where neighbouring samples say the same.
+        standard_error: accounts for autocorrelated residuals; None if the parameter is held, at
+            a bound, or not separable from others.
+        low, high: 95 % interval; symmetric in the logarithm of a value that is fitted by it, so
+            that a stiffness stays positive. None with `standard_error`.
+        white_error: standard error for white residuals: much less than `standard_error` if
+            neighbouring samples are correlated.
         fixed: not fitted.
-        note: why it is held or has no interval; or what it is tied to.
-        nuisance: fitted, but not what is asked for: a start value, a dead time.
+        note: reason why it is held or has no interval, or that it is tied.
+        nuisance: fitted, but not requested: a start value, a dead time.
     """
 
     value: float
@@ -60,16 +60,16 @@ class Estimate:
 @final
 @dataclass(frozen=True)
 class Error:
-    """What a fit leaves of one signal of one record.
+    """Residuals of one signal of one record.
 
     Attributes:
         unit: of the signal.
         rms: root mean square of predicted - measured.
-        relative: norm of the difference over the norm of the signal [%], as the EMPS benchmark
-            has it; it says little of a signal far from zero, such as a position with an offset.
+        relative: norm of the difference over the norm of the signal [%], as in the EMPS
+            benchmark; not informative for a signal far from zero, such as an offset position.
         largest: largest magnitude of the difference.
         rows: number of differences.
-        effective: how many independent ones they count as, by their colour; NaN where unknown.
+        effective: equivalent number of independent samples; NaN if unknown.
     """
 
     unit: str
@@ -83,16 +83,16 @@ class Error:
 @final
 @dataclass(frozen=True)
 class Tried:
-    """One start and where it ended.
+    """A start and its end.
 
     Attributes:
         number: of the start.
-        above: minus twice the logarithm of its likelihood over that of the best one; below 1 the
-            two are the same minimum.
+        above: -2 log-likelihood above that of the best start; below 1 both reached the same
+            minimum.
         cost: sum of weighted squares, or of the robust losses.
-        status, message: how it ended.
+        status, message: of the end.
         evaluations: of the residuals.
-        values: where it ended.
+        values: at the end.
     """
 
     number: int
@@ -105,18 +105,18 @@ class Tried:
 
 
 Errors = dict[tuple[str, str], Error]
-"""(record, signal) -> what is left of it."""
+"""(record, signal) -> its errors."""
 
 
 Array = NDArray[np.float64]
 
 MOST = 2000
-"""Points of a line: more than a screen has columns of pixels for both ends of each."""
+"""Largest number of points of a line, two for each column of pixels."""
 GAP = 3.0
-"""Usual steps of time that are a gap."""
+"""Smallest gap in time, over the usual step."""
 LEAST = 300
 TOGETHER = 24_000
-"""Points of one kind of line over all channels: many channels are drawn coarser."""
+"""Points of all channels for one type of line: with many channels each is coarser."""
 
 
 @final
@@ -133,17 +133,17 @@ class Line:
 @final
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One signal of one record.
+    """A signal of a record.
 
     Attributes:
-        record, signal, unit: what it is.
-        abscissa: what `t` is: "t [s]", a velocity, a number.
-        ordered: whether neighbours in t are neighbours in time: a line is drawn, not dots.
-        rows: samples compared; the lines hold the envelope of so many.
+        record, signal, unit: names.
+        abscissa: quantity of `t`: "t [s]", a velocity, a number.
+        ordered: whether neighbours in t are neighbours in time; drawn as a line, else as dots.
+        rows: number of compared samples; the lines hold their envelope.
         measured, predicted, residual: predicted - measured is the residual.
         breaks: times at which windows begin.
-        lags, correlation: autocorrelation of the residuals at lags 1, 2, ... samples; empty where
-            they have no order.
+        lags, correlation: autocorrelation of the residuals at lags 1, 2, ... samples; empty if
+            they are unordered.
         low, high: 95 % limits of `correlation` for white residuals.
     """
 
@@ -166,10 +166,10 @@ class Series:
 
 
 def envelope(t: Array, y: Array, most: int = MOST) -> Line:
-    """The line with at most `most` points that covers the same area.
+    """Return a line with at most `most` points that covers the same area.
 
-    In each of most / 2 equal spans the smallest and the largest value stay, where they stand, and
-    the ends: no spike is lost. Values that are not finite are left out.
+    The smallest and the largest value in each of most / 2 equal intervals are kept, and the ends:
+    no spike is lost. Non-finite values are left out.
     """
     finite = np.isfinite(y)
     t, y = t[finite], y[finite]
@@ -184,7 +184,7 @@ def envelope(t: Array, y: Array, most: int = MOST) -> Line:
 
 
 def cut_envelope(t: Array, y: Array, most: int = MOST) -> Line:
-    """The same of a signal over time, with a NaN in every gap: no line is drawn across it."""
+    """Return the same for a signal over time, with a NaN in every gap to interrupt the line."""
     steps = np.diff(t)
     gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else steps.astype(int)
     if not 0 < gaps.size <= most // 10:
@@ -200,14 +200,14 @@ def cut_envelope(t: Array, y: Array, most: int = MOST) -> Line:
 def series(
     channel: Channel, record: str, r: Array, white: Whiteness, abscissa: str, most: int = MOST
 ) -> Series:
-    """What is drawn of a channel.
+    """Return the data of a channel for plots.
 
     Args:
-        channel: what was compared.
+        channel: compared samples.
         record: its name.
         r: residuals of all rows of all channels.
-        white: autocorrelation of those of this channel.
-        abscissa: what its `t` is.
+        white: autocorrelation of the residuals of this channel.
+        abscissa: quantity of its `t`.
         most: points of a line.
     """
     order = slice(None) if channel.ordered else np.argsort(channel.t, kind="stable")
@@ -232,12 +232,12 @@ def series(
 
 
 def points_each(channels: int) -> int:
-    """Points of a line where there are so many channels: many are drawn coarser."""
+    """Return the number of points of a line for a number of channels: fewer if there are many."""
     return int(np.clip(TOGETHER // max(1, channels), LEAST, MOST))
 
 
 def error(channel: Channel, r: Array, effective: float = nan) -> Error:
-    """What is left of one channel; `r` holds the residuals of all rows."""
+    """Return the errors of one channel; `r` holds the residuals of all rows."""
     left = r[channel.rows]
     size = float(np.linalg.norm(channel.measured))
     return Error(
@@ -251,9 +251,9 @@ def error(channel: Channel, r: Array, effective: float = nan) -> Error:
 
 
 SIDE = 300
-"""Points of the law's curve each way, the nearest to rest a millionth of the largest speed."""
+"""Points of the law's curve in each direction, down to a millionth of the largest speed."""
 DOTS = 4000
-"""Measured points that are drawn, over all records."""
+"""Largest number of measured points drawn, over all records."""
 
 
 @final
@@ -265,7 +265,7 @@ class Curve:
         v_unit, F_unit: units.
         law: force of the fitted law in steady sliding, a point for each velocity.
         measured: record -> points (velocity, friction).
-        says: how the points come about.
+        says: origin of the points.
     """
 
     v_unit: str
@@ -276,13 +276,13 @@ class Curve:
 
 
 def of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
-    """The curve beside measured points (v, F) of each record."""
+    """Return the curve with measured points (v, F) of each record."""
     measured = _thinned({name: Line(v, F) for name, (v, F) in points.items()})
     return _curve(law, N, measured, turning, "measured points")
 
 
 def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
-    """The curve of a drive's law beside force - m a - offset of its records.
+    """Return the curve of a drive's law with force - m a - offset of its records.
 
     Records without position, force or equal intervals have no points.
     """
@@ -304,7 +304,7 @@ def _frictions(drive: Drive, records: Sequence[Record]) -> Iterator[tuple[str, L
 
 
 def _thinned(lines: dict[str, Line]) -> dict[str, Line]:
-    """Every so many points, so that there are not more than `DOTS`."""
+    """Return every n-th point, so that at most about `DOTS` remain."""
     total = sum(line.t.size for line in lines.values())
     every = max(1, -(-total // DOTS))
     return {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
@@ -322,7 +322,7 @@ def _curve(law: Law, N: float, measured: dict[str, Line], turning: bool, says: s
 
 
 def limits(curve: Curve) -> tuple[float, float]:
-    """Range of forces that shows the curve and all but the farthest points."""
+    """Return a range of forces that shows the curve and all but the farthest points."""
     dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
     ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []
     low, high = min([*ends, curve.law.y.min()]), max([*ends, curve.law.y.max()])

@@ -1,9 +1,9 @@
-"""A fit as JSON and back: everything that a page needs, and the law, without data and equations.
+"""JSON form of a fit: everything for a page, and the law, without data and equations.
 
-Dataclasses are coded by the types of their fields: arrays become lists; numbers that are not finite
-become null where that reads back as NaN, else "inf" and "-inf"; pairs as keys become two levels;
-members of an `Enum` are their names. Laws and drives are class by name, numbers, options and what
-they hold, which their text (`law_name`) does not say in full.
+Dataclasses are coded by the types of their fields: arrays become lists; non-finite numbers become
+null if that reads back as NaN, else "inf" and "-inf"; pairs as keys become two levels; members of
+an `Enum` their names. Laws and drives become class name, numbers, options and parts, because their
+text (`law_name`) is not complete.
 """
 
 import re
@@ -28,14 +28,14 @@ from symfric.scenes import Drive
 
 INFINITE = {"inf": inf, "-inf": -inf}
 DIGITS = 6
-"""Digits of arrays: they are drawn, not computed with."""
+"""Digits of arrays, which are only drawn."""
 
 
 def plain(value: Any) -> Any:
-    """`value` as what JSON takes.
+    """Return `value` as JSON-compatible data.
 
     Raises:
-        TypeError: something that is neither a number, a text, a collection nor a dataclass.
+        TypeError: a value that is neither a number, a text, a collection nor a dataclass.
     """
     if value is None or isinstance(value, str | bool | int):
         return value
@@ -80,7 +80,7 @@ def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def revived(kind: Any, data: Any) -> Any:
-    """What `plain` wrote of a value of the type `kind`.
+    """Return the value of the type `kind` that `plain` wrote.
 
     Raises:
         ValueError, TypeError, KeyError: data that `plain` did not write of such a value.
@@ -147,13 +147,13 @@ KINDS: dict[str, type[Parametric]] = {
     **ALL_LAWS, **WRAPPERS, "sum": Sum, "asymmetric": Asymmetric, "table": Table,
     "element": Element, "slider": Slider, "drive": Drive,
 }  # fmt: skip
-"""What can be made again from a file, by name."""
+"""Classes that a file can restore, by name."""
 
 
 def to_data(held: Parametric) -> dict[str, Any]:
-    """A law or a drive with numbers as a dictionary that JSON takes.
+    """Return a law or a drive with numbers as a dictionary for JSON.
 
-    One of a class of your own is written by the name of its class.
+    A user-defined class is stored by its name.
 
     Raises:
         ValueError: a parameter that is a symbol.
@@ -179,7 +179,7 @@ def _plain(where: str, value: Any) -> Any:
 
 
 def source_of(law: Law) -> str:
-    """Python that makes this law; its class stands in symfric, unless it is your own."""
+    """Return Python code that makes this law; it imports the class from symfric if it is there."""
     text = repr(law)
     known = sorted({kind.__name__ for kind in KINDS.values()})
     names = [name for name in known if re.search(rf"\b{name}\(", text)]
@@ -188,7 +188,7 @@ def source_of(law: Law) -> str:
 
 
 def known(data: Any, own: Mapping[str, type[Parametric]]) -> bool:
-    """Whether the classes of what `to_data` wrote are all known, here or among `own`."""
+    """Return True if all classes that `to_data` wrote are known, here or in `own`."""
     if isinstance(data, Mapping):
         named = data.get("kind") in KINDS or data.get("kind") in own  # pyright: ignore
         return named and all(known(one, own) for one in data.values())  # pyright: ignore
@@ -196,14 +196,14 @@ def known(data: Any, own: Mapping[str, type[Parametric]]) -> bool:
 
 
 def from_data(data: Any, own: Mapping[str, type[Parametric]] | None = None) -> Parametric:
-    """The law or drive that `to_data` wrote.
+    """Return the law or drive that `to_data` wrote.
 
     Args:
-        data: what was written.
+        data: output of `to_data`.
         own: further classes by name.
 
     Raises:
-        ValueError: no such class or field, or numbers that it refuses.
+        ValueError: unknown class or field, or refused numbers.
     """
     known = {**KINDS, **(own or {})}
     given = checks.named("law from data", data)
@@ -224,14 +224,14 @@ def _made_of(value: Any, known: Mapping[str, type[Parametric]]) -> Any:
 
 FILE = "symfric fit"
 FORMAT = 1
-"""Raised whenever older programs could not read the file or would misread it."""
+"""Raised when older programs cannot read the file or would misread it."""
 
 APART = ("law", "machine", "live", "asked")
-"""Fields that are no plain data."""
+"""Fields that are not plain data."""
 
 
 def to_dict(fit: Outcome) -> dict[str, Any]:
-    """All but the problem; the law as its text and as data that make it again, and the drive."""
+    """Return all fields but the problem; the law as text and as data, and the drive."""
     data = {f.name: plain(getattr(fit, f.name)) for f in fields(fit) if f.name not in APART}
     return {
         "file": FILE,
@@ -244,7 +244,7 @@ def to_dict(fit: Outcome) -> dict[str, Any]:
 
 
 def _data(held: Parametric | None) -> dict[str, Any] | None:
-    """A law or a drive as data; None of a class of your own that holds more than numbers."""
+    """Return a law or a drive as data; None for a user's class that holds more than numbers."""
     try:
         return None if held is None else to_data(held)
     except ValueError:
@@ -252,7 +252,7 @@ def _data(held: Parametric | None) -> dict[str, Any] | None:
 
 
 def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:
-    """The fit that was written to `path`; see `Fitted.from_json`."""
+    """Read the fit that was written to `path`; see `Fitted.from_json`."""
     what = "a file that fit.to_json(path) wrote"
     data = read_json("fit", path, what)
     if data.get("file") != FILE:
@@ -266,7 +266,7 @@ def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametri
         return _made(kind, data, own)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise ValueError(
-            f"fit '{path}': expected what fit.to_json(path) wrote, got it changed: {error}"
+            f"fit '{path}': expected the output of fit.to_json(path), got a modified file: {error}"
         ) from None
 
 
@@ -285,5 +285,5 @@ def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Para
 
 
 def _known(data: Any, own: Mapping[str, type[Parametric]] | None) -> Any:
-    """The law or machine, None where its class, or that of a part of it, is not known here."""
+    """Return the law or machine; None if its class, or the class of a part, is unknown."""
     return None if data is None or not known(data, own or {}) else from_data(data, own)

@@ -1,16 +1,16 @@
-"""Descent from one start to a minimum, with a status that says what was reached.
+"""Descent from one start to a minimum, with a status of the result.
 
-The trust region is SciPy's (`least_squares`, method "trf"): it keeps bounds in the interior,
+The trust region is SciPy's (`least_squares`, method "trf"): it keeps iterates inside the bounds,
 scales by the derivatives and is deterministic. Robust losses and weights are applied to the rows
-before they are reduced to a triangle, so its linear algebra sees n + 1 rows.
+before they are reduced to a triangle, so its linear algebra has n + 1 rows.
 
-Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain:
+The end is accepted as a minimum by the predicted gain of a full Gauss-Newton step:
 
-    fall = max over s of  f'f - |f + J s|^2     in the coordinates that no bound holds
+    fall = max over s of  f'f - |f + J s|^2     in the coordinates not held by a bound
 
-A motion that is simulated over a whole record has many minima far from the truth, one that starts
-again from the data in every window has few. All starts but the first therefore begin on the
-`easier` problems of the task (multiple shooting) and end on the task itself.
+A simulation over a whole record has many minima far from the truth; one that restarts from the data
+in every window has few. All starts but the first therefore begin on the `easier` problems of the
+task (multiple shooting) and end on the task itself.
 
 Sources: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J.
 Wright, Numerical Optimization, 2nd ed., 2006, chapter 10; H. G. Bock, in Modelling of Chemical
@@ -33,36 +33,37 @@ Array = NDArray[np.float64]
 Tell = Callable[[int], None]
 
 GAIN, NEAR = 1e-6, 1e-2
-"""Fall of the cost over the variance: of a minimum, and of an end that is near enough (a tenth of a
-standard error)."""
+"""Fall of the cost over the variance: for a minimum, and for an acceptable end (a tenth of a
+standard error).
+"""
 KINKS = 1.0
-"""Fall that derivatives promise and no step finds: kinks of a law that switches between samples."""
+"""Accepted predicted fall that no step achieves, due to kinks of a law with switches."""
 FAR = 15.0
-"""Longest step that is believed in: of a logarithmic coordinate a factor of three million."""
+"""Largest trusted step; a factor of three million for a logarithmic coordinate."""
 NOWHERE = 1e-13
-"""Largest change of a coordinate that is no step."""
+"""Largest change of a coordinate that does not count as a step."""
 ROUNDS = 12
-"""Times that noise levels are estimated anew."""
+"""Largest number of estimates of the noise levels."""
 SETTLED = 0.02
-"""Change of the noise levels that no longer matters for the weights."""
+"""Change of the noise levels below which the weights are converged."""
 ROUGH = 0.1
-"""Fall over the variance that is small enough while noise levels still change."""
+"""Fall over the variance that is sufficient while noise levels still change."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Start:
-    """One start and where it ended.
+    """A start and its end.
 
     Attributes:
-        number: of the start, in the order in which they were made.
+        number: of the start, in order of generation.
         w0, w: coordinates at the start and at the end, shape (n,).
         cost: sum of the losses at the end, under the noise levels of the best start.
-        status, message: how it ended.
+        status, message: of the end.
         evaluations: of the residuals.
         noise: noise levels at the end [SI].
-        objective: minus twice the logarithm of the likelihood, by which starts are compared.
-        evidence: cost of each trial in turn; inf where there was none.
+        objective: -2 log-likelihood, by which starts are compared.
+        evidence: cost of each trial in turn; inf if it failed.
     """
 
     number: int
@@ -78,13 +79,13 @@ class Start:
 
 
 class _EndedError(Exception):
-    """There is nothing left to gain."""
+    """Raised when no further gain is possible."""
 
 
 @final
 @dataclass(eq=False)
 class _Search:
-    """Points that were tried, for SciPy and for whoever interrupts it."""
+    """Evaluated points, for SciPy and for interruptions."""
 
     task: Task
     best: Point
@@ -116,18 +117,18 @@ class _Search:
         return self.last
 
     def _far_enough(self, w: Array) -> bool:
-        """Whether a trial differs from the best point; not if failures shrank the region to it."""
+        """Return False if failures shrank the region to the best point, else True."""
         return bool(np.abs(w - self.best.w).max() > NOWHERE)  # False of NaN, too
 
     def residuals(self, w: Array) -> Array:
-        """Reduced residuals; where there are none, infinite ones, at which the step shrinks."""
+        """Return reduced residuals; infinite ones on failure, for which SciPy shrinks the step."""
         found = self.at(w)
         if isinstance(found, str):
             return np.full(len(self.task.unknowns.names) + 1, np.inf)
         return found.reduced[0]
 
     def slopes(self, w: Array) -> Array:
-        """Their derivatives, asked for at accepted points only: there it may end."""
+        """Return their derivatives, or end the search; SciPy calls it at accepted points only."""
         found = self.at(w)
         if isinstance(found, str):  # never: SciPy asks only where residuals are finite
             raise _EndedError
@@ -140,7 +141,7 @@ class _Search:
         optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
         box = self.task.unknowns
         try:
-            with np.errstate(all="ignore"):  # of a region without size; see `_far_enough`
+            with np.errstate(all="ignore"):  # for a region of zero size; see `_far_enough`
                 optimize.least_squares(
                     self.residuals, self.best.w, self.slopes, bounds=(box.lower, box.upper),
                     x_scale="jac", ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=self.left + 9,
@@ -154,12 +155,12 @@ class _Search:
 def descend(
     task: Task, w0: Array, number: int = 0, evaluations: int = 200, tell: Tell | None = None
 ) -> Start:
-    """Go from `w0` to a minimum, noise levels estimated on the way where nobody gave them.
+    """Descend from `w0` to a minimum, and estimate the noise levels that were not given.
 
     `tell` is called with the number of each evaluation before it.
 
-    Returns what was reached in any case: after an interruption or where the start has no residuals,
-    too; `status` and `message` say so.
+    The best point is returned in any case, also after an interruption or if the start has no
+    residuals; see `status` and `message`.
     """
     try:
         first = task.at(task.unknowns.inside(w0))
@@ -210,9 +211,9 @@ def descend(
 
 
 def _back(search: _Search) -> int:
-    """Values that are as good as nothing or as infinite, at numbers one can read, if that is free.
+    """Replace values that count as zero or infinite by finite limits if the cost allows it.
 
-    Returns the evaluations that it took.
+    Return the number of evaluations.
     """
     box, old = search.task.unknowns, search.best
     w = np.clip(old.w, box.floor, box.ceiling)
@@ -225,7 +226,7 @@ def _back(search: _Search) -> int:
 
 
 def _renew(search: _Search) -> float:
-    """Estimate noise levels at the best point; by how much they changed."""
+    """Estimate noise levels at the best point; return their change."""
     old = search.task.noise
     search.task = search.task.with_noise(levels(search.task, search.best))
     search.best = search.task.again(search.best)
@@ -234,7 +235,7 @@ def _renew(search: _Search) -> float:
 
 
 def variance(task: Task, point: Point) -> float:
-    """Variance of the weighted residuals: of given noise at least 1, else what is left."""
+    """Return the variance of the weighted residuals, at least 1 for given noise."""
     freedom = max(1, point.sigma.size - point.w.size)
     least = 1.0
     if set(task.noise) == set(task.estimated):
@@ -243,10 +244,10 @@ def variance(task: Task, point: Point) -> float:
 
 
 def remaining(task: Task, point: Point) -> float:
-    """Fall of the cost that a Gauss-Newton step in the coordinates off their bounds promises.
+    """Return the fall of the cost that a Gauss-Newton step in the free coordinates predicts.
 
-    The step goes no further than `FAR` in any principal direction: beyond, derivatives promise
-    nothing, and a coordinate that has lost its influence would have to go further than any.
+    The step is limited to `FAR` in any principal direction: beyond, derivatives are not reliable,
+    and a coordinate that has lost its influence would need an unlimited step.
     """
     f, J = point.reduced
     g, box = np.einsum("ij,i->j", J, f), task.unknowns
@@ -260,11 +261,11 @@ def remaining(task: Task, point: Point) -> float:
 
 
 def _verdict(search: _Search) -> tuple[Status, str]:
-    """What was reached."""
+    """Return the status of the search and a message."""
     task, point = search.task, search.best
     fall = remaining(task, point) / variance(task, point)
     if search.interrupted:
-        return Status.INTERRUPTED, "interrupted by the user; the best so far"
+        return Status.INTERRUPTED, "interrupted by the user; best result so far"
     if fall <= 1e2 * GAIN:
         return Status.SOLVED, ""
     if fall <= NEAR:
@@ -272,23 +273,23 @@ def _verdict(search: _Search) -> tuple[Status, str]:
     if search.left <= 0:
         return Status.MAX_ITERATIONS, f"a step would still gain {fall:.3g} of the variance"
     if search.why:
-        return Status.NO_DESCENT, f"the last trial that failed: {search.why}"
-    said = f"a step should gain {fall:.3g} of the variance, and none does"
+        return Status.NO_DESCENT, f"the last failed trial: {search.why}"
+    message = f"a step should gain {fall:.3g} of the variance, but none does"
     if fall <= KINKS:
-        return Status.ACCEPTABLE, f"{said}: less than a standard error, as where a law has kinks"
-    return Status.NO_DESCENT, said
+        return Status.ACCEPTABLE, f"{message}: less than a standard error, as at kinks of a law"
+    return Status.NO_DESCENT, message
 
 
 ENOUGH = 40
-"""Evaluations on an easier problem: it need not end at its minimum."""
+"""Evaluations on an easier problem, which need not converge."""
 REACH = 100.0
-"""Largest factor by which it may change a positive value."""
+"""Largest factor by which it may change a logarithmic value."""
 
 
-def descend_by_way(
+def descend_easier_first(
     task: Task, w0: Array, number: int, evaluations: int, tell: Tell | None = None
 ) -> Start:
-    """`descend`, for all but the first start by way of the easier problems of the task."""
+    """Descend; all but the first start solve the easier problems of the task first."""
     w, spent = w0, 0
     for other in task.easier if number else ():
         shared = set(task.unknowns.fitted) & set(other.unknowns.fitted)
@@ -305,9 +306,9 @@ def descend_by_way(
 
 
 def _near(task: Task, w: Array) -> Task:
-    """The problem with logarithmic values within a factor of `REACH` of those at `w`.
+    """Return the problem with logarithmic values within a factor of `REACH` of those at `w`.
 
-    Parts of a record may be fitted as well by something that vanishes or grows without bound.
+    Parts of a record may be fitted equally well by values that vanish or grow without bound.
     """
     box = task.unknowns
     free = np.array([np.log(REACH) if u.logarithmic else np.inf for u in box.unknowns])
@@ -318,6 +319,6 @@ def _near(task: Task, w: Array) -> Task:
 
 
 def _parameters(task: Task, w: Array, shared: set[str]) -> dict[str, float]:
-    """Values of what both problems fit, without what belongs to records and windows."""
+    """Return the values that both problems fit, without those of records and windows."""
     values, own = task.unknowns.named(w), set(task.unknowns.nuisance)
     return {name: x for name, x in values.items() if name in shared and name not in own}

@@ -1,12 +1,12 @@
-"""Several starts, on any executor, with the same result to the bit as one after the other.
+"""Multiple starts on any executor, with bit-identical results.
 
 Starts are a Latin hypercube around the first one: positive values are multiplied by factors up to
-`REACH`, those that the user bounded cover their range, values of either sign move by half of
-themselves; start values of records stay.
+`REACH`, values bounded by the user cover their range, values of either sign change by up to half
+their magnitude; start values of records stay.
 
-Results are taken in the order of the numbers of the starts. They end early where another start
-cannot matter: one left nothing but white noise, or `AGREE` of them found the same lowest minimum.
-Results beyond that are dropped, so that the outcome does not depend on the executor.
+Results are processed in the order of the start numbers. The search ends early if another start is
+unnecessary: one left only white noise, or `AGREE` of them found the same lowest minimum. Further
+results are dropped, so that the outcome does not depend on the executor.
 
 Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21, 1979.
 """
@@ -21,7 +21,7 @@ from threading import get_ident
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.descent import Start, Tell, descend, descend_by_way
+from identification.solving.descent import Start, Tell, descend, descend_easier_first
 from identification.solving.task import Point, Task, square
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
@@ -32,11 +32,11 @@ Array = NDArray[np.float64]
 REACH = 5.0
 """Largest factor by which a positive value is changed."""
 WIDE = 1e3
-"""Ratio of bounds up to which all of the range is searched; others are bounds by nature."""
+"""Ratio of bounds up to which the whole range is searched; wider bounds are natural limits."""
 
 
 def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Array]:
-    """`count` coordinates, the first one the `centre`, the same for the same `seed`.
+    """Return `count` coordinates, the first one the `centre`; deterministic for a given `seed`.
 
     Args:
         at: the unknowns with their box.
@@ -59,7 +59,7 @@ def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Ar
 
 
 def _moved(unknown: Unknown, w: float, share: float, lower: float, upper: float) -> float:
-    """One coordinate moved, `share` in (0, 1)."""
+    """Return one moved coordinate, for `share` in (0, 1)."""
     side = 2 * share - 1
     if unknown.nuisance and not (np.isfinite(lower) and np.isfinite(upper)):
         return w
@@ -81,14 +81,14 @@ def _moved(unknown: Unknown, w: float, share: float, lower: float, upper: float)
 
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done and the fraction done."""
+"""Callback of the current activity and the fraction done."""
 
 AGREE = 3
-"""Starts that find the same lowest minimum before one believes that it is the lowest."""
+"""Starts that must find the same lowest minimum before the search ends."""
 SAME = 1.0
 """Difference of minus twice the log-likelihood below which two minima are the same."""
 WHITE = 3.0
-"""Correlation of neighbours, over its standard deviation, that white noise hardly exceeds."""
+"""Correlation of neighbours, over its standard deviation, that white noise rarely exceeds."""
 
 
 def many_starts(
@@ -105,13 +105,13 @@ def many_starts(
         task: the problem; for an executor it must pickle.
         executor: threads or processes, or None: one after the other here.
         progress: called after each start; without an executor also before each evaluation.
-        evaluations: of the residuals, allowed to each start; where the best has used them up, it
-            gets as many again.
+        evaluations: of the residuals, allowed to each start; if the best start has used them up,
+            it gets as many again.
         agree: starts that must find the same minimum for an early end; 0: all starts are made.
 
     Returns:
-        In the order of their numbers, costs under the noise levels of the best. After Ctrl-C what
-        was finished until then, and where the interrupted one stood.
+        In the order of their numbers, costs under the noise levels of the best. After Ctrl-C the
+        starts finished until then, and the state of the interrupted one.
     """
     done: list[Start] = []
     found = _in_turn(task, starts, executor, progress, evaluations)
@@ -123,11 +123,11 @@ def many_starts(
             if start.status is Status.INTERRUPTED or (agree and _enough(task, done, agree)):
                 break
     except BrokenExecutor as error:
-        said = f"a worker process ended after {len(done)} of {len(starts)} starts (killed, or out "
-        said += "of memory); fewer workers need less memory"
+        why = f"a worker process ended after {len(done)} of {len(starts)} starts (killed, or out "
+        why += "of memory); fewer workers need less memory"
         if not done:
-            raise SolveError(f"fit: {said}", Status.INTERRUPTED) from error
-        _mark_interrupted(done, said)
+            raise SolveError(f"fit: {why}", Status.INTERRUPTED) from error
+        _mark_interrupted(done, why)
     except KeyboardInterrupt:
         if not done:
             raise
@@ -140,18 +140,18 @@ def many_starts(
 
 
 def _mark_interrupted(done: list[Start], why: str) -> None:
-    """Say so of the best start, unless it is at a minimum."""
+    """Mark the best start as interrupted, unless it is at a minimum."""
     best = best_of(done)
     if not best.status.ok:
-        said = f"{why}; the best so far"
-        done[done.index(best)] = replace(best, status=Status.INTERRUPTED, message=said)
+        message = f"{why}; best result so far"
+        done[done.index(best)] = replace(best, status=Status.INTERRUPTED, message=message)
 
 
 def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
-    """More evaluations for the best of those `done`, if it has used its own up."""
+    """Continue the best of the starts `done` if it has used up its evaluations."""
     best = best_of(done)
     if best.status is not Status.MAX_ITERATIONS:
-        return  # at a minimum, or nowhere
+        return  # at a minimum, or failed
     more = descend(task, best.w, best.number, evaluations)
     if more.objective <= best.objective:
         spent = best.evaluations + more.evaluations
@@ -160,7 +160,7 @@ def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
 
 
 def best_of(starts: Sequence[Start]) -> Start:
-    """The likeliest end; of equal ones the first."""
+    """Return the start of the highest likelihood; of equal ones the first."""
     return min(starts, key=lambda s: (s.objective, s.number))
 
 
@@ -171,11 +171,11 @@ def _in_turn(
     progress: Progress | None,
     evaluations: int,
 ) -> Generator[Start]:
-    """Results in the order of the numbers."""
+    """Yield results in the order of the numbers."""
     if executor is None:
         for number, w in enumerate(starts):
             tell = None if progress is None else _telling(progress, number, len(starts))
-            yield descend_by_way(task, w, number, evaluations, tell)
+            yield descend_easier_first(task, w, number, evaluations, tell)
         return
     packed = pickle.dumps(task)
     waiting: list[Future[Start]] = [
@@ -191,7 +191,7 @@ def _in_turn(
 
 
 def _telling(progress: Progress, number: int, count: int) -> Tell:
-    """What tells each evaluation of one start."""
+    """Return a callback for the evaluations of one start."""
 
     def tell(evaluation: int) -> None:
         progress(f"start {number + 1} of {count}, evaluation {evaluation}", number / count)
@@ -200,18 +200,18 @@ def _telling(progress: Progress, number: int, count: int) -> Tell:
 
 
 def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> Start:
-    return descend_by_way(_unpacked(packed, get_ident()), w, number, evaluations)
+    return descend_easier_first(_unpacked(packed, get_ident()), w, number, evaluations)
 
 
 @lru_cache(maxsize=4)
 def _unpacked(packed: bytes, thread: int) -> Task:
-    """The task of this thread, made once: to compile a model again takes longer than a start."""
+    """Return the task of this thread, unpickled once, because compilation is expensive."""
     del thread
     return pickle.loads(packed)
 
 
 def _alike(done: Sequence[Start]) -> list[Start]:
-    """Costs under the noise levels of the best start, so that they can be compared."""
+    """Return starts with costs under the noise levels of the best, for comparison."""
     if not done:
         return []
     best = best_of(done)
@@ -221,7 +221,7 @@ def _alike(done: Sequence[Start]) -> list[Start]:
 
 
 def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
-    """Whether no further start is needed."""
+    """Return True if no further start is needed."""
     best = best_of(done)
     if not best.status.ok:
         return False
@@ -235,7 +235,7 @@ def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
 
 
 def is_white(task: Task, point: Point) -> bool:
-    """Whether neighbouring residuals are uncorrelated in every channel, at several distances."""
+    """Return True if neighbouring residuals of every channel are uncorrelated at several lags."""
     for channel in task.channels:
         r = point.r[channel.rows]
         if not channel.ordered or r.size < 20:

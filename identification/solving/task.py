@@ -1,4 +1,4 @@
-"""The weighted least-squares problem that residuals and unknowns make together.
+"""The weighted least-squares problem of residuals and unknowns.
 
     minimise over w   sum_signals [ n_s ln sigma_s ] + 1/2 sum_rows loss(r_i(p(w)) / sigma_s(i))
 
@@ -6,12 +6,12 @@ Losses: C^2 rho((r/C)^2) = e^2 with e = C sign(r) sqrt(rho((r/C)^2)) and C the r
 deviations, above which an outlier costs less; e is smooth, so the problem stays one of least
 squares with exact derivatives e' = rho' r / e.
 
-Noise levels by maximum likelihood, with the share d_s of the parameters that signal s pays for:
+Noise levels by maximum likelihood; d_s are the degrees of freedom that the fit takes from signal s:
 
     sigma_s^2 = sum r^2 / (n_s - d_s),   d_s = tr (J'J)^-1 J_s'J_s
 
 Rows are reduced block by block to the triangle R of a QR factorisation (a sequential TSQR). Blocks
-are so small that BLAS does not share one among threads: bits do not depend on their number.
+are small enough that BLAS does not use several threads: bits do not depend on their number.
 
 Sources: P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009; B. Triggs et al., Bundle
 Adjustment, 2000, section 3; Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
@@ -34,11 +34,11 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 THRESHOLD = {"squares": np.inf, "huber": 1.345, "soft_l1": 1.0, "cauchy": 2.385, "arctan": 3.0}
-"""Loss -> C. Of huber and cauchy that for 95 % efficiency on normal noise."""
+"""Loss -> C. huber and cauchy have 95 % efficiency on normal noise."""
 
 
 def shaped(r: Array, loss: str) -> tuple[Array, Array]:
-    """E and de/dr of residuals r in standard deviations, shape of r both."""
+    """Return e and de/dr of residuals r in standard deviations, shape of r both."""
     C = THRESHOLD[loss]
     if loss == "squares":
         return r, np.ones_like(r)
@@ -51,14 +51,14 @@ def shaped(r: Array, loss: str) -> tuple[Array, Array]:
 
 
 def influence(r: Array, loss: str) -> Array:
-    """Weight rho' of each residual in the normal equations: 1 for small ones, shape of r."""
+    """Return the weight rho' of each residual in the normal equations, 1 for small ones."""
     if loss == "squares":
         return np.ones_like(r)
     return _rho((r / THRESHOLD[loss]) ** 2, loss)[1]
 
 
 def _rho(z: Array, loss: str) -> tuple[Array, Array]:
-    """rho(z) and its derivative, rho(z) = z + O(z^2)."""
+    """Return rho(z) and its derivative, rho(z) = z + O(z^2)."""
     if loss == "huber":
         root = np.sqrt(np.maximum(z, 1.0))
         return np.where(z <= 1, z, 2 * root - 1), 1 / root
@@ -71,13 +71,13 @@ def _rho(z: Array, loss: str) -> tuple[Array, Array]:
 
 
 ENTRIES = 8192
-"""Of a block with its triangle; OpenBLAS takes threads from 9216 on for matrix times vector."""
+"""Entries of a block and its triangle; OpenBLAS uses threads from 9216 on (matrix times vector)."""
 FEWEST = 32
 """Fewest new rows of a block, however many columns there are."""
 
 
 def triangle(columns: Array) -> Array:
-    """R of `columns` (rows, k), shape (k, k), upper triangular with a diagonal >= 0."""
+    """Return R of `columns` (rows, k), shape (k, k), upper triangular with a diagonal >= 0."""
     rows, k = columns.shape
     found = np.zeros((0, k))
     size = max(FEWEST, ENTRIES // max(k, 1) - k)
@@ -91,7 +91,7 @@ def triangle(columns: Array) -> Array:
 
 
 def square(x: Array) -> float:
-    """Sum of squares without BLAS, which shares long ones among threads."""
+    """Return the sum of squares without BLAS, which uses several threads for long sums."""
     return float(np.sum(x * x))
 
 
@@ -101,15 +101,15 @@ Guard = Callable[[Mapping[str, float]], object]
 @final
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Where the residuals are known.
+    """Coordinates with their evaluated residuals.
 
     Attributes:
         w: coordinates, shape (n,).
-        values: by `names` of the residuals, shape (k,).
+        values: in the order of `names` of the residuals, shape (k,).
         evaluation: residuals in SI units with their derivatives by the values.
         sigma: noise level of every row, in SI units, shape (rows,).
         slope: dvalues/dw, shape (k, n).
-        loss: what a residual costs.
+        loss: loss function.
     """
 
     w: Array
@@ -131,14 +131,14 @@ class Point:
 
     @cached_property
     def weights(self) -> Array:
-        """Weight of each row in the normal equations: 1, less of outliers under a robust loss."""
+        """Weight of each row in the normal equations: 1, less for outliers under a robust loss."""
         return influence(self.r, self.loss)
 
     @cached_property
     def reduced(self) -> tuple[Array, Array]:
         """Residuals (k + 1,) and derivatives (k + 1, n) with the same cost, gradient and J'J.
 
-        Of the loss-shaped rows e: |f|^2 = |e|^2, J'f = J'e.
+        With the loss-shaped rows e: |f|^2 = |e|^2, J'f = J'e.
         """
         e, de = shaped(self.r, self.loss)
         J = self.evaluation.J * (de / self.sigma)[:, None]
@@ -157,13 +157,13 @@ class Task:
     """A weighted least-squares problem.
 
     Attributes:
-        residuals: what the model leaves of the data.
-        unknowns: coordinates of what is fitted.
-        noise: signal -> standard deviation [SI], as it is taken now.
+        residuals: residuals of the model on the data.
+        unknowns: coordinates of the fitted values.
+        noise: signal -> standard deviation [SI], at present.
         estimated: signals whose noise level is estimated.
         loss: "squares", or a robust one: "huber", "soft_l1", "cauchy", "arctan".
-        guard: raises ValueError at values (by name) that cannot be.
-        easier: problems of the same parameters by whose way starts far off go.
+        guard: raises ValueError for inadmissible values (by name).
+        easier: problems of the same parameters, solved first for distant starts.
     """
 
     residuals: Residuals
@@ -176,7 +176,7 @@ class Task:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """What the rows are."""
+        """Channels of the rows."""
         return self.residuals.channels
 
     @cached_property
@@ -189,11 +189,11 @@ class Task:
         return found
 
     def with_noise(self, noise: Mapping[str, float]) -> "Task":
-        """The same problem with other noise levels."""
+        """Return the problem with other noise levels."""
         return replace(self, noise=dict(noise))
 
     def at(self, w: Array) -> Point | str:
-        """The point at `w`; a sentence that says why there is none."""
+        """Return the point at `w`, or a message on the failure."""
         w = np.array(w, float)
         values = self.unknowns.values(w)
         names = self.unknowns.names
@@ -214,11 +214,11 @@ class Task:
         return Point(w, values, found, self.sigma, self.unknowns.slope(w), self.loss)
 
     def again(self, point: Point) -> Point:
-        """The same point under the noise levels of this task."""
+        """Return the point under the noise levels of this task."""
         return replace(point, sigma=self.sigma)
 
     def spread(self, signal: str) -> float:
-        """Standard deviation of the measured values of a signal over all records, or their size."""
+        """Return the standard deviation of a measured signal over all records, or its magnitude."""
         values = [c.measured for c in self.channels if c.signal == signal]
         spread = max(float(np.std(v)) for v in values)
         return spread or max(float(np.abs(v).max()) for v in values) or 1.0
@@ -231,9 +231,9 @@ def task(
     loss: object = "squares",
     guard: Guard | None = None,
 ) -> Task:
-    """The problem with noise levels `noise`: "estimate", or signal -> standard deviation [SI].
+    """Return the problem with noise levels: "estimate", or signal -> standard deviation [SI].
 
-    Signals that `noise` does not name are estimated.
+    Signals that are not in `noise` are estimated.
 
     Raises:
         ValueError: an unknown loss or signal, a noise level that is not above 0.
@@ -257,13 +257,13 @@ def _shown(names: Sequence[str], values: Array) -> str:
 
 
 NOISELESS = 1e-8
-"""Least noise level over the spread of a signal: no simulation is right to more than this."""
+"""Least noise level over the spread of a signal: the accuracy limit of simulations."""
 NORMAL = 1.4826
-"""Standard deviation of normal noise over the median of its magnitude."""
+"""Ratio of the standard deviation of normal noise to the median of its magnitude."""
 
 
 def levels(task: Task, point: Point) -> dict[str, float]:
-    """Noise levels [SI] by signal: those given, and those that the residuals at `point` have."""
+    """Return the noise levels [SI] by signal: given ones, and estimates from the residuals."""
     found = dict(task.noise)
     shares = _shares(task, point)
     for signal in task.estimated:
@@ -277,12 +277,12 @@ def levels(task: Task, point: Point) -> dict[str, float]:
 
 
 def change(old: dict[str, float], new: dict[str, float]) -> float:
-    """Largest change of a noise level, as a logarithm."""
+    """Return the largest change of a noise level, as a logarithm."""
     return max((abs(log(new[s] / old[s])) for s in new), default=0.0)
 
 
 def objective(task: Task, point: Point) -> float:
-    """Minus twice the logarithm of the likelihood, without its constant: lower is likelier."""
+    """Return -2 log-likelihood without its constant: lower is likelier."""
     rows = {s: sum(c.t.size for c in _of(task, s)) for s in task.noise}
     return point.cost + sum(2 * n * log(task.noise[s]) for s, n in rows.items())
 
@@ -292,7 +292,7 @@ def _of(task: Task, signal: str) -> list[Channel]:
 
 
 def _shares(task: Task, point: Point) -> dict[str, float]:
-    """Degrees of freedom that the fit takes from each signal."""
+    """Return the degrees of freedom that the fit takes from each signal."""
     _, J = point.reduced
     _, s, vt = np.linalg.svd(J, full_matrices=False)
     kept = s > 1e-10 * s.max(initial=1e-300)

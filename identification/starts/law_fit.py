@@ -1,4 +1,4 @@
-"""Levels and velocity scales of any law from binned points: a scan, then least squares."""
+"""Levels and velocity scales of any law from binned points: a grid search, then least squares."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class LawCurve:
-    """Force of a law in steady sliding, as a function of the parameters it depends on.
+    """Force of a law in steady sliding, as a function of its relevant parameters.
 
     Attributes:
         parameters: in the order of p.
         force: function of p: forces (points,), slopes (points, p).
-        floors: (high, low, value): p[high] >= p[low], or >= value where low is -1.
+        floors: (high, low, value): p[high] >= p[low], or >= value if low is -1.
         strict: (high, low): velocities p[high] > p[low].
     """
 
@@ -36,18 +36,18 @@ class LawCurve:
     strict: tuple[tuple[int, int], ...]
 
     def at(self, p: Array) -> tuple[Array, Array]:
-        """Forces and their slopes; not finite where the law has none."""
+        """Return forces and their derivatives; not finite where the law is undefined."""
         F, J = self.force(p)
         return F.full().ravel(), J.full()
 
 
 def law_curve(law: Law, names: Sequence[str], v: Array, N: float) -> LawCurve | None:
-    """The steady curve of `law` at velocities `v` [m/s] and normal force N [N].
+    """Return the steady curve of `law` at velocities `v` [m/s] and normal force N [N].
 
-    Only those of `names` that it depends on are kept; None where there are none. Further inputs of
-    the law have their steady values.
+    Only the parameters in `names` on which it depends are kept; None if there are none. Further
+    inputs of the law have their steady values.
     """
-    kept = _felt(law, names, N)
+    kept = _relevant(law, names, N)
     if not kept:
         return None
     known = parameters(law)
@@ -68,20 +68,20 @@ def _steady(law: Law, v: ca.SX, N: float) -> ca.SX:
     return ca.SX(law.force(v, N, law.steady_state(v, N), **given))
 
 
-def _felt(law: Law, names: Sequence[str], N: float) -> list[str]:
-    """Those of `names` that the steady force depends on."""
+def _relevant(law: Law, names: Sequence[str], N: float) -> list[str]:
+    """Return those of `names` that the steady force depends on."""
     if not names:
         return []
     model, variables = symbolise(law, *names)
     p = ca.vertcat(*(x.symbol for x in variables))
-    felt = ca.which_depends(_steady(model, ca.SX.sym("v"), N), p, 1, False)
-    return [name for name, depends in zip(names, felt, strict=True) if depends]
+    relevant = ca.which_depends(_steady(model, ca.SX.sym("v"), N), p, 1, False)
+    return [name for name, depends in zip(names, relevant, strict=True) if depends]
 
 
 def _orders(
     law: Law, variables: Sequence[Variable]
 ) -> tuple[tuple[tuple[int, int, float], ...], tuple[tuple[int, int], ...]]:
-    """Which values must not fall below others, or below a number; which must differ."""
+    """Return ordered pairs of values (or a value and a number), and strictly ordered pairs."""
 
     def place(value: object) -> int:
         return next((i for i, x in enumerate(variables) if x.symbol is value), -1)
@@ -101,18 +101,19 @@ def _orders(
 
 
 SCALES = {0: 1, 1: 16, 2: 8}
-"""Values tried of each velocity scale, by the number of scales; 5 of each of more."""
+"""Number of values tried for each velocity scale, by the number of scales; 5 for more scales."""
 STEPS = 2
-"""Linear least-squares steps at each; one is exact for laws that are linear in their levels."""
+"""Linear least-squares steps at each; one is exact if a law is linear in its levels."""
 POLISHED = 3
-"""Best trials that are improved by nonlinear least squares."""
+"""Number of best trials refined by nonlinear least squares."""
 PULL = 1e-3
-"""Weight of the guess against the points: what they do not tell stays there."""
+"""Weight of the guess against the points; it fixes undetermined parameters."""
 HIGHEST = 3.0
-"""Factor by which levels may exceed the guess; a static one exceeds the dynamic one by its guess at
-most, however steep a curve fits the slowest bins."""
+"""Factor by which levels may exceed the guess; a static one exceeds the dynamic one by at most its
+guess, however steeply a curve fits the slowest bins.
+"""
 WIDE = 10.0
-"""Factor by which velocity scales may leave the speeds of the data."""
+"""Factor by which velocity scales may exceed the range of speeds of the data."""
 
 
 @final
@@ -127,7 +128,7 @@ class Coordinates:
     upper: Array
 
     def p(self, w: Array) -> tuple[Array, Array]:
-        """Parameters and their slopes dp/dw."""
+        """Return the parameters and their derivatives dp/dw."""
         p = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, w, 0)), self.scale * w)
         slope = np.diag(np.where(self.logarithmic, p, self.scale))
         for high, low, value in self.curve.floors:
@@ -136,7 +137,7 @@ class Coordinates:
         return p, slope
 
     def w(self, p: Array) -> Array:
-        """Coordinates of parameters, moved inside the bounds."""
+        """Return the coordinates of parameters, moved inside the bounds."""
         p = p.copy()
         for high, low, value in self.curve.floors:
             p[high] -= p[low] if low >= 0 else value
@@ -145,17 +146,17 @@ class Coordinates:
 
 
 def is_scale(parameter: Parameter) -> bool:
-    """Whether a parameter is a positive velocity scale, or the inverse of one."""
+    """Return True if a parameter is a positive velocity scale, or the inverse of one."""
     return parameter.role == "velocity scale" and parameter.lower >= 0
 
 
 def velocity(parameter: Parameter, scale: float) -> float:
-    """A velocity scale in the unit of the parameter: itself, or its inverse."""
+    """Return a velocity scale in the unit of the parameter: itself, or its inverse."""
     return scale if parameter.unit in ("m/s", "rad/s") else 1 / scale
 
 
 def coordinates(curve: LawCurve, guess: Array, speeds: tuple[float, float]) -> Coordinates:
-    """Coordinates around `guess` for data between the slowest and the fastest of `speeds`."""
+    """Return coordinates around `guess` for data between the slowest and fastest of `speeds`."""
     known = curve.parameters
     logarithmic = np.array([is_scale(p) for p in known])
     scale = np.where(guess == 0, 1.0, np.abs(guess))
@@ -172,11 +173,11 @@ def coordinates(curve: LawCurve, guess: Array, speeds: tuple[float, float]) -> C
 
 
 def fit_law(curve: LawCurve, points: Curve, guess: Mapping[str, float]) -> dict[str, float]:
-    """Parameters with the smallest sum of squares over the bins.
+    """Return the parameters with the smallest sum of squares over the bins.
 
     At each combination of velocity scales between the slowest and the fastest bin the levels come
-    from linear least squares within their bounds; the best combinations are improved in all
-    parameters together. What the points do not tell stays at `guess`.
+    from linear least squares within their bounds; the best combinations are refined in all
+    parameters together. Parameters that the points do not determine stay at `guess`.
     """
     known, speed = curve.parameters, np.abs(points.v)
     ends = float(max(speed.min() / 2, 1e-3 * speed.max())), float(speed.max())
@@ -197,7 +198,7 @@ def fit_law(curve: LawCurve, points: Curve, guess: Mapping[str, float]) -> dict[
 
 
 def _scales(curve: LawCurve, start: Array, ends: tuple[float, float]) -> Iterator[Array]:
-    """Starts at all combinations of velocity scales; scales of one name move together."""
+    """Yield starts at all combinations of velocity scales; scales of one field move together."""
     fields = sorted({p.field for p in curve.parameters if is_scale(p)})
     values = np.geomspace(*ends, SCALES.get(len(fields), 5))
     for chosen in product(values, repeat=len(fields)):
@@ -211,16 +212,16 @@ def _scales(curve: LawCurve, start: Array, ends: tuple[float, float]) -> Iterato
         yield start
     own = np.array([float(p.value) for p in curve.parameters])
     if _apart(curve, own):
-        yield own  # for laws whose levels are no forces, such as those of a rope
+        yield own  # for laws whose levels are not forces, such as a rope
 
 
 def _apart(curve: LawCurve, p: Array) -> bool:
-    """Whether velocities that must differ do, by a twentieth."""
+    """Return True if strictly ordered velocities differ by at least a twentieth."""
     return all(p[high] > 1.05 * p[low] for high, low in curve.strict)
 
 
 def _levels(at: Coordinates, w: Array, F: Array, size: float) -> Array:
-    """Coordinates after bounded linear least squares in all but the velocity scales."""
+    """Return the coordinates after bounded linear least squares in all but the velocity scales."""
     from scipy.optimize import lsq_linear  # noqa: PLC0415 (slow to import)
 
     linear = ~at.logarithmic
@@ -255,7 +256,7 @@ def _cost(at: Coordinates, w: Array, F: Array, size: float) -> float:
 
 
 def _polished(at: Coordinates, w: Array, F: Array, size: float) -> Array:
-    """All coordinates after a few steps of a trust region; `w` where that fails."""
+    """Return all coordinates after trust-region steps."""
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
 
     pull, begin = PULL * np.sqrt(F.size), w.copy()

@@ -1,11 +1,11 @@
-"""Maxwell-slip elements from force against path: a convex problem, then better radii.
+"""Maxwell-slip elements from force against path: a convex problem, then refined radii.
 
     F = sum_i k_i e_i + sigma_2 v + offset,   e_i: path x kept within +-r_i by its slider
 
-For given radii r_i (break-away displacements) the e_i are known, and k_i >= 0 a non-negative least
-squares problem with one minimum. A dense set of radii gives the virgin curve
-f(x) = sum k_i min(x, r_i); a few elements start where it bends and are improved together with their
-radii, with exact derivatives. They start the elements of laws that have some (GMS, Leuven).
+For given radii r_i (break-away displacements) the e_i are known, and k_i >= 0 is a non-negative
+least-squares problem with one minimum. A dense set of radii gives the virgin curve
+f(x) = sum k_i min(x, r_i). A few elements start where it bends; they are refined together with
+their radii, with exact derivatives. They are start values for laws with elements (GMS, Leuven).
 Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteresis curve);
 Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
 """
@@ -27,23 +27,23 @@ from symfric.laws.base.law import Law
 Array = NDArray[np.float64]
 
 CANDIDATES = 60
-"""Radii of the dense set, by equal factors."""
+"""Number of radii of the dense set, in geometric progression."""
 MOST = 6000
-"""Samples that are used unless told otherwise."""
+"""Default number of samples used."""
 SHORTEST = 1e-4
 """Smallest radius over the travel, unless the steps of the record are larger."""
 SPARE = 4
-"""Elements beyond those wanted, which are merged with their neighbours later on."""
+"""Additional elements, merged with their neighbours later."""
 TOLD = 0.1
-"""Share of the force that elements must explain."""
+"""Least share of the force that elements must explain."""
 STEPS, QUICK = 40, 8
-"""Evaluations that improve the radii, and those of a start."""
+"""Evaluations to refine the radii, and those of a start."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """Maxwell-slip elements, the one that slips first in front.
+    """Maxwell-slip elements in the order in which they slip.
 
     Attributes:
         k: stiffnesses [N/m], shape (n,), > 0.
@@ -51,8 +51,8 @@ class Elements:
         sigma_2: viscous coefficient [N s/m].
         offset: constant force [N].
         loaded: state at the first sample: all elements slipping forwards (1), backwards (-1), or
-            none loaded (0).
-        rms: root mean square error [N] over the samples that were used.
+            unloaded (0).
+        rms: root mean square error [N] over the samples used.
     """
 
     k: Array
@@ -73,13 +73,13 @@ class Elements:
         return self.levels / self.levels.sum()
 
     def force(self, measured: Measured) -> Array:
-        """The force [N] along records that begin as `loaded` says."""
+        """Return the force [N] along records that begin in the state `loaded`."""
         e = _stretches(measured, _path(measured), self.radii, self.loaded)[0]
         return e @ self.k + self.sigma_2 * measured.v + self.offset
 
 
 def stretches(x: Array, radii: Array, loaded: int = 0) -> tuple[Array, Array]:
-    """Stretch e of each element along the path `x`, from e = r `loaded`, and de/dr.
+    """Return the stretch e of each element along the path `x`, from e = r `loaded`, and de/dr.
 
     e <- clip(e + dx, -r, r), exact for any dx in one direction; shapes (samples, radii).
     """
@@ -103,39 +103,39 @@ def fit_elements(
     most: int = MOST,
     thorough: bool = True,
 ) -> Elements:
-    """`count` elements, or fewer where fewer explain the data as well, by least squares.
+    """Fit `count` elements, or fewer if they explain the data equally well, by least squares.
 
     Args:
-        measured: with positions or times. The record begins without load, or in sliding one way
-            or the other: what explains it best.
-        count: elements wanted.
-        viscous: fit sigma_2 >= 0, too.
-        offset: fit a constant force, too.
-        most: samples to use; of more, every so many and all turning points.
-        thorough: start from two sets of radii and improve both until nothing changes.
+        measured: with positions or times. The record begins unloaded, or in sliding in either
+            direction: the best fit of the three.
+        count: requested elements.
+        viscous: also fit sigma_2 >= 0.
+        offset: also fit a constant force.
+        most: samples to use; from more, every n-th and all turning points.
+        thorough: start from two sets of radii and refine both to convergence.
 
     Raises:
-        ValueError: no path; nothing moves; no friction that follows the path.
+        ValueError: no path, no motion, or friction that does not follow the path.
     """
     count = checks.count("fit_elements: count", count)
     used = _thinned(measured, most)
-    path, beside = _path(used), _beside(used, viscous, offset)
+    path, columns = _path(used), _columns(used, viscous, offset)
     travel = max(float(np.ptp(path[r])) for r in used.records)
     if not travel > 0:
         raise ValueError("fit_elements: expected a position that moves, got the same everywhere")
     radii = np.geomspace(_shortest(path, travel), travel / 2, CANDIDATES)
-    trials = [(*_dense(used, path, beside, radii, loaded), loaded) for loaded in (0, 1, -1)]
+    trials = [(*_dense(used, path, columns, radii, loaded), loaded) for loaded in (0, 1, -1)]
     w, left, loaded = min(trials, key=lambda trial: trial[1])
     k = w[:CANDIDATES]
     if not k.any() or left > (1 - TOLD) * np.linalg.norm(used.F):
         raise ValueError(
-            "fit_elements: expected a force that grows along the path after each reversal, got one "
-            f"that elements explain to {100 * (1 - left / np.linalg.norm(used.F)):.0f} %; "
-            "is its sign that of the sliding velocity?"
+            "fit_elements: expected a force that increases along the path after each reversal, got "
+            f"one that elements explain to {100 * (1 - left / np.linalg.norm(used.F)):.0f} %; "
+            "check that its sign is that of the sliding velocity"
         )
 
     def improved(start: Array, steps: int = STEPS) -> Elements:
-        return _improved(used, path, beside, start, (viscous, offset, loaded), steps)
+        return _improved(used, path, columns, start, (viscous, offset, loaded), steps)
 
     few = _quantiles(radii, k, count)
     if not thorough:
@@ -147,12 +147,12 @@ def fit_elements(
 
 
 def _dense(
-    measured: Measured, path: Array, beside: Array, radii: Array, loaded: int
+    measured: Measured, path: Array, others: Array, radii: Array, loaded: int
 ) -> tuple[Array, float]:
-    """Coefficients of a dense set of radii and of the rest, and the norm of the error."""
+    """Return coefficients of a dense set of radii and of the other columns, and the error norm."""
     from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
 
-    X = np.column_stack([_stretches(measured, path, radii, loaded)[0], beside])
+    X = np.column_stack([_stretches(measured, path, radii, loaded)[0], others])
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     w, left = nnls(X / scale, measured.F)
     return w / scale, float(left)
@@ -162,13 +162,13 @@ def _path(measured: Measured) -> Array:
     if measured.x is None:
         raise ValueError(
             "fit_elements: expected positions or times, got points of velocity and force alone; "
-            "give x= or t="
+            "pass x= or t="
         )
     return measured.x
 
 
 def _thinned(measured: Measured, most: int) -> Measured:
-    """At most some `most` samples, the turning points among them."""
+    """Return about `most` samples, the turning points among them."""
     every = -(-measured.v.size // most)
     if every == 1:
         return measured
@@ -180,15 +180,15 @@ def _thinned(measured: Measured, most: int) -> Measured:
     return measured.at(kept)
 
 
-def _beside(measured: Measured, viscous: bool, offset: bool) -> Array:
-    """Columns for sigma_2 and for both signs of the offset."""
+def _columns(measured: Measured, viscous: bool, offset: bool) -> Array:
+    """Return columns for sigma_2 and for both signs of the offset."""
     one = np.ones(measured.v.size)
     columns = [measured.v] * viscous + [one, -one] * offset
     return np.column_stack(columns) if columns else np.zeros((one.size, 0))
 
 
 def _shortest(path: Array, travel: float) -> float:
-    """Radius below which the samples do not resolve an element."""
+    """Return the radius below which the samples do not resolve an element."""
     moves = np.abs(np.diff(path))
     step = float(np.quantile(moves[moves > 0], 0.1)) if (moves > 0).any() else travel
     return min(max(SHORTEST * travel, step), travel / 4)
@@ -200,7 +200,7 @@ def _stretches(measured: Measured, path: Array, radii: Array, loaded: int) -> tu
 
 
 def _quantiles(radii: Array, k: Array, count: int) -> Array:
-    """Radii that divide the force of the dense set evenly."""
+    """Return radii that divide the force of the dense set evenly."""
     share = np.cumsum(k * radii)
     goals = (np.arange(count) + 0.5) / count * share[-1]
     found = np.interp(goals, np.concatenate([[0.0], share]), np.concatenate([radii[:1], radii]))
@@ -208,13 +208,13 @@ def _quantiles(radii: Array, k: Array, count: int) -> Array:
 
 
 def _merged(elements: Elements, count: int) -> Array:
-    """Radii of `count` elements: neighbours whose merging bends the virgin curve least are one."""
+    """Return `count` radii, merging the neighbours that change the virgin curve least."""
     k, levels = elements.k, elements.levels
     while k.size > count:
         pair = np.add(k[:-1], k[1:]), np.add(levels[:-1], levels[1:])
         mean = pair[1] / pair[0]
         first, second = levels[:-1] / k[:-1], levels[1:] / k[1:]
-        bend = k[:-1] * (mean - first) * (second - mean)  # force lost, times the path over which
+        bend = k[:-1] * (mean - first) * (second - mean)  # lost force times its path
         i = int(np.argmin(bend))
         k = np.concatenate([k[:i], pair[0][i : i + 1], k[i + 2 :]])
         levels = np.concatenate([levels[:i], pair[1][i : i + 1], levels[i + 2 :]])
@@ -224,17 +224,17 @@ def _merged(elements: Elements, count: int) -> Array:
 def _improved(
     measured: Measured,
     path: Array,
-    beside: Array,
+    others: Array,
     radii: Array,
     kinds: tuple[bool, bool, int],
     steps: int,
 ) -> Elements:
-    """Stiffnesses, log radii and the rest together by a trust region."""
+    """Refine stiffnesses, log radii and the other coefficients by a trust region."""
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
 
     viscous, offset, loaded = kinds
     n, size = radii.size, float(np.abs(measured.F).max())
-    w = _dense(measured, path, beside, radii, loaded)[0]
+    w = _dense(measured, path, others, radii, loaded)[0]
     k, rest = w[:n], w[n:]
 
     def split(w: Array) -> tuple[Array, Array, Array]:
@@ -242,13 +242,13 @@ def _improved(
 
     def residuals(w: Array) -> Array:
         r, k, rest = split(w)
-        return (_stretches(measured, path, r, loaded)[0] @ k + beside @ rest - measured.F) / size
+        return (_stretches(measured, path, r, loaded)[0] @ k + others @ rest - measured.F) / size
 
     def slopes(w: Array) -> Array:
         r, k, _ = split(w)
         e, moved = _stretches(measured, path, r, loaded)
         by_radius = (moved * r - e) * k  # at constant k r
-        return np.hstack([by_radius, e / r * size, beside]) / size
+        return np.hstack([by_radius, e / r * size, others]) / size
 
     start = np.concatenate([np.log(radii), k * radii / size, rest])
     low = np.concatenate([np.log(radii) - 3, np.zeros(n), np.zeros(rest.size)])
@@ -262,7 +262,7 @@ def _improved(
         max_nfev=steps,
     )
     radii = np.sort(np.exp(found.x[:n]))
-    w, left = _dense(measured, path, beside, radii, loaded)
+    w, left = _dense(measured, path, others, radii, loaded)
     k, rest = w[:n], w[n:]
     kept = k * radii > 1e-6 * float(k @ radii)
     shift = float(rest[-2] - rest[-1]) if offset else 0.0
@@ -273,19 +273,19 @@ def _improved(
 FIELDS = ("k", "mu", "alpha")
 """Fields of an element: stiffness, friction coefficient or share."""
 ENOUGH = 1500
-"""Samples that are enough for a start."""
+"""Samples sufficient for a start."""
 SLOW = 0.75
-"""Share of the static level that friction keeps, by the median, in a record of pre-sliding."""
+"""Median share of the static level that friction keeps in a record of pre-sliding."""
 LEAST = 0.05
-"""Least share of it that a force is divided by."""
+"""Lower bound of this share as a divisor of forces."""
 APART = 1.25
-"""Radii over those of the element that is split where fewer explain the data than the law has."""
+"""Ratio of radii into which an element is split if the law has more elements than the fit."""
 HEADROOM = 1.1
-"""What the elements of a law carry together over its static level, where it has one."""
+"""Sum of a law's elements over its static level, if it has one."""
 
 
 def element_names(law: Law) -> dict[str, tuple[str, ...]]:
-    """Field of an element -> names of the parameters of all elements, in their order.
+    """Return field of an element -> names of the parameters of all elements, in their order.
 
     Empty for a law without elements, or with two sets of them (one for each direction).
     """
@@ -300,19 +300,19 @@ def element_names(law: Law) -> dict[str, tuple[str, ...]]:
 def element_values(
     law: Law, measured: Measured, curve: StribeckCurve, *, offset: float, free: Collection[str]
 ) -> dict[str, float]:
-    """Stiffness and level of each element of `law`, the one that slips first in front.
+    """Return stiffness and level of each element of `law`, in the order in which they slip.
 
-    The Maxwell-slip elements of `fit_elements`; for a law with a Stribeck curve, of the force over
-    this curve, which is alike in pre-sliding and in sliding. Empty where the data or the law have
-    no elements.
+    They come from `fit_elements`. For a law with a Stribeck curve the force is first divided by
+    this curve, so that pre-sliding and sliding are comparable. Empty if the data or the law have no
+    elements.
 
     Args:
         law: with N = measured.N.
         measured: friction alone, with positions or times.
         curve: its Stribeck curve.
-        offset: constant force [N] beside friction.
-        free: names that are asked for. Shares alpha_i count by their ratios alone; where some are
-            held, the others stand in the right ratio to the first one of them.
+        offset: constant force [N] in addition to friction.
+        free: names of requested parameters. Only the ratios of the shares alpha_i count; if some
+            are held, the others are scaled relative to the first held one.
     """
     names = element_names(law)
     if not names or measured.x is None:
@@ -327,7 +327,7 @@ def element_values(
     try:
         found = fit_elements(friction, count, viscous=viscous and not falls, most=ENOUGH)
     except ValueError:
-        return {}  # no hysteresis in these data: what the law has is as good
+        return {}  # no hysteresis in these data: keep the values of the law
     k, levels = _as_many(found, count)
     total = float(levels.sum())
     carried = HEADROOM * curve.F_S / total if falls else 1.0
@@ -341,7 +341,7 @@ def element_values(
 
 
 def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
-    """Forces over the Stribeck curve, times its top; slow records alone where there are some."""
+    """Return forces over the Stribeck curve, times its maximum; only slow records if any."""
     side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
     sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
     sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
@@ -353,7 +353,7 @@ def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
 
 
 def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
-    """Coefficients of elements, raised together until they carry mu_s, where a law asks for it."""
+    """Return coefficients of elements, scaled up to carry mu_s if the law requires it."""
     mine, known = element_names(law).get("mu", ()), parameters(law)
     if "mu_s" not in known or not set(mine) & values.keys():
         return {}
@@ -365,7 +365,7 @@ def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
-    """Stiffnesses and levels of `count` elements: the strongest ones are split."""
+    """Return stiffnesses and levels of `count` elements: the strongest ones are split."""
     levels, radii = elements.levels, elements.radii
     while levels.size < count:
         i = int(np.argmax(levels))
@@ -376,13 +376,13 @@ def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
 
 
 def shared(parameter: Parameter, law: Law) -> int:
-    """Elements that a parameter of one of them stands beside, itself included; else 1."""
+    """Return the number of elements that share a parameter's field; else 1."""
     if parameter.field not in FIELDS:
         return 1
     return max(len(getattr(part, "elements", "1")) for part in parts(law))
 
 
 def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
-    """Sum of the values of one field over `count` elements."""
+    """Return the sum of the values of one field over `count` elements."""
     same = [float(p.value) for p in values.values() if p.field == field]
     return sum(same) * count / len(same)

@@ -1,4 +1,4 @@
-"""Samples of friction for start values: break-away forces from ramps, stiffness from reversals."""
+"""Friction samples for start values: break-away forces from ramps, stiffness from reversals."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,22 +15,22 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 LEAST = 3
-"""Samples below which nothing is estimated."""
+"""Fewest samples for an estimate."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Samples of friction, in SI units; of an axis that turns in rad/s, N m and rad.
+    """Samples of friction, in SI units; for a rotary axis in rad/s, N m and rad.
 
     Attributes:
         v: sliding velocity [m/s], shape (n,).
-        F: force that moves the body, or friction itself where no mass is moved [N], shape (n,).
-        x: position [m], shape (n,); from v and t where it is not given.
+        F: force that moves the body, or friction itself if no mass is moved [N], shape (n,).
+        x: position [m], shape (n,); from v and t if omitted.
         t: increasing times [s], shape (n,); None for points without time.
-        a: acceleration [m/s^2], shape (n,), where F moves a mass, too.
+        a: acceleration [m/s^2], shape (n,), if F also moves a mass.
         N: normal force [N]; with 1 N the coefficients of a law read as forces.
-        breaks: first samples of the records after the first one.
+        breaks: first samples of the second and later records.
 
     Raises:
         ValueError: arrays of different shapes, numbers that are not finite, fewer than 3 samples,
@@ -70,7 +70,7 @@ class Measured:
         return tuple(slice(a, b) for a, b in pairwise(edges))
 
     def at(self, rows: Sequence[NDArray[np.intp]], F: Array | None = None) -> "Measured":
-        """Samples `rows` of each record, with other forces `F`, shape (n,), if given."""
+        """Return samples `rows` of each record, with other forces `F`, shape (n,), if given."""
         taken = np.concatenate(rows)
         x, t = (None if y is None else y[taken] for y in (self.x, self.t))
         breaks = tuple(np.cumsum([r.size for r in rows])[:-1].tolist())
@@ -84,7 +84,7 @@ class Measured:
 
 
 def _samples(name: str, given: object, size: int) -> Array:
-    """`given` as finite floats, shape (size,)."""
+    """Return `given` as finite floats, shape (size,)."""
     found = np.asarray(given, dtype=float)
     if found.ndim != 1 or found.size != size or size < LEAST:
         what = f"at least {LEAST} samples in one dimension, as many as v"
@@ -93,30 +93,30 @@ def _samples(name: str, given: object, size: int) -> Array:
         place = int(np.flatnonzero(~np.isfinite(found))[0])
         raise ValueError(
             f"Measured: {name}: expected finite numbers, got {found[place]} at sample {place}; "
-            "leave such rows out"
+            "remove such rows"
         )
     return found
 
 
 REST = 0.02
-"""Share of the largest speed below which a body counts as resting."""
+"""Share of the largest speed below which a body counts as at rest."""
 SHORTEST = 5
-"""Samples of a rest."""
+"""Fewest samples of a rest."""
 RISE = (0.3, 0.9)
-"""Shares of the break-away force between which its rate is read."""
+"""Shares of the break-away force between which its rate is evaluated."""
 APART = 2.0
-"""Ratio of the rates without which nothing is said about their effect."""
+"""Least ratio of the rates for which their effect is evaluated."""
 
 
 @final
 @dataclass(frozen=True)
 class BreakAway:
-    """One break-away.
+    """A break-away event.
 
     Attributes:
-        t: when the force is largest [s].
+        t: time of the largest force [s].
         force: that force in the direction of the motion that follows [N].
-        rate: how fast it was loaded before [N/s].
+        rate: loading rate before it [N/s].
         side: direction of the motion, 1 or -1.
     """
 
@@ -129,14 +129,14 @@ class BreakAway:
 @final
 @dataclass(frozen=True, eq=False)
 class BreakAways:
-    """All break-aways of a data set.
+    """Break-aways of a data set.
 
     Attributes:
         events: in order of time.
         level: median force of both directions [N].
         scatter: median absolute deviation of the force over its median.
-        per_decade: change of the force when it is loaded ten times as fast [N], of a straight line
-            over the logarithm of the rate; None where the rates differ by less than a factor of 2.
+        per_decade: change of the force per decade of the loading rate [N], by linear regression on
+            the logarithm of the rate; None if the rates differ by less than a factor of 2.
         error: standard error of `per_decade` [N].
     """
 
@@ -148,38 +148,38 @@ class BreakAways:
 
     @property
     def note(self) -> str:
-        """What is known about the loading rate, in a sentence."""
+        """Message on the effect of the loading rate."""
         rates = [event.rate for event in self.events]
         span = f"{min(rates):.3g} to {max(rates):.3g} N/s"
         if self.per_decade is None:
-            return f"all loaded alike ({span}): how the force depends on the rate is not known"
+            return f"all loading rates are similar ({span}): their effect on the force is unknown"
         if abs(self.per_decade) < 2 * self.error:
-            return f"no effect of the loading rate is seen ({span})"
-        word = "falls" if self.per_decade < 0 else "rises"
+            return f"no effect of the loading rate is visible ({span})"
+        word = "decreases" if self.per_decade < 0 else "increases"
         return (
             f"the force {word} by {abs(self.per_decade):.3g} +- {self.error:.2g} N for each factor "
-            f"of ten of the loading rate ({span}): take the slowest ramps for the static level"
+            f"of ten of the loading rate ({span}): use the slowest ramps for the static level"
         )
 
 
 def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -> BreakAways:
-    """Break-away forces of all ramps in a record.
+    """Find the break-away forces of all ramps in a record.
 
-    A rest is a stretch of at least 5 samples below `rest` times the largest speed that ends in
-    motion; the break-away force is the largest one along that motion until it begins. The samples
+    A rest is an interval of at least 5 samples below `rest` times the largest speed that ends in
+    motion; the break-away force is the largest one in that direction during the rest. The samples
     must resolve the rise, or the maximum is missed.
 
     Args:
-        measured: with times; the force with what accelerates the mass left out, or of slow ramps.
+        measured: with times; the force without inertia, or of slow ramps.
         rest: share of the largest speed.
-        offset: constant force [N] beside friction.
+        offset: constant force [N] in addition to friction.
 
     Raises:
         ValueError: no times; no rest that ends in motion.
     """
     rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
     if measured.t is None:
-        raise ValueError("break_away: expected a record with times, got points; give t=")
+        raise ValueError("break_away: expected a record with times, got points; pass t=")
     events = tuple(e for r in measured.records for e in _events(measured, r, rest, offset))
     if not events:
         raise ValueError(
@@ -206,7 +206,7 @@ def _events(measured: Measured, record: slice, rest: float, offset: float) -> It
             continue
         rising = (ramp[:top] > RISE[0] * ramp[top]) & (ramp[:top] < RISE[1] * ramp[top])
         last = np.flatnonzero(ramp[:top] <= RISE[0] * ramp[top])
-        rising[: last[-1] + 1 if last.size else 0] = False  # what came before the last rise
+        rising[: last[-1] + 1 if last.size else 0] = False  # samples before the last rise
         if rising.sum() >= 2:
             rate = float(np.polyfit(t[begin : begin + top][rising], ramp[:top][rising], 1)[0])
             if rate > 0:
@@ -214,7 +214,7 @@ def _events(measured: Measured, record: slice, rest: float, offset: float) -> It
 
 
 def _by_rate(events: tuple[BreakAway, ...]) -> tuple[float | None, float]:
-    """Slope of the force over the decades of the rate, and its standard error."""
+    """Return the slope of the force over the decades of the rate, and its standard error."""
     decades = np.log10([event.rate for event in events])
     if len(events) < 3 or np.ptp(decades) < np.log10(APART):
         return None, 0.0
@@ -226,9 +226,9 @@ def _by_rate(events: tuple[BreakAway, ...]) -> tuple[float | None, float]:
 
 
 DEAD = 2e-3
-"""Share of the travel by which the position must come back to count as a reversal."""
+"""Displacement back that counts as a reversal, over the travel."""
 PART = 0.3
-"""Share of the typical force that a branch must start from, and reach on the other side."""
+"""Least force at both ends of a branch, over the typical force."""
 
 
 @final
@@ -242,7 +242,7 @@ class Branch:
         level: force [N] before the reversal, positive.
         half: path [m] from the reversal until the force is zero.
         slope: least-squares slope of the force over this path [N/m].
-        damping: least-squares coefficient of velocity beside it [N s/m], >= 0.
+        damping: least-squares coefficient of velocity, fitted with it [N s/m], >= 0.
     """
 
     first: int
@@ -257,10 +257,10 @@ class Branch:
 @final
 @dataclass(frozen=True, eq=False)
 class Hysteresis:
-    """What all branches say together: medians over `branches`.
+    """Medians over all `branches`.
 
     Attributes:
-        branches: those on which the force changes its sign.
+        branches: branches on which the force changes its sign.
         half: path [m] from a reversal until the force is zero.
         level: force [N] from which it falls.
         damping: coefficient of velocity on this path [N s/m].
@@ -282,14 +282,14 @@ class Hysteresis:
     def bristle(self) -> float:
         """Stiffness level ln(2)/half [N/m] of a bristle (LuGre, Dahl).
 
-        From z = -g/sigma_0 it comes back as z = g/sigma_0 (1 - 2 exp(-sigma_0 x/g)), so that its
-        slope is 2 sigma_0 at the reversal and sigma_0 where the force is zero.
+        From z = -g/sigma_0 it returns as z = g/sigma_0 (1 - 2 exp(-sigma_0 x/g)), so its slope is
+        2 sigma_0 at the reversal and sigma_0 where the force is zero.
         """
         return self.level * log(2) / self.half
 
 
 def turning_points(x: Array, dead: float) -> list[int]:
-    """Samples at which a position turns back by more than `dead`, in order."""
+    """Return the samples at which a position turns back by more than `dead`, in order."""
     found = list[int]()
     side, extreme = 0, 0
     for i in range(1, x.size):
@@ -306,7 +306,7 @@ def turning_points(x: Array, dead: float) -> list[int]:
 
 
 def travelled(measured: Measured) -> Array:
-    """Path [m] since the last reversal at each sample; inf before the first one."""
+    """Return the path [m] since the last reversal at each sample; inf before the first one."""
     found = np.full(measured.v.size, np.inf)
     if measured.x is None:
         return found
@@ -319,15 +319,15 @@ def travelled(measured: Measured) -> Array:
 
 
 def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -> Hysteresis | None:
-    """Stiffness and damping of pre-sliding from the branches after each reversal.
+    """Estimate stiffness and damping of pre-sliding from the branches after each reversal.
 
     Args:
-        measured: with positions or times; the force without what accelerates a mass.
-        offset: constant force [N] beside friction.
-        dead: share of the travel by which the position must come back to count as a reversal.
+        measured: with positions or times; the force without inertia.
+        offset: constant force [N] in addition to friction.
+        dead: displacement back that counts as a reversal, over the travel.
 
     Returns:
-        None where there is no path, or no reversal after which the force changes sign.
+        None without a path or a reversal after which the force changes sign.
     """
     if measured.x is None:
         return None
@@ -383,13 +383,13 @@ def _branches(
 
 
 def _median_of_three(F: Array) -> Array:
-    """Against single spikes."""
+    """Return the running median of three samples, against single spikes."""
     inner = np.median([F[:-2], F[1:-1], F[2:]], axis=0)
     return np.concatenate([F[:1], inner, F[-1:]])
 
 
 def _slopes(along: Array, speed: Array, force: Array) -> tuple[float, float]:
-    """Slopes of the force over path and speed; over the path alone where the speed says nothing."""
+    """Return the slopes of the force over path and speed; only over path if speed is useless."""
     one = np.ones(along.size)
     if along.size > 4 and np.ptp(speed) > 0:
         scale = np.array([1.0, along.max(), np.abs(speed).max()])

@@ -1,4 +1,4 @@
-"""The six-step procedure for the static parameters of LuGre, step by step beside the curve.
+"""The six-step procedure for the static parameters of LuGre.
 
     F = F_C + (F_S - F_C) exp(-(v/v_s)^delta) + sigma_2 v
 
@@ -9,8 +9,8 @@
     5  F_C                    step 2 less step 4
     6  delta, v_s             exponential part again, with a free exponent
 
-Each step uses a part of the curve alone; a fit of all points at once (`identification.Fit`) has the
-smaller error. What it cannot know it says in `doubts`.
+Each step uses only a part of the curve; a fit of all points at once (`identification.Fit`) has the
+smaller error. `doubts` lists what the points do not determine.
 Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 4.2; after
 Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
 """
@@ -31,17 +31,17 @@ NAMES = ("F_S", "F_C", "v_s", "sigma_2", "delta")
 SHARE = (0.02, 0.98)
 """Shares of F_S - F_C between which a force counts for the exponential part."""
 EXPONENTS = (0.3, 10.0)
-"""What the exponent is kept within."""
+"""Bounds of the exponent."""
 LOOSE = 0.3
-"""Relative standard error beyond which a parameter counts as not determined."""
+"""Relative standard error above which a parameter counts as not determined."""
 LEAST = 4
-"""Speeds of one direction without which there is no curve to take apart."""
+"""Speeds of one direction required for a curve."""
 
 
 @final
 @dataclass(frozen=True)
 class Step:
-    """One step: its number, what it finds, from which part of the curve, and the numbers."""
+    """A step: its number, its result, the number of points used, and the values."""
 
     number: int
     what: str
@@ -56,18 +56,18 @@ class Step:
 @final
 @dataclass(frozen=True, eq=False)
 class SixSteps:
-    """Result of the procedure.
+    """Result of the six-step procedure.
 
     Attributes:
-        steps: as they were done, in the order of the numbers.
-        values: F_S, F_C [N], v_s [m/s], sigma_2 [N s/m], delta; v_s and delta are NaN where no
+        steps: in the order of their numbers.
+        values: F_S, F_C [N], v_s [m/s], sigma_2 [N s/m], delta; v_s and delta are NaN if no
             falling part was found.
-        errors: relative standard errors if all points were fitted at once around these values,
-            with the scatter that the curve leaves; inf where the points cannot tell.
-        rms: root mean square error over the mean force [%], that of F_C + sigma_2 v without a
+        errors: relative standard errors of a simultaneous fit of all points around these values,
+            from the scatter around the curve; inf if the points do not determine a value.
+        rms: root mean square error over the mean force [%], of F_C + sigma_2 v without a
             falling part.
         curve: mean force at each speed.
-        doubts: what the points cannot tell, one sentence each.
+        doubts: messages on undetermined values, one sentence each.
     """
 
     steps: tuple[Step, ...]
@@ -82,11 +82,11 @@ class SixSteps:
         """The law with these values.
 
         Raises:
-            ValueError: no falling part was found, so that there is no v_s.
+            ValueError: no falling part was found, so there is no v_s.
         """
         if not np.isfinite(self.values["v_s"]):
             why = self.doubts[0]
-            raise ValueError(f"six_steps: law: expected points that tell v_s, got none; {why}")
+            raise ValueError(f"six_steps: law: expected points that determine v_s, got none; {why}")
         return SteadyStateLuGre(**self.values, v_eps=1e-3 * float(self.curve.v.min()))
 
     def __str__(self) -> str:
@@ -100,18 +100,18 @@ class SixSteps:
 
 
 def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
-    """Static parameters of LuGre from points in sliding at constant speeds.
+    """Estimate the static parameters of LuGre from points in sliding at constant speeds.
 
-    Both directions count alike: points of negative velocity are mirrored.
+    Both directions count equally: points of negative velocity are mirrored.
 
     Args:
         v: sliding velocities [m/s], shape (n,).
         F: friction forces with the sign of v [N], shape (n,).
-        unstable: speed [m/s] up to which the measured motion was stick-slip, if it was; the points
-            are used, and what rests on them is doubted.
+        unstable: speed [m/s] up to which the measured motion was stick-slip, if any; the points
+            are used, and values that depend on them are doubted.
 
     Raises:
-        ValueError: fewer than four speeds, or forces that point forward.
+        ValueError: fewer than four speeds, or forces against the sign of the velocity.
     """
     velocity, friction = samples("six_steps", v, F)
     unstable = checks.number("six_steps: unstable", unstable, unit="m/s", lower=0.0)
@@ -154,10 +154,10 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
 
 
 def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[str, float]:
-    """Relative standard errors of a least-squares fit of all five parameters (Cramer-Rao).
+    """Return relative standard errors of a least-squares fit of all five parameters (Cramer-Rao).
 
-    The smallest that any unbiased method can have at white noise of standard deviation `noise` [N]
-    in each point; inf for values of 0 and for what the points cannot tell at all.
+    They are the smallest of any unbiased method for white noise of standard deviation `noise` [N]
+    in each point; inf for values of 0 and for undetermined ones.
     """
     F_S, F_C, v_s, delta = curve.F_S, curve.F_C, curve.v_s, curve.delta
     power = (speed / v_s) ** delta
@@ -166,22 +166,22 @@ def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[st
     columns = falling, 1 - falling, bend * delta / v_s, speed, -bend * np.log(speed / v_s)
     J = np.column_stack(columns)
     scale = np.linalg.norm(J, axis=0)
-    told = scale > 0
+    known = scale > 0
     error = np.full(len(NAMES), np.inf)
-    covariance = np.linalg.pinv((X := J[:, told] / scale[told]).T @ X, rcond=1e-14)
-    error[told] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale[told]
+    covariance = np.linalg.pinv((X := J[:, known] / scale[known]).T @ X, rcond=1e-14)
+    error[known] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale[known]
     size = np.abs([F_S, F_C, v_s, curve.sigma_2, delta])
     found = np.divide(error, size, out=np.full(size.size, np.inf), where=size > 0)
     return dict(zip(NAMES, found.tolist(), strict=True))
 
 
 def _noise(error: Array) -> float:
-    """Standard deviation of what five parameters leave."""
+    """Return the standard deviation of the residuals of five parameters."""
     return float(np.sqrt(np.sum(error**2) / max(error.size - len(NAMES), 1)))
 
 
 def _slope(speed: Array, force: Array) -> float:
-    """Slope of the linear part [N s/m], >= 0; 0 where it has one point."""
+    """Return the slope of the linear part [N s/m], >= 0; 0 if it has one point."""
     if speed.size < 2:
         return 0.0
     return max(float(np.polyfit(speed, force, 1)[0]), 0.0)
@@ -190,7 +190,7 @@ def _slope(speed: Array, force: Array) -> float:
 def _exponential(
     curve: Curve, top: int, low: int, F_S: float, F_C: float, sigma_2: float
 ) -> tuple[Array, Array]:
-    """Speeds and -log of the share of F_S - F_C that is left, where it can be told from both."""
+    """Return speeds and -log of the remaining share of F_S - F_C, where it is significant."""
     speed = curve.v[top : low + 1]
     share = (curve.F[top : low + 1] - F_C - sigma_2 * speed) / max(F_S - F_C, 1e-300)
     inside = (share > SHARE[0]) & (share < SHARE[1])
@@ -198,10 +198,10 @@ def _exponential(
 
 
 def _exponents(speed: Array, power: Array) -> tuple[float, float, float]:
-    """v_s for delta = 2; v_s and delta: straight lines through power = (v/v_s)^delta; else NaN.
+    """Return v_s for delta = 2; v_s and delta: straight lines of power = (v/v_s)^delta; else NaN.
 
-    With a free exponent it is a line through the logarithms. Each point weighs as much as an error
-    of the force moves it: share = exp(-power), so d log(power) = d share / (share power).
+    With a free exponent it is a line through the logarithms. The weight of each point is the
+    inverse effect of a force error: share = exp(-power), d log(power) = d share / (share power).
     """
     if speed.size < 2:
         scale = float(speed[0] / np.sqrt(power[0])) if speed.size else float("nan")
@@ -215,49 +215,49 @@ def _exponents(speed: Array, power: Array) -> tuple[float, float, float]:
 
 
 def _doubts(found: StribeckCurve, curve: Curve, low: int, count: int, unstable: float) -> list[str]:
-    """What the shape of the curve cannot tell."""
-    said = list[str]()
+    """Return messages on values that the shape of the curve does not determine."""
+    messages = list[str]()
     v_s, slowest, fastest = found.v_s, float(curve.v[0]), float(curve.v[-1])
     lost = (found.F_S - found.F_C) * -np.expm1(-((slowest / v_s) ** found.delta))
     if lost > 0.005 * found.F_S:
-        said.append(
+        messages.append(
             f"at the slowest point, {slowest:.3g} m/s, the force has already fallen: F_S is the "
             "largest force measured, a lower bound of the static one"
         )
     if v_s <= unstable:
-        said.append(
-            f"v_s = {v_s:.3g} m/s lies among speeds of stick-slip (up to {unstable:.3g} m/s): "
-            "F_S, v_s and delta describe means of an unsteady force"
+        messages.append(
+            f"v_s = {v_s:.3g} m/s is among speeds of stick-slip (up to {unstable:.3g} m/s): "
+            "F_S, v_s and delta are averages over an unsteady force"
         )
-    said += _of_line(curve, low)
+    messages += _of_line(curve, low)
     if count < LEAST:
-        said.append(f"the exponential part has {count} points: v_s and delta are guesses")
+        messages.append(f"the exponential part has {count} points: v_s and delta are uncertain")
     if not slowest < v_s < fastest:
-        said.append(f"v_s = {v_s:.3g} m/s lies outside the speeds measured")
-    return said
+        messages.append(f"v_s = {v_s:.3g} m/s is outside the measured speeds")
+    return messages
 
 
 def _of_line(curve: Curve, low: int) -> list[str]:
-    """What the linear part, from the smallest force on, cannot tell."""
+    """Return messages on the linear part, from the smallest force on."""
     if low == curve.v.size - 1:
         return ["the force falls up to the fastest point: no linear part, sigma_2 is set to 0"]
     if curve.v.size - low < LEAST:
-        return [f"the linear part has {curve.v.size - low} points: sigma_2 is a guess"]
+        return [f"the linear part has {curve.v.size - low} points: sigma_2 is uncertain"]
     return []
 
 
 def _no_fall(curve: Curve, top: int, low: int) -> str:
-    """That no point tells how friction falls, so that there is neither v_s nor delta."""
+    """Return the message that no point shows how friction falls, so v_s and delta are unknown."""
     F, v = curve.F, curve.v
     if top == low:
         return (
             f"no falling part was found: the force is smallest, {F[low]:.3g} N, at the slowest "
-            "point; it rises, as that of coulomb+viscous does, or falls at lower speeds"
+            "point; it rises, as with coulomb+viscous, or falls at lower speeds"
         )
     return (
         f"no falling part was found: no point between the largest force, {F[top]:.3g} N at "
-        f"{v[top]:.3g} m/s, and the smallest, {F[low]:.3g} N at {v[low]:.3g} m/s, tells how it "
-        "falls; scatter may hide that, and more points at these speeds or Fit of all points tell"
+        f"{v[top]:.3g} m/s, and the smallest, {F[low]:.3g} N at {v[low]:.3g} m/s, shows how it "
+        "falls; scatter may hide it: add points at these speeds, or use Fit with all points"
     )
 
 

@@ -1,4 +1,4 @@
-"""Start values of any law from data: its roles say which measured quantity belongs where."""
+"""Start values of any law from data, assigned by the roles of its parameters."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -23,30 +23,30 @@ from symfric.laws.base.law import Law
 from symfric.scenes.blocks import Drive
 
 STEADY = ("level", "viscous", "velocity scale", "")
-"""Roles that the steady curve of a law tells."""
+"""Roles that the steady curve of a law determines."""
 ELASTIC = ("MaxwellSlip", "GMS", "Leuven", "BoucWen", "HaessigFriedland", "StickSlip", "Armstrong")
 """Laws whose elements unload elastically; bristles unload at twice their stiffness."""
 DAMPED = 0.6
-"""Ratio of bristle damping to sqrt(stiffness mass) where the data do not tell it."""
+"""Ratio of bristle damping to sqrt(stiffness mass) if the data do not determine it."""
 BEYOND = 5.0
-"""Paths to zero force behind a reversal after which a body counts as sliding."""
+"""Distance after a reversal beyond which a body counts as sliding, in paths to zero force."""
 APART = 1.05
 """Least ratio of velocities that must differ."""
 SPIKE = 0.3
-"""Share of the sliding force that bristle damping gives at the largest speed, without a mass."""
+"""Bristle damping force at the largest speed over the sliding force, without a mass."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What the data say, whatever the law.
+    """Information from the data, independent of the law.
 
     Attributes:
         stribeck: curve through the bins.
         curve: the bins, without mass and offset.
-        friction: the samples without what accelerates the mass.
+        friction: the samples without inertia.
         reversals: branches after reversals, or None.
-        m: moving mass [kg], 0 where the force moves none or its acceleration is not known.
+        m: moving mass [kg], 0 without a mass or a known acceleration.
         offset: constant force [N].
         N: normal force [N].
         fastest: largest speed [m/s].
@@ -65,22 +65,22 @@ class Facts:
 def start_values(
     what: Law | Drive, measured: Measured, *, free: Collection[str]
 ) -> dict[str, float]:
-    """Start values of the parameters `free` of a law, or of a drive with its mass and offset.
+    """Return start values of the parameters `free` of a law, or a drive with mass and offset.
 
     Levels, viscous coefficients and velocity scales: least squares of the law's own steady curve
     in bins of the velocity (`fit_law`). Stiffness and damping of bristles: branches after
-    reversals (`hysteresis`). Mass and offset: linear regression beside the Stribeck curve. What the
-    data do not tell keeps the value that `what` has. The same data give the same values; they
-    can be given to `with_values`.
+    reversals (`hysteresis`). Mass and offset: linear regression together with the Stribeck curve.
+    Undetermined parameters keep the value of `what`. The result is deterministic, and
+    `with_values` accepts it.
 
     Args:
-        what: with numbers; those that are not free stay as they are.
+        what: with numbers; parameters that are not free keep their value.
         measured: velocity and force; positions or times for laws with states; accelerations for
             the mass of a drive.
         free: names of parameters.
 
     Raises:
-        ValueError: unknown names; data that do not move.
+        ValueError: unknown names; data without motion.
     """
     names = checks.names("start_values: free", tuple(free), parameters(what))
     law = what.law if isinstance(what, Drive) else what
@@ -100,16 +100,16 @@ def start_values(
 
 
 def _is_steady(parameter: Parameter, law: Law) -> bool:
-    """Whether the steady curve tells a parameter; of elements that share a level it does not."""
+    """Return True if the steady curve determines a parameter; not if elements share a level."""
     shared = parameter.field == "mu" and "mu_s" in parameters(law)
     return parameter.role in STEADY and not shared
 
 
 def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) -> Facts:
-    """Levels, stiffness, mass and offset of the data, as far as they tell them.
+    """Return levels, stiffness, mass and offset of the data, as far as they determine them.
 
-    The Stribeck curve is taken twice: of all samples, and, where reversals show how far
-    pre-sliding goes, of those that lie `BEYOND` times as far behind the last reversal.
+    The Stribeck curve is fitted twice: to all samples, and, if reversals show the length of
+    pre-sliding, to samples more than `BEYOND` times this length after the last reversal.
     """
     m = _mass(measured) if mass else 0.0
     friction = measured.F if measured.a is None else measured.F - m * measured.a
@@ -139,10 +139,10 @@ def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) ->
 
 
 def noise_speed(measured: Measured) -> float:
-    """Speed [m/s] below which noise hides the direction: three standard deviations of velocity.
+    """Return the speed [m/s] below which noise hides the direction: three standard deviations.
 
-    From second differences of records with times, which smooth motion leaves nearly out; 0 for
-    points without time.
+    Estimated from second differences of records with times, which nearly remove smooth motion; 0
+    for points without time.
     """
     if measured.t is None or measured.v.size < 5:
         return 0.0
@@ -152,9 +152,9 @@ def noise_speed(measured: Measured) -> float:
 
 
 def _mass(measured: Measured) -> float:
-    """Slope of the force over the acceleration inside bins of velocity [kg], >= 0.
+    """Return the slope of the force over the acceleration inside bins of velocity [kg], >= 0.
 
-    Friction, which is alike inside a bin, cancels with the mean of the bin.
+    Friction is similar inside a bin and cancels with the mean of the bin.
     """
     if measured.a is None:
         return 0.0
@@ -169,7 +169,7 @@ def _mass(measured: Measured) -> float:
 
 
 def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
-    """Start of one parameter from its role and unit; its own value where nothing is known."""
+    """Return the start of one parameter from its role and unit; its own value if unknown."""
     value, unit = float(parameter.value), parameter.unit
     parted = shared(parameter, law)
     match parameter.role:
@@ -201,7 +201,7 @@ def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
 
 
 def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
-    """A friction level in the unit of the parameter: the static one for upper ones of a pair."""
+    """Return a friction level in the unit of the parameter: static for the upper ones of a pair."""
     if parameter.unit not in ("1", "N", "N m"):
         return float(parameter.value)
     per = facts.N if parameter.unit == "1" else 1.0
@@ -209,7 +209,7 @@ def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
     upper = {high for part in parts(law) for _, high in type(part).ordered}
     if parameter.field in upper:
         return max(facts.stribeck.F_S, sliding) / per
-    if parameter.field == "mu" and "mu_s" in parameters(law):  # its elements must carry mu_s
+    if parameter.field == "mu" and "mu_s" in parameters(law):  # the elements must carry mu_s
         return HEADROOM * facts.stribeck.F_S / per
     known = [p for p in parameters(law).values() if p.role == "level" and p.field not in upper]
     largest = max(float(p.value) for p in known if p.unit == parameter.unit)
@@ -217,7 +217,7 @@ def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
 
 
 def _stiffness(facts: Facts, law: Law) -> float:
-    """Of a bristle, or of all elements together [N/m]; 0 where the data do not tell it."""
+    """Return the stiffness of a bristle or of all elements [N/m]; 0 if undetermined."""
     if facts.reversals is None:
         return 0.0
     elastic = any(type(part).__name__ in ELASTIC for part in parts(law))
@@ -225,7 +225,7 @@ def _stiffness(facts: Facts, law: Law) -> float:
 
 
 def _damping(facts: Facts, stiffness: float) -> float:
-    """Of a bristle [N s/m]: from reversals, or .6 of critical, or small against sliding."""
+    """Return the damping of a bristle [N s/m]: from reversals, .6 of critical, or small."""
     if facts.m > 0:
         return DAMPED * sqrt(stiffness * facts.m)
     if facts.reversals is not None and facts.reversals.damping > facts.stribeck.sigma_2:
@@ -234,10 +234,10 @@ def _damping(facts: Facts, stiffness: float) -> float:
 
 
 def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, float]:
-    """`values` moved inside bounds and into order, so that `with_values` takes them."""
+    """Return `values` inside bounds and in order, so that `with_values` accepts them."""
     known = parameters(what)
     found = {n: _inside(known[n], value) for n, value in values.items()}
-    for _ in range(3):  # a pair put into order may leave another one out of it
+    for _ in range(3):  # ordering one pair may break another
         for low, high, strictly in orders(what):
             ratio = APART if strictly else 1.0
             at = {n: found.get(n, float(known[n].value)) for n in (low, high)}
@@ -251,7 +251,7 @@ def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, 
 
 
 def _inside(parameter: Parameter, value: float) -> float:
-    """`value` inside the bounds; of what must be positive, not below a millionth of the default."""
+    """Return `value` inside the bounds; if positive, at least a millionth of the default."""
     own = float(parameter.value)
     least = parameter.lower
     if 0 < least < 1e-6 * abs(own):
@@ -260,11 +260,11 @@ def _inside(parameter: Parameter, value: float) -> float:
 
 
 FEW = 0.01
-"""Share of points whose speed may be any small number, such as noise about rest."""
+"""Share of points with an arbitrarily small speed, such as noise about rest."""
 
 
 def findings_of(kind: object, data: Dataset) -> Findings:
-    """What is doubtful about the data, for who uses them like this."""
+    """Return the warnings on the data for these residuals."""
     if isinstance(kind, Points):
         return data.check()
     called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
@@ -272,7 +272,7 @@ def findings_of(kind: object, data: Dataset) -> Findings:
 
 
 def explained(error: ValueError, findings: Findings) -> ValueError:
-    """The error of residuals that could not be made, behind what is wrong with the data."""
+    """Return the error of failed residuals, preceded by the first error in the data."""
     if not findings.errors:
         return error
     sentence = findings.errors[0].sentence.rstrip(".")
@@ -280,18 +280,18 @@ def explained(error: ValueError, findings: Findings) -> ValueError:
 
 
 def _roles(kind: object) -> dict[str, str]:
-    """Channels of position and force of a drive."""
+    """Return the channels of position and force of a drive."""
     names = {name: getattr(kind, name, name) for name in ("x", "force")}
     return {name: given if isinstance(given, str) else name for name, given in names.items()}
 
 
 def measured(kind: object, data: Dataset, load: float) -> Measured | None:
-    """Velocity and force of points or of a drive, all records; None where the data have none."""
+    """Return velocity and force of points or of a drive, all records; None if unavailable."""
     try:
         if isinstance(kind, Points):
             return _of_points(kind, data, load)
         return _of_drive(kind, data, load)
-    except ValueError:  # whoever prepares the residuals says what is missing
+    except ValueError:  # the preparation of the residuals reports missing channels
         return None
 
 
@@ -315,9 +315,9 @@ def _of_drive(kind: object, data: Dataset, load: float) -> Measured:
 def strongest(
     kind: object, data: Dataset, seen: Measured | None, mass: float | None
 ) -> float | None:
-    """Largest force on the friction of points or of a drive [N]; None where nobody knows it.
+    """Return the largest force on the friction of points or of a drive [N]; None if unknown.
 
-    In sliding it is F - m a, at rest F. Not known of points with a measured normal force.
+    In sliding it is F - m a, at rest F. Unknown for points with a measured normal force.
     """
     loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
     if seen is None or loaded:
@@ -328,7 +328,7 @@ def strongest(
 
 
 def slowest(kind: object, seen: Measured | None) -> float:
-    """Speed [m/s] above which nearly all points lie that are not at rest; 0 for motions."""
+    """Return the speed [m/s] above which nearly all points not at rest lie; 0 for motions."""
     if seen is None or not isinstance(kind, Points):
         return 0.0
     speeds = np.abs(seen.v[seen.v != 0])
@@ -340,19 +340,19 @@ def _breaks(sizes: list[int]) -> tuple[int, ...]:
 
 
 def from_data(subject: Subject, seen: Measured | None) -> dict[str, float]:
-    """Start values of the free parameters of a law or a drive that the data tell."""
+    """Return start values, from the data, of the free parameters of a law or a drive."""
     whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
     if whole is None or seen is None:
         return {}
     names = [u.name for u in subject.unknowns]
     try:
         return start_values(whole, seen, free=names)
-    except ValueError:  # data that do not move: the law's own values are as good as any
+    except ValueError:  # data without motion: keep the values of the law
         return {}
 
 
 def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
-    """Start value of every free parameter: what the user says, else the data, else the law."""
+    """Return the start of every free parameter: from the user, else the data, else the law."""
     values = {u.name: u.start for u in subject.unknowns}
-    told = {n: x for n, x in from_data(subject, seen).items() if n not in subject.started}
-    return values | told | dict(given)
+    found = {n: x for n, x in from_data(subject, seen).items() if n not in subject.started}
+    return values | found | dict(given)

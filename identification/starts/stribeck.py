@@ -12,13 +12,13 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 BINS = 40
-"""Bins of each direction, spaced by equal factors of speed."""
+"""Bins of each direction, logarithmically spaced in speed."""
 SLOWEST = 1e-4
 """Speeds below this share of the largest one count as rest."""
 SCALES = 24
-"""Stribeck velocities tried, by equal factors between the slowest and the fastest bin."""
+"""Number of Stribeck velocities tried, logarithmically spaced between slowest and fastest bin."""
 EXPONENTS = (0.5, 1.0, 2.0, 4.0)
-"""Exponents tried where none is given."""
+"""Exponents tried by default."""
 
 
 @final
@@ -39,15 +39,15 @@ class Curve:
 
     @property
     def both(self) -> bool:
-        """Whether the motion goes both ways: an offset can be told from friction."""
+        """True if the motion has both directions, which separates an offset from friction."""
         return bool(self.v.min() < 0 < self.v.max())
 
 
 def samples(where: str, v: object, F: object) -> tuple[Array, Array]:
-    """Velocities and forces as columns of one length.
+    """Return velocities and forces as columns of one length.
 
     Raises:
-        ValueError: they are none.
+        ValueError: arrays of different lengths.
     """
     speed, force = (checks.array(f"{where}: {n}", x) for n, x in (("v", v), ("F", F)))
     if speed.shape != force.shape:
@@ -58,10 +58,10 @@ def samples(where: str, v: object, F: object) -> tuple[Array, Array]:
 
 
 def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) -> Curve:
-    """Medians over bins of speed, spaced by equal factors, each direction apart.
+    """Return medians over bins of speed, logarithmically spaced, separately for each direction.
 
-    Points at few velocities, such as a staircase, are grouped by velocity instead. A median takes
-    no notice of a few spikes, and none of pre-sliding as long as most samples of a bin slide.
+    Points at few velocities, such as a staircase, are grouped by velocity instead. A median ignores
+    a few spikes, and pre-sliding as long as most samples of a bin slide.
 
     Args:
         v, F: samples, shape (n,).
@@ -69,7 +69,7 @@ def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) ->
         slowest: share of the largest speed below which samples count as rest.
 
     Raises:
-        ValueError: nothing moves.
+        ValueError: no motion.
     """
     bins = checks.count("binned: bins", bins, least=3)
     speed, force = samples("binned", v, F)
@@ -98,7 +98,7 @@ def _medians(groups: Sequence[NDArray[np.bool_]], v: Array, F: Array) -> Curve:
 
 
 def _median(v: Array, F: Array) -> tuple[float, float, float, float]:
-    """Medians of a bin, 1.2533 MAD / .6745 / sqrt(n) as the error of that of F, and n."""
+    """Return the medians of a bin, the error 1.2533 MAD / .6745 / sqrt(n) of F's median, and n."""
     middle = float(np.median(F))
     spread = 1.4826 * float(np.median(np.abs(F - middle)))
     return float(np.median(v)), middle, 1.2533 * spread / np.sqrt(F.size), F.size
@@ -113,7 +113,7 @@ class StribeckCurve:
         F_S, F_C: static and dynamic level [N].
         v_s, delta: Stribeck velocity [m/s] and exponent.
         sigma_2: viscous coefficient [N s/m].
-        offset: constant force [N]; 0 where the motion goes one way only.
+        offset: constant force [N]; 0 if the motion has one direction only.
         rms: root mean square error over the bins [N].
     """
 
@@ -126,21 +126,21 @@ class StribeckCurve:
     rms: float
 
     def force(self, v: Array) -> Array:
-        """The force [N] at velocities [m/s], without the offset."""
+        """Return the force [N] at velocities [m/s], without the offset."""
         falling = np.exp(-((np.abs(v) / self.v_s) ** self.delta))
         level = self.F_C + (self.F_S - self.F_C) * falling
         return np.sign(v) * level + self.sigma_2 * v
 
 
 def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
-    """Least squares of a Stribeck curve in the bins, all equally heavy.
+    """Fit a Stribeck curve to the bins by least squares with equal weights.
 
     For each of 24 Stribeck velocities (and exponents .5, 1, 2, 4 unless `delta` is given) the
     levels F_C, F_S - F_C, sigma_2 >= 0 and the offset come from non-negative least squares, which
-    has one minimum; the best is improved in v_s and delta with the levels eliminated. Ordered
-    by construction: F_S >= F_C >= 0.
+    has one minimum; the best is refined in v_s and delta with the levels eliminated. The order
+    F_S >= F_C >= 0 holds by construction.
 
-    Of a curve that does not fall, F_S = F_C and v_s says nothing.
+    For a curve that does not fall, F_S = F_C and v_s is meaningless.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
 
@@ -185,7 +185,7 @@ def _columns(curve: Curve, v_s: float, delta: float) -> Array:
 
 
 def _levels(curve: Curve, v_s: float, delta: float) -> tuple[list[float], float]:
-    """F_C, F_S - F_C, sigma_2 and both signs of the offset, and the norm of the error."""
+    """Return F_C, F_S - F_C, sigma_2 and both signs of the offset, and the norm of the error."""
     from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
 
     w, cost = nnls(_columns(curve, v_s, delta), curve.F)

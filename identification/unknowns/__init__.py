@@ -1,1 +1,1 @@
-"""What is fitted: names, bounds, ties, and the coordinates of the fit."""
+"""Fitted parameters: names, bounds, ties, and the coordinates of the fit."""

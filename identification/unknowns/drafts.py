@@ -1,4 +1,4 @@
-"""From what a parameter may be and what the user wants of it to one unknown, orders kept."""
+"""Unknowns from the limits of the parameters and the requests of the user, in order."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,23 +11,23 @@ from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, Variable
 
 OTHERS = "others"
-"""`fixed="others"`: whatever `free` does not name is held at its value."""
+"""`fixed="others"`: every parameter that is not in `free` is held at its value."""
 APART = 1.2
-"""Upper over lower start value of two parameters in order of which one was moved."""
+"""Ratio of the start values of two ordered parameters after one was moved."""
 Order = tuple[str, str, bool]
 
 
 @final
 @dataclass(frozen=True)
 class Wishes:
-    """What the user said: specs of free parameters, values of fixed ones.
+    """Requests of the user: specifications of free parameters, values of fixed ones.
 
     Attributes:
-        free: name -> spec.
+        free: name -> specification.
         fixed: name -> value.
-        only: whether nothing else than `free` is fitted.
-        names: all that was named, by where.
-        problems: what is wrong with the specs and values.
+        only: whether only the parameters in `free` are fitted.
+        names: all given names, by argument.
+        problems: errors in the specifications and values.
     """
 
     free: dict[str, Spec]
@@ -38,13 +38,13 @@ class Wishes:
 
     @property
     def started(self) -> frozenset[str]:
-        """Names whose start is given."""
+        """Names with a given start value."""
         return frozenset(
             n for n, s in self.free.items() if not isinstance(s, Tied) and s.start is not None
         )
 
     def check(self, known: Iterable[str]) -> None:
-        """Refuse names that are not `known`, and all else that is wrong, in one error."""
+        """Raise one error for all names that are not `known` and all other problems."""
         problems = list[str]()
         everything = list(known)
         for where, given in self.names.items():
@@ -56,10 +56,12 @@ class Wishes:
 
 
 def wishes(free: object, fixed: object, start: Iterable[str] = ()) -> Wishes:
-    """What `free` and `fixed` of a fit say, and the names in `start`; `Wishes.check` refuses.
+    """Read the arguments `free` and `fixed` of a fit, and the names in `start`.
+
+    Problems of single entries are collected; `Wishes.check` raises them.
 
     Raises:
-        ValueError: what is neither names nor values by name.
+        ValueError: an argument that is neither names nor values by name.
     """
     if free is None or isinstance(free, Mapping):
         given: dict[str, Any] = checks.named("Fit: free", free)
@@ -87,7 +89,7 @@ def wishes(free: object, fixed: object, start: Iterable[str] = ()) -> Wishes:
 
 
 def refuse(problems: Sequence[str]) -> None:
-    """One error for all problems of a fit."""
+    """Raise one error for all problems of a fit, if there are any."""
     if problems:
         raise ValueError("Fit: " + "; ".join(problems))
 
@@ -95,13 +97,13 @@ def refuse(problems: Sequence[str]) -> None:
 @final
 @dataclass(frozen=True)
 class Limits:
-    """What a parameter is and may be, whoever declares it.
+    """Value, bounds and scaling of a parameter of a law, a scene or a model.
 
     Attributes:
-        value: that it has.
-        lower, upper: bounds by nature.
-        window: bounds by what the data can tell, for those who ask for none.
-        logarithmic: fitted by its logarithm, unless the user wants it otherwise.
+        value: its present value.
+        lower, upper: bounds of its definition.
+        window: bounds of what the data can resolve, used if the user gives no bounds.
+        logarithmic: fitted by its logarithm, unless the user requests otherwise.
     """
 
     name: str
@@ -115,7 +117,7 @@ class Limits:
 
 
 def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Limits:
-    """The limits of a parameter of a law or a scene, by its role."""
+    """Return the limits of a parameter of a law or a scene, by its role."""
     value = float(parameter.value)
     return Limits(
         name=parameter.name, unit=unit, value=value, lower=parameter.lower, upper=parameter.upper,
@@ -125,7 +127,7 @@ def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Limit
 
 
 def of_variable(variable: Variable) -> Limits:
-    """The limits of a parameter of a model: logarithmic where it starts and stays positive."""
+    """Return the limits of a model parameter: logarithmic if it starts and stays positive."""
     value = float(variable.start)
     return Limits(
         name=variable.name,
@@ -142,10 +144,10 @@ def of_variable(variable: Variable) -> Limits:
 def drafted(
     free: Sequence[Limits], wished: Wishes, held: Mapping[str, float], orders: Iterable[Order]
 ) -> dict[str, Unknown]:
-    """The unknowns of the `free` parameters, by name; tied ones among them, for their start.
+    """Return the unknowns of the `free` parameters, by name; tied ones included, for their start.
 
     Raises:
-        ValueError: bounds, starts and orders that contradict each other, all of them.
+        ValueError: all bounds, starts and orders that contradict each other.
     """
     problems: list[str] = []
     drafts = dict[str, Unknown]()
@@ -169,7 +171,7 @@ def drafted(
 
 
 def _draft(limits: Limits, spec: Spec, problems: list[str]) -> Unknown:
-    """One unknown, orders aside."""
+    """Return one unknown, without orders."""
     low, high = limits.window
     logarithmic, start = limits.logarithmic, limits.value
     if isinstance(spec, Range):
@@ -214,7 +216,7 @@ def _order(
     order: Order,
     problems: list[str],
 ) -> None:
-    """Keep low <= high by a bound, or by a coordinate where both are free."""
+    """Enforce low <= high by a bound, or by a coordinate if both are free."""
     low, high, strictly = order
     tied = [n for n in (low, high) if isinstance(wished.free.get(n), Tied)]
     step = 1 + 1e-6 * strictly
@@ -236,11 +238,11 @@ def _order(
 def _put_above(
     drafts: dict[str, Unknown], wished: Wishes, low: str, high: str, strictly: bool
 ) -> None:
-    """`high` counted from `low`, their starts in order; where it is bounded, the other way."""
+    """Express `high` relative to `low`, or `low` relative to `high` if `high` has a lower bound."""
     a, b = drafts[low], drafts[high]
     asked = wished.free.get(high)
     if isinstance(asked, Range) and asked.lower > a.lower:
-        # a lower one with an upper bound of its own stays in its box: no coordinate keeps both,
+        # a lower value with its own upper bound keeps its box: no coordinate satisfies both,
         # and trials out of order are refused when the law is made
         if a.upper >= b.upper:
             first = min(a.start, _between(b))
@@ -261,7 +263,7 @@ def _put_above(
 
 
 def _between(unknown: Unknown) -> float:
-    """The start, moved between the bounds."""
+    """Return the start value, clipped to the bounds."""
     return min(max(unknown.start, unknown.lower), unknown.upper)
 
 

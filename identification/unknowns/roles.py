@@ -1,4 +1,4 @@
-"""Which parameters of a law are fitted, and why the others are not."""
+"""Roles of law parameters: which ones are fitted, and the reasons why others are held."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -16,35 +16,35 @@ Array = NDArray[np.float64]
 
 VELOCITIES = ("m/s", "rad/s")
 STEEPNESSES = ("s/m", "s/rad")
-"""Units of what places a feature on the velocity axis, and of its inverse."""
+"""Units of a feature's position on the velocity axis, and of its inverse."""
 
 FITTED = ("mass", "inertia", "offset", "level", "viscous", "velocity scale", "")
-"""Roles that are fitted unless named in `fixed`; nobody has said what "" is for."""
+"""Roles that are fitted unless named in `fixed`; "" is an undeclared role."""
 BRISTLE = ("stiffness", "damping", "length")
-"""Roles that are fitted of a law with internal states, whose motion shows them."""
+"""Roles that are fitted for a law with internal states if the data show their motion."""
 
 REASONS = {
     "width": "smoothing width, small against the speeds",
     "load": "the load is constant in the data",
 }
-STEADY = "steady sliding says nothing of it"
+STEADY = "steady sliding does not depend on it"
 MACHINE = "of the machine, fitted only on request"
 
 ALIKE = 1e-7
-"""Part of a parameter's effect on the force, relative to it, that no other one has as well."""
+"""Share of a parameter's effect on the force below which other parameters reproduce it."""
 WIDTH, BLEND = 1e-3, 1e-4
-"""Smoothing widths over the largest speed in the data; the blend is the narrower one."""
+"""Smoothing widths, over the largest speed in the data; the blend is the narrower one."""
 SMALL = 0.1
-"""The same over the least speed, where the data have one: points at low speeds."""
+"""The same over the least speed, for points at low speeds."""
 SLOWEST, NARROWEST = 2e-3, 1e-5
-"""Least velocity scale, and least smoothing width, over the largest speed that data can tell."""
+"""Least velocity scale, and least smoothing width, over the largest speed, that data resolve."""
 
 LINEAR = ("level", "viscous", "offset", "temperature", "motion")
-"""Roles of which the force is linear, or whose sign is open: fitted by their value."""
+"""Roles on which the force depends linearly, or of unknown sign: fitted by their value."""
 
 
 def parts(obj: Parametric) -> Iterator[Parametric]:
-    """`obj` and every parametric object inside it."""
+    """Yield `obj` and every parametric object inside it."""
     yield obj
     for item in fields(obj):
         value = getattr(obj, item.name)
@@ -54,13 +54,13 @@ def parts(obj: Parametric) -> Iterator[Parametric]:
 
 
 def orders(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
-    """Pairs of parameters (low, high, strictly) of `obj` that must stay in order, by flat name."""
+    """Yield the pairs of parameters (low, high, strictly) of `obj` that must stay in order."""
     plain = [n for n, p in parameters(obj).items() if np.ndim(p.value) == 0]
     yield from symbols_in_order(symbolise(obj, *plain)[0])
 
 
 def symbols_in_order(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
-    """The same by the names of symbols, where both of a pair are one."""
+    """Yield the same pairs by symbol name, if both values are symbols."""
     for part in parts(obj):
         for pairs, strictly in ((type(part).ordered, False), (type(part).strictly_ordered, True)):
             for pair in pairs:
@@ -70,21 +70,21 @@ def symbols_in_order(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
 
 
 def is_coefficient(parameter: Parameter) -> bool:
-    """Whether a parameter is a friction coefficient: times N it is a force level."""
+    """Return True if a parameter is a friction coefficient: times N it is a force level."""
     return parameter.role == "level" and parameter.unit == "1"
 
 
 def is_velocity(parameter: Parameter) -> bool:
-    """Whether a parameter places a feature on the velocity axis, or is as small as one."""
+    """Return True if a parameter is a position or a width on the velocity axis."""
     scale = parameter.role in ("velocity scale", "width", "")
     return scale and parameter.unit in (*VELOCITIES, *STEEPNESSES)
 
 
 def is_logarithmic(parameter: Parameter) -> bool:
-    """Whether a parameter is fitted by its logarithm.
+    """Return True if a parameter is fitted by its logarithm.
 
-    Positive by nature, and of a scale that nobody knows. The friction levels of laws that divide
-    by them (their lower bound is above zero) are such, too; others may vanish.
+    Such parameters are positive scales of unknown magnitude. Friction levels of laws that divide by
+    them (lower bound above zero) are included; other levels may vanish.
     """
     if float(parameter.value) <= 0 or parameter.lower < 0:
         return False
@@ -94,24 +94,24 @@ def is_logarithmic(parameter: Parameter) -> bool:
 @final
 @dataclass(frozen=True)
 class Speeds:
-    """What the data say of speeds [m/s or rad/s]: the largest and the least one, 0 if unknown."""
+    """Speeds in the data [m/s or rad/s]: the largest and the least one, 0 if unknown."""
 
     largest: float = 0.0
     least: float = 0.0
 
     @property
     def known(self) -> bool:
-        """Whether there are some."""
+        """True if the largest speed is known."""
         return self.largest > 0 and np.isfinite(self.largest)
 
     def share(self, of_largest: float, of_least: float = 1.0) -> float:
-        """A share of the largest speed, or of the least one if that is less."""
+        """Return a share of the largest speed, or of the least one if that is less."""
         small = of_largest * self.largest
         return min(small, of_least * self.least) if self.least > 0 else small
 
 
 def window(parameter: Parameter, speeds: Speeds) -> tuple[float, float]:
-    """Range in which data with these speeds can tell the parameter, in its unit."""
+    """Return the range of the parameter that data with these speeds resolve, in its unit."""
     low, high = parameter.lower, parameter.upper
     if is_velocity(parameter) and speeds.known:
         slow = speeds.share(NARROWEST if parameter.role == "width" else SLOWEST)
@@ -123,12 +123,12 @@ def window(parameter: Parameter, speeds: Speeds) -> tuple[float, float]:
 
 
 def reason(parameter: Parameter, *, directions: bool, bristle: bool | None, machine: bool) -> str:
-    """Why a parameter is not fitted unless it is asked for; "" where it is.
+    """Return the reason why a parameter is not fitted by default; "" if it is.
 
     Args:
-        directions: the law has two directions, whose levels hold the offset.
-        bristle: the data show the internal states of a law that has them; None: it has none.
-        machine: the parameter is none of the law, nor of a `Drive`.
+        directions: the law has two directions, whose levels include the offset.
+        bristle: whether the data show the internal states of the law; None if it has none.
+        machine: the parameter belongs neither to the law nor to a `Drive`.
     """
     if parameter.name == "N":
         return "given"
@@ -144,12 +144,12 @@ def reason(parameter: Parameter, *, directions: bool, bristle: bool | None, mach
 
 
 def has_directions(obj: Parametric) -> bool:
-    """Whether some law in `obj` tells the two directions apart."""
+    """Return True if a law in `obj` distinguishes the two directions."""
     return any(isinstance(part, Asymmetric) for part in parts(obj))
 
 
 def held_value(parameter: Parameter, speeds: Speeds) -> float:
-    """Value of a parameter that is not fitted; a width the user changed is kept."""
+    """Return the value of a held parameter; a smoothing width changed by the user is kept."""
     value = float(parameter.value)
     if parameter.role != "width" or parameter.unit not in VELOCITIES:
         return value
@@ -159,7 +159,7 @@ def held_value(parameter: Parameter, speeds: Speeds) -> float:
 
 
 def one_digit(value: float) -> float:
-    """`value` > 0 rounded to one significant digit."""
+    """Return `value` > 0 rounded to one significant digit."""
     digits = -floor(log10(value))
     return round(value, digits)
 
@@ -167,12 +167,12 @@ def one_digit(value: float) -> float:
 def inseparable(
     law: Law, load: float, names: Sequence[str], asked: Collection[str], bristle: bool
 ) -> dict[str, str]:
-    """Those of `names` that only a change of load or temperature could tell from others.
+    """Return those of `names` that only a change of load or temperature separates from others.
 
     Each is compared with those before it, by sensitivities of the force (and of the rates of the
-    states, where the data show them; else of the force in steady sliding) at many speeds and a
-    position of the parameters that is special in nothing; those in `asked` are kept. What no change
-    could tell apart either is left to the fit, which names it.
+    states, if the data show them; else of the force in steady sliding) at many speeds and at a
+    generic point of the parameters; those in `asked` are kept. Parameters that no change separates
+    are left to the fit, which reports them.
     """
     known = parameters(law)
     mine = [n for n in names if n in known]
@@ -191,17 +191,17 @@ def inseparable(
         elif name in asked or others is None or _same_effect(changing, kept, i) is not None:
             kept.append(i)
         else:
-            told = ", ".join(mine[k] for k in others)
-            found[name] = f"load and temperature are constant: it cannot be told from {told}"
+            related = ", ".join(mine[k] for k in others)
+            found[name] = f"load and temperature are constant: not separable from {related}"
     return found
 
 
 def _effects(
     law: Law, load: float, mine: Sequence[str], around: Sequence[str], bristle: bool
 ) -> list[Array]:
-    """Derivatives by the parameters `mine` at many speeds (rows, parameters), at four places.
+    """Return derivatives by the parameters `mine` at many speeds (rows, parameters), four times.
 
-    At the first all is as it is, at the others load and temperature are different.
+    The first has the given load and temperature, the others have different ones.
     """
     law, variables = symbolise(law, *mine, *around)
     v, N = ca.SX.sym("v"), ca.SX.sym("N")
@@ -227,7 +227,7 @@ def _effects(
 
 
 def _by_parameter(slopes: ca.DM, count: int) -> Array:
-    """Columns of mapped derivatives, one for each of `count` parameters."""
+    """Return mapped derivatives as columns, one for each of `count` parameters."""
     outputs = slopes.shape[0] // count
     values = slopes.full().reshape(count, outputs, -1)
     size = np.abs(values).max(axis=(0, 2), where=np.isfinite(values), initial=1e-300)
@@ -235,7 +235,7 @@ def _by_parameter(slopes: ca.DM, count: int) -> Array:
 
 
 def _same_effect(columns: Array, kept: Sequence[int], i: int) -> list[int] | None:
-    """Which of the columns `kept` make up column i; None where they do not."""
+    """Return the columns of `kept` that combine to column i; None if there are none."""
     columns = columns[np.isfinite(columns).all(axis=1)]
     column, others = columns[:, i], columns[:, list(kept)]
     others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-300)

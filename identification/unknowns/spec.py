@@ -1,4 +1,4 @@
-"""Unknowns of a fit, and how a user says what becomes of a parameter: a range, an order, a tie.
+"""Unknowns of a fit, and specifications of free parameters: a range, an order, a tie.
 
 free={"sigma_0": log(1e3, 1e7), "mu_s": above("mu_d"), "sigma_1": tied(lambda p: ...)}
 """
@@ -14,18 +14,18 @@ from symfric.foundation import checks
 @final
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """A number that is fitted, in the unit of the user.
+    """A fitted number, in the unit of the user.
 
     Attributes:
-        name: of a parameter of the model; of what belongs to a record, with its number: "x0.v[2]",
+        name: of a parameter of the model; for a value of one record with its index: "x0.v[2]",
             "dead_time[0]".
         start: value from which the fit starts.
         lower, upper: bounds.
         scale: typical magnitude; a linear coordinate is value / scale.
-        logarithmic: fitted by its logarithm: positive scales of which nobody knows the order.
-        above: name of the value that this one does not fall below, or "".
-        below: likewise, of the value that this one does not exceed.
-        nuisance: a start value, a dead time: fitted, but not what is asked for.
+        logarithmic: fitted by its logarithm, for positive scales of unknown magnitude.
+        above: name of the value that is a lower bound of this one, or "".
+        below: name of the value that is an upper bound of this one, or "".
+        nuisance: a start value or dead time: fitted, but not requested.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Unknown:
 
     @property
     def partner(self) -> str:
-        """The value that this one is in order with, or ""."""
+        """The value that this one is ordered with, or ""."""
         return self.above or self.below
 
 
@@ -52,8 +52,8 @@ class Range:
 
     Attributes:
         lower, upper: bounds in the unit of the parameter; its own bounds hold, too.
-        start: where the fit starts; None: from the data, or from the law.
-        logarithmic: fitted by its logarithm, by its value, or (None) as its role says.
+        start: start value of the fit; None: from the data or the law.
+        logarithmic: fitted by its logarithm or by its value; None: by its role.
     """
 
     lower: float = -inf
@@ -65,7 +65,7 @@ class Range:
 @final
 @dataclass(frozen=True)
 class Above:
-    """A parameter that does not fall below another one, and stays below `upper`."""
+    """A parameter that is at least another one, and at most `upper`."""
 
     name: str
     upper: float = inf
@@ -75,7 +75,7 @@ class Above:
 @final
 @dataclass(frozen=True)
 class Tied:
-    """A parameter that follows from the others: `rule` takes them by name, symbols or numbers."""
+    """A parameter computed from the others: `rule` takes them by name, as symbols or numbers."""
 
     rule: Callable[[Mapping[str, Any]], Any]
 
@@ -84,7 +84,7 @@ Spec = Range | Above | Tied
 
 
 def log(lower: float, upper: float, start: float | None = None) -> Range:
-    """Fitted by its logarithm between 0 < lower < upper: a scale of which nobody knows the order.
+    """Fit a parameter by its logarithm between 0 < lower < upper, for scales of unknown magnitude.
 
     Raises:
         ValueError: bounds that are not positive or not in order, a start outside them.
@@ -95,7 +95,7 @@ def log(lower: float, upper: float, start: float | None = None) -> Range:
 
 
 def linear(lower: float = -inf, upper: float = inf, start: float | None = None) -> Range:
-    """Fitted by its value between lower < upper, which may be infinite.
+    """Fit a parameter by its value between lower < upper, which may be infinite.
 
     Raises:
         ValueError: bounds that are not in order, a start outside them.
@@ -104,14 +104,14 @@ def linear(lower: float = -inf, upper: float = inf, start: float | None = None) 
 
 
 def above(name: str, upper: float = inf, start: float | None = None) -> Above:
-    """Not below the parameter `name`, whatever value that one takes."""
+    """Keep a parameter at or above the parameter `name`."""
     checks.text("above", name, "the name of a parameter, such as 'mu_d'")
     high = inf if _is_infinite(upper) else checks.number("above: upper", upper)
     return Above(name, high, None if start is None else checks.number("above: start", start))
 
 
 def tied(to: str | Callable[[Mapping[str, Any]], Any], factor: float = 1.0) -> Tied:
-    """`factor` times the parameter `to`, or what the function `to` makes of all of them.
+    """Tie a parameter to `factor` times the parameter `to`, or to a function `to` of all of them.
 
     The function takes values by name and returns an expression in them: `lambda p: p["m"] * 9.81`.
     """
@@ -124,7 +124,7 @@ def tied(to: str | Callable[[Mapping[str, Any]], Any], factor: float = 1.0) -> T
 @final
 @dataclass(frozen=True)
 class _Multiple:
-    """A function that pickles."""
+    """Picklable function: a multiple of a named value."""
 
     name: str
     factor: float
@@ -136,10 +136,10 @@ class _Multiple:
 
 
 def as_spec(where: str, value: object) -> Spec:
-    """What a user wrote for one parameter: a spec, a pair of bounds, a start value, or None.
+    """Return the specification of a user's entry: a class above, two bounds, a start, or None.
 
     Raises:
-        ValueError: anything else.
+        ValueError: any other entry.
     """
     if isinstance(value, Range | Above | Tied):
         return value

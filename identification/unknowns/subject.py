@@ -1,4 +1,4 @@
-"""What is fitted: a law, a machine or a model, with its free parameters as symbols."""
+"""Subject of a fit: a law, a machine or a model, with its free parameters as symbols."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ from symfric.scenes.base import Scene
 @final
 @dataclass(frozen=True, eq=False)
 class Closed:
-    """The subject with numbers: law and machine where there are some, and the model."""
+    """The subject with numbers: law and machine if it has them, and the model."""
 
     law: Law | None
     scene: Scene | None
@@ -41,24 +41,24 @@ class Closed:
 @final
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is fitted, before there are values.
+    """A law, machine or model to be fitted, with symbols for its free parameters.
 
     Attributes:
         name: of the law, or of the model.
         names: free parameters, tied ones included; all are among the symbols `model.p`.
-        model: its equations with the free parameters as symbols `p`; of a law fitted to points the
-            inputs v, N and those of the law, and the output F. Parameters of a model that are held
-            are symbols, too; their start is their value.
-        law: the law with numbers; None of a model whose contacts have not one law.
-        scene: the machine with numbers; None of a law alone or of a model.
+        model: its equations with the free parameters as symbols `p`; for a law fitted to points
+            with inputs v, N and further inputs of the law, and the output F. Held parameters of a
+            model are symbols, too; their start is their value.
+        law: the law with numbers; None for a model that does not have exactly one law.
+        scene: the machine with numbers; None for a law alone or a model.
         unknowns: free parameters with a coordinate, starting at the values of the law.
-        ties: free parameters that follow from others.
-        reasons: parameter that is held -> why.
-        held: parameter that is held -> its value.
-        variables: parameter -> name, unit, bounds and doc, of all that there are.
-        guard: function of free values by name that raises ValueError where a law refuses them, and
-            returns the law or the machine; free of symbols.
-        started: parameters whose start the user gave.
+        ties: free parameters computed from others.
+        reasons: held parameter -> reason.
+        held: held parameter -> value.
+        variables: parameter -> name, unit, bounds and doc, for all parameters.
+        guard: function of free values by name that returns the law or the machine; it raises
+            ValueError if a law refuses them; without symbols.
+        started: parameters with a start value given by the user.
     """
 
     name: str
@@ -76,11 +76,11 @@ class Subject:
 
     @property
     def drive(self) -> Drive | None:
-        """The machine, where it is a mass with a force input."""
+        """The machine, if it is a mass with a force input."""
         return self.scene if isinstance(self.scene, Drive) else None
 
     def close(self, values: Mapping[str, float]) -> Closed:
-        """Numbers in the place of the symbols; the model keeps them as starts of its parameters.
+        """Insert numbers for the symbols; the model keeps them as starts of its parameters.
 
         Raises:
             ValueError: values that the law refuses.
@@ -94,7 +94,7 @@ class Subject:
 
 
 def restarted(model: Model, p: Variables) -> Model:
-    """The same model with other starts of its parameters, also where its contacts are open."""
+    """Return the model with other starts of its parameters, also if its contacts are open."""
     opening = None if model.opening is None else partial(_open, model.opening, p)
     return replace(model, p=p, opening=opening)
 
@@ -117,23 +117,23 @@ def subject(
     v_max: float = 0.0,
     v_min: float = 0.0,
 ) -> Subject:
-    """Decide what is fitted, and write it with symbols.
+    """Decide which parameters are fitted, and formulate the model with symbols.
 
     Args:
-        what: a law or its text, which becomes a `Drive` (of `points`: the law alone); a scene; a
+        what: a law or its text, which becomes a `Drive` (with `points`: the law alone); a scene; a
             model, of which all parameters are free.
-        free: names, or name -> spec, fitted beside those that are by their role; specs say how.
-        fixed: name -> value of what is not fitted; "others": all that `free` does not name.
-        start: names of parameters whose start is given elsewhere, to be checked with the others.
+        free: names, or name -> specification, fitted in addition to those fitted by their role.
+        fixed: name -> value of held parameters; "others": all that are not in `free`.
+        start: names of parameters with a start given elsewhere, to be checked with the others.
         normal_force: N of a law [N]; with 1 N coefficients read as forces.
         points: the data are forces at given velocities, not a motion.
-        moving: the data show how the states of a law change; None: unless they are points.
+        moving: the data show how the states of a law change; None: True unless they are points.
         turning: positions are angles.
         v_max: largest speed in the data [m/s or rad/s]; 0: unknown.
-        v_min: least speed at which points were taken; 0: nobody knows, or a motion through rest.
+        v_min: least speed of measured points; 0: unknown, or a motion through rest.
 
     Raises:
-        ValueError: everything that is wrong with them, in one error.
+        ValueError: all problems, in one error.
     """
     wished = wishes(free, fixed, start)
     if isinstance(what, Model):
@@ -159,7 +159,7 @@ def subject(
 @final
 @dataclass(frozen=True)
 class _Setting:
-    """What the data are of: normal force [N], states that move, angles, speeds."""
+    """Setting of the data: normal force [N], changing states, angles, speeds."""
 
     load: float
     moving: bool
@@ -168,7 +168,7 @@ class _Setting:
 
 
 def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
-    """The subject that a law (of points) or a scene (of a motion) is."""
+    """Return the subject for a law (with points) or a scene (with a motion)."""
     from symfric.laws import law_name  # noqa: PLC0415 (slow to import)
 
     known = parameters(whole)
@@ -215,7 +215,7 @@ def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
 
 
 def _reasons(whole: Scene | Law, wished: Wishes, setting: _Setting) -> dict[str, str]:
-    """Parameters that are held -> why."""
+    """Return the held parameters with the reason for each."""
     known = parameters(whole)
     law = whole if isinstance(whole, Law) else whole.law
     frictional = parameters(law)
@@ -238,7 +238,7 @@ def _reasons(whole: Scene | Law, wished: Wishes, setting: _Setting) -> dict[str,
 
 
 def points_model(law: Law, load: float, p: Variables) -> Model:
-    """The force F of a law at given v, N and further inputs; of one with states, steady sliding."""
+    """Return a model of the force F of a law at given v, N and inputs; states in steady sliding."""
     v, N = Variable("v", "m/s", nominal=0.1), Variable("N", "N", start=load, nominal=load)
     further = tuple(Variable(i.name, i.unit, start=i.steady, nominal=i.nominal) for i in law.inputs)
     inputs = {x.name: x.symbol for x in further}
@@ -251,7 +251,7 @@ def points_model(law: Law, load: float, p: Variables) -> Model:
 
 
 def _of_model(model: Model, wished: Wishes) -> Subject:
-    """The subject that a model is: all its parameters, unless they are fixed."""
+    """Return the subject for a model: all its parameters are free unless fixed."""
     names = [v.name for v in model.p]
     if not names:
         raise ValueError("Fit: expected a model with parameters, got none; scene.model(free=[...])")
@@ -289,7 +289,7 @@ def _of_model(model: Model, wished: Wishes) -> Subject:
 
 
 def _guard(laws: Sequence[Law], p: Variables) -> "Laws":
-    """What makes laws with numbers of those of a model, whose parameters are expressions in p."""
+    """Return a function that evaluates the model's laws, whose parameters are expressions in p."""
     plain: list[tuple[Law, ca.Function, tuple[str, ...]]] = []
     column = symbols_of(p)
     for law in laws:
@@ -304,13 +304,13 @@ def _guard(laws: Sequence[Law], p: Variables) -> "Laws":
 @final
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """The laws of a model's contacts as functions of its parameters; the law, where it is one."""
+    """The laws of a model's contacts as functions of its parameters."""
 
     laws: tuple[tuple[Law, ca.Function, tuple[str, ...]], ...]
     starts: tuple[tuple[str, float], ...]
 
     def __call__(self, values: Mapping[str, float]) -> Law | None:
-        """The only law with numbers, None of several; ValueError where one refuses them."""
+        """Return the only law with numbers, None if there are several; ValueError if refused."""
         p = [values.get(name, start) for name, start in self.starts]
         made = [
             with_values(law, dict(zip(names, at(p).full().ravel().tolist(), strict=True)))

@@ -1,15 +1,16 @@
-"""Coordinates of the fit: scaled, logarithmic or as an excess, so that only boxes are left.
+"""Coordinates of the fit: scaled, logarithmic or an excess, so that only box bounds remain.
 
     p = scale w                      linear
     p = exp(w)                       logarithmic: positive scales
-    p = low + s (exp(w) - 1), w >= 0 not below another value: linear near it, logarithmic beyond s,
-                                     twice its scale; low + exp(w) where it is logarithmic
-    p = low + (upper - low) w        not below another value and not above a bound, 0 <= w <= 1
-    p = low (upper / low)^w          likewise, where it is logarithmic, and strictly above
-    p = lower + (high - lower) w     not above another value, 0 <= w <= 1
+    p = low + s (exp(w) - 1), w >= 0 at least another value: linear near it, logarithmic beyond s,
+                                     twice its scale; low + exp(w) if it is logarithmic
+    p = low + (upper - low) w        at least another value, at most a bound, 0 <= w <= 1
+    p = low (upper / low)^w          the same if it is logarithmic and strictly above
+    p = lower + (high - lower) w     at most another value, 0 <= w <= 1
+    p = high - scale (1 - w)         the same without a lower bound, w <= 1
     p = rule(p)                      tied: no coordinate of its own
 
-A box in w is all that a solver has to keep; orders and ties hold at every trial.
+A solver only has to respect a box in w; orders and ties hold at every trial.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,30 +28,32 @@ from symfric.foundation.numeric import evaluate_all
 Array = NDArray[np.float64]
 
 DECADES = 6.0
-"""Decades from its start beyond which a bound of a logarithmic value is none for the solver, whose
-steps feel bounds from afar; who makes the law checks it."""
+"""Decades from the start beyond which the solver ignores a bound of a logarithmic value: its
+steps depend on distant bounds, too. The law itself still checks the bound.
+"""
 VANISHED = 12.0
-"""Decades from its start at which a value that wants to be nothing or infinite is at its bound."""
+"""Decades from the start at which a value that tends to zero or infinity is at its bound."""
 WITHIN = 1e-6
-"""Relative distance to a bound of a value that is taken back to it: rounding must not pass it."""
+"""Relative distance to a bound within which a value counts as at it, so rounding cannot pass it."""
 NEAR = 2.0
-"""Excess over a lower value, over the scale, up to which it is fitted by its value: the excess of
-static friction and the velocity at which it falls trade along a line of their logarithms."""
+"""Excess over a lower value, over the scale, up to which it is fitted by its value: in their
+logarithms, the excess of static friction and the Stribeck velocity are strongly correlated.
+"""
 MARGIN = 1e-3
-"""Distance of a start to its bounds, over theirs or over one."""
+"""Distance of a start to its bounds, over their width or one."""
 STRICTLY = 1e-4
-"""Least share of the way from a lower value to the bound of what is strictly above it."""
+"""Least share of the range between a lower value and the bound for a value strictly above it."""
 AT_BOUND = 1e-5
-"""Distance to a bound, in coordinates over their width or one, below which a value is there."""
+"""Distance to a bound, over the width of the box or one, below which a value is at the bound."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Values that residuals take, as functions of the coordinates w that are fitted.
+    """Arguments of the residuals as functions of the fitted coordinates w.
 
     Attributes:
-        unknowns: what has a coordinate, in the order of w, shape (n,).
+        unknowns: one for each coordinate, in the order of w, shape (n,).
         names: of the values, shape (k,), tied ones included.
         lower, upper: box of w, shape (n,).
         function: w -> values (k,), dvalues/dw (k, n).
@@ -64,20 +67,20 @@ class Unknowns:
 
     @property
     def fitted(self) -> tuple[str, ...]:
-        """Names of what has a coordinate."""
+        """Names of the values with a coordinate."""
         return tuple(u.name for u in self.unknowns)
 
     @property
     def nuisance(self) -> tuple[str, ...]:
-        """Names of values that are fitted but not asked for."""
+        """Names of fitted values that were not requested."""
         return tuple(u.name for u in self.unknowns if u.nuisance)
 
     def values(self, w: Array) -> Array:
-        """The values at w, shape (k,)."""
+        """Return the values at w, shape (k,)."""
         return self._both(w)[0]
 
     def slope(self, w: Array) -> Array:
-        """dvalues/dw at w, shape (k, n)."""
+        """Return dvalues/dw at w, shape (k, n)."""
         return self._both(w)[1]
 
     def _both(self, w: Array) -> tuple[Array, Array]:
@@ -85,7 +88,7 @@ class Unknowns:
         return found.ravel(), slope.reshape(len(self.names), len(self.unknowns))
 
     def named(self, w: Array) -> dict[str, float]:
-        """The values at w by name."""
+        """Return the values at w by name."""
         return dict(zip(self.names, self.values(w).tolist(), strict=True))
 
     @property
@@ -94,7 +97,7 @@ class Unknowns:
         return self.of({})
 
     def of(self, values: Mapping[str, float]) -> Array:
-        """Coordinates of `values`, moved inside the box; what is not named is at its start."""
+        """Return the coordinates of `values`, moved inside the box; others are at their start."""
         known = {u.name: u.start for u in self.unknowns} | dict(values)
         if any(u.partner and u.partner not in known for u in self.unknowns):
             known = self._with_ties(known) | known
@@ -102,7 +105,7 @@ class Unknowns:
         return self.inside(np.array(w))
 
     def _with_ties(self, known: Mapping[str, float]) -> dict[str, float]:
-        """Values that others are in order with, tied ones among them."""
+        """Return the values that others are ordered with, tied ones included."""
         free = [replace(u, above="", below="") for u in self.unknowns]
         w = np.array([_coordinate(u, known[u.name], 0.0) for u in free])
         for _ in range(2):  # a tied value may follow from one with an order of its own
@@ -112,21 +115,21 @@ class Unknowns:
         return self.named(self.inside(w))
 
     def inside(self, w: Array) -> Array:
-        """`w` moved inside the box by a thousandth of its width or of one."""
+        """Return `w` moved inside the box by a thousandth of its width or of one."""
         margin = MARGIN * np.minimum(1.0, self.upper - self.lower)
         return np.clip(w, self.lower + margin, self.upper - margin)
 
     def at_bound(self, w: Array) -> NDArray[np.bool_]:
-        """Which of the unknowns stand at a bound, shape (n,)."""
+        """Return a mask of the unknowns at a bound, shape (n,)."""
         near = AT_BOUND * np.minimum(1.0, self.upper - self.lower)
         low, high = np.maximum(self.lower, self.floor), np.minimum(self.upper, self.ceiling)
         return (w - low < near) | (high - w < near)
 
     @property
     def floor(self) -> Array:
-        """Coordinates below which a logarithmic value is as good as nothing, shape (n,).
+        """Coordinates below which a logarithmic value counts as zero, shape (n,).
 
-        The search does not know them, since its steps feel bounds from afar.
+        The search does not use them, since its steps depend on distant bounds, too.
         """
         open_ = self._scales & np.isinf(self.lower)
         least = np.array([0.0 if u.above else u.lower for u in self.unknowns])
@@ -137,7 +140,7 @@ class Unknowns:
 
     @property
     def ceiling(self) -> Array:
-        """Coordinates above which a value is as good as infinite, shape (n,); see `floor`."""
+        """Coordinates above which a value counts as infinite, shape (n,); see `floor`."""
         reach = VANISHED * np.log(10.0)
         most = np.array([np.inf if u.above else u.upper for u in self.unknowns])
         known = np.log(np.where((most > 0) & (most < np.inf), most, 1.0)) - WITHIN
@@ -149,12 +152,12 @@ class Unknowns:
 
     @property
     def _scales(self) -> NDArray[np.bool_]:
-        """What has the logarithm of a value or an excess as coordinate, shape (n,)."""
+        """Mask of the coordinates that are logarithms of a value or an excess, shape (n,)."""
         return np.array([u.logarithmic and not u.below for u in self.unknowns], dtype=bool)
 
     @property
     def _sizes(self) -> Array:
-        """Size of what is logarithmic at its start; one of others, shape (n,)."""
+        """Start values of logarithmic coordinates; one for others, shape (n,)."""
         sizes = np.array([u.scale if u.above else u.start for u in self.unknowns])
         return np.where(self._scales, sizes, 1.0)
 
@@ -165,13 +168,13 @@ def unknowns_of(
     names: Sequence[str],
     held: Mapping[str, float] | None = None,
 ) -> Unknowns:
-    """The coordinates of `unknowns` and what `ties` make of them, in the order of `names`.
+    """Return the coordinates of `unknowns` and the tied values, in the order of `names`.
 
-    Values of `held` parameters are constants: ties may name them, residuals may ask for them.
+    Values of `held` parameters are constants, available to ties and residuals.
 
     Raises:
-        ValueError: a tie or an order to what is not there, or that leads back to itself; a name
-            that is neither an unknown nor tied.
+        ValueError: a tie or an order to an absent name or in a cycle; a name that is neither an
+            unknown nor tied.
     """
     w = ca.SX.sym("w", len(unknowns))
     by_name = {u.name: (u, w[i]) for i, u in enumerate(unknowns)}
@@ -197,7 +200,7 @@ def _write(
     ties: Mapping[str, Tied],
     values: dict[str, Any],
 ) -> bool:
-    """Whether the expression of `name` could be written with the `values` that there are."""
+    """Add the expression of `name` to `values`; return False if it needs absent values."""
     if name in ties:
         try:
             values[name] = ca.SX(ties[name].rule(values))
@@ -222,7 +225,7 @@ def _write(
 
 
 def _under(unknown: Unknown, high: Any, w: Any) -> Any:
-    """A value that does not exceed `high`."""
+    """Return an expression that does not exceed `high`."""
     if unknown.lower > -inf:
         return unknown.lower + (high - unknown.lower) * w
     return high - unknown.scale * (1 - w)
@@ -234,21 +237,21 @@ def _circle(
     ties: Mapping[str, Tied],
     values: Mapping[str, Any],
 ) -> str:
-    """Why none of `waiting` can be written."""
-    said: list[str] = []
+    """Return the message on the names `waiting` that cannot be expressed."""
+    messages: list[str] = []
     for name in waiting:
         if name in ties:
             try:
                 ties[name].rule(values)
             except (KeyError, ValueError) as error:
-                said.append(f"{name} is tied to what is not fitted or leads back to it ({error})")
+                messages.append(f"{name} is tied to an absent name or in a cycle ({error})")
         else:
-            said.append(f"{name} is in order with {unknowns[name][0].partner}, which is not")
-    return "Fit: free: expected ties and orders that end somewhere, got " + "; ".join(said)
+            messages.append(f"{name} is ordered with {unknowns[name][0].partner}, which is absent")
+    return "Fit: free: expected ties and orders without cycles, got " + "; ".join(messages)
 
 
 def _coordinate(unknown: Unknown, value: float, low: float) -> float:
-    """Coordinate of a value; `low` is that of its partner in an order, if it has one."""
+    """Return the coordinate of a value; `low` is the value of its partner in an order, if any."""
     if unknown.below:
         if unknown.lower > -inf:
             return (value - unknown.lower) / max(low - unknown.lower, 1e-300)
@@ -268,7 +271,7 @@ def _coordinate(unknown: Unknown, value: float, low: float) -> float:
 
 
 def _box(unknown: Unknown) -> tuple[float, float]:
-    """Box of the coordinate."""
+    """Return the bounds of the coordinate."""
     if unknown.below:
         return (0.0 if unknown.lower > -inf else -inf), 1.0
     if unknown.above:

@@ -1,1 +1,1 @@
-"""What a fit is worth: tests of residuals, intervals, profiles, what cannot be told."""
+"""Assessment of a fit: residual tests, intervals, profiles, unidentifiable combinations."""

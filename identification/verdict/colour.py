@@ -28,9 +28,9 @@ from symfric.foundation.shown import brief
 MOST = 30
 """Largest order."""
 REFINED = 6
-"""Largest order whose coefficients are refined; higher ones are only chosen for long records."""
+"""Largest order whose coefficients are refined; higher ones are chosen for long records only."""
 NEAR_ONE = 0.9995
-"""Largest partial autocorrelation: noise that wanders off has no variance."""
+"""Largest partial autocorrelation; noise at one (a random walk) has no finite variance."""
 
 
 @final
@@ -64,7 +64,7 @@ class Colour:
 
     @property
     def effective(self) -> float:
-        """Number of independent samples that tell a mean as well as these, at most `rows`.
+        """Effective number of independent samples for the estimate of a mean, at most `rows`.
 
         n_eff = n gamma(0) / (gamma(0) + 2 gamma(1) + 2 gamma(2) + ...)
         """
@@ -73,7 +73,7 @@ class Colour:
         return float(np.clip(self.rows * relative / slow, 1.0, self.rows))
 
     def spectrum(self, places: int) -> tuple[Array, Array]:
-        """Spectral density over a grid of that many frequencies of a full turn, and its slopes.
+        """Return the spectral density at `places` frequencies of [0, 2 pi), and its derivatives.
 
             S(w) = s^2 / |A(w)|^2,   A(w) = 1 - sum phi_j exp(-i w j),   dS/dphi_j = 2 S Re(e/A)
 
@@ -102,13 +102,13 @@ class Colour:
 
 
 def colour(r: Array, J: Array, position: Count, *, refine: bool = True) -> Colour:
-    """The colour of residuals that a fit with sensitivities J left.
+    """Fit the autoregressive model to residuals of a fit with sensitivities J.
 
     Args:
         r: residuals of one channel in the order of time, shape (n,).
-        J: their sensitivities to what was fitted, shape (n, k), of any rank.
+        J: their sensitivities to the fitted values, shape (n, k), of any rank.
         position: neighbours before each row, see `positions`.
-        refine: whether to go on from Burg's coefficients to those of the restricted likelihood.
+        refine: whether to refine Burg's coefficients by the restricted likelihood.
     """
     basis = span(J)
     n, k = basis.shape
@@ -125,9 +125,9 @@ def colour(r: Array, J: Array, position: Count, *, refine: bool = True) -> Colou
 
 
 def whitened(x: Array, partial: Array, position: Count) -> Array:
-    """Prediction errors of each column of x, shape of x, all with the variance of u.
+    """Return the prediction errors of each column of x, shape of x, with the variance of u.
 
-    The first rows of a run are predicted by as many as there are.
+    The first rows of a run are predicted from the rows available.
     """
     table, spread = predictors(partial)
     order = np.minimum(position, partial.size)
@@ -139,9 +139,9 @@ def whitened(x: Array, partial: Array, position: Count) -> Array:
 
 
 def predictors(partial: Array) -> tuple[Array, Array]:
-    """Coefficients of the best predictors of order 0 ... p, (p+1, p), and error variances / s^2.
+    """Return the best predictors of order 0 ... p, (p+1, p), and their error variances / s^2.
 
-    Levinson's and Durbin's recursion from the partial autocorrelations.
+    Levinson-Durbin recursion from the partial autocorrelations.
     """
     p = partial.size
     table = np.zeros((p + 1, p))
@@ -153,7 +153,7 @@ def predictors(partial: Array) -> tuple[Array, Array]:
 
 
 def span(J: Array, tolerance: float = 1e-9) -> Array:
-    """Orthonormal basis of the columns of J, shape (rows, rank)."""
+    """Return an orthonormal basis of the columns of J, shape (rows, rank)."""
     size = np.linalg.norm(J, axis=0)
     used = J[:, size > 0] / size[size > 0]
     if not used.size:
@@ -163,7 +163,7 @@ def span(J: Array, tolerance: float = 1e-9) -> Array:
 
 
 def _burg(r: Array, position: Count, most: int) -> Array:
-    """Partial autocorrelations of the order of the smallest BIC."""
+    """Return the partial autocorrelations at the order of the smallest BIC."""
     f, b = r.copy(), r.copy()
     partial = list[float]()
     total, best, order = 0.0, 0.0, 0
@@ -184,7 +184,7 @@ def _burg(r: Array, position: Count, most: int) -> Array:
 
 
 def _likelihood(partial: Array, r: Array, basis: Array, position: Count) -> tuple[float, float]:
-    """-2 log of the restricted likelihood but for a constant, and the variance s^2.
+    """Return -2 log of the restricted likelihood up to a constant, and the variance s^2.
 
     (n - k) log s^2 + log |Sigma / s^2| + log |B' (Sigma / s^2)^-1 B|
     """
@@ -198,7 +198,7 @@ def _likelihood(partial: Array, r: Array, basis: Array, position: Count) -> tupl
 
 
 def _refined(partial: Array, r: Array, basis: Array, position: Count) -> Array:
-    """The partial autocorrelations of the largest restricted likelihood, from those of Burg."""
+    """Maximise the restricted likelihood over the partial autocorrelations, from those of Burg."""
     optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
 
     def cost(z: Array) -> float:
@@ -213,7 +213,7 @@ def _refined(partial: Array, r: Array, basis: Array, position: Count) -> Array:
 
 
 LAGS = 25
-"""Most lags that are looked at."""
+"""Largest number of tested lags."""
 
 
 @final
@@ -225,7 +225,7 @@ class Whiteness:
         lags: 1 ... L, shape (L,).
         correlation: rho_k, shape (L,).
         low, high: 95 % limits of white residuals of this fit, shape (L,).
-        statistic, p: Q and the chance of a larger one; 0 and 1 where nothing can be tested.
+        statistic, p: Q and its p-value; 0 and 1 if no lag can be tested.
     """
 
     lags: Array
@@ -239,12 +239,12 @@ class Whiteness:
 
 
 def whiteness(r: Array, J: Array, position: Count) -> Whiteness:
-    """Autocorrelations of residuals and their limits.
+    """Compute the autocorrelations of residuals and their limits.
 
     Args:
         r: residuals of one channel in the order of time, shape (n,).
-        J: sensitivities to what was fitted, shape (n, k), of any rank.
-        position: neighbours before each row, see `positions`; 0 everywhere: nothing to test.
+        J: sensitivities to the fitted values, shape (n, k), of any rank.
+        position: neighbours before each row, see `positions`; with 0 everywhere no lag is tested.
     """
     from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
@@ -277,7 +277,7 @@ def whiteness(r: Array, J: Array, position: Count) -> Whiteness:
 
 
 def _moments(Q: Array, pair: Count, lag: int) -> tuple[float, float]:
-    """Mean and standard deviation of r'S r / r'r for r = M e, S the symmetric shift by `lag`.
+    """Return mean and deviation of r'S r / r'r for r = M e, S the symmetric shift by `lag`.
 
     With f = n - k:  E = tr(MS)/f,  var = 2 (f tr(MSMS) - tr(MS)^2) / (f^2 (f + 2)).
     """

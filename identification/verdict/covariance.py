@@ -1,12 +1,12 @@
-"""Uncertainty of what was fitted: covariance under coloured noise, 95 % intervals, in words.
+"""Covariance of fitted values under autocorrelated residuals, 95 % intervals, and warnings.
 
     C = B' Sigma B,   B = J (J'J)^-1 (dvalues/dw)',   Sigma = autoregressive model of each channel
 
-C is computed in frequencies (Whittle): B on the grid of times, transformed, weighted by the
-spectral density; rows that are missing or belong to windows need no special care.
+C is computed in the frequency domain (Whittle): B on the grid of times is transformed and weighted
+by the spectral density. Missing rows and windows need no special treatment.
 
-A record that only slides shows how friction falls with speed, but not from which level: a law fits
-it with a static level far above every measured force. Such levels (`Levels`) get no interval.
+A record that only slides shows how friction falls with speed, but not the static level: a law may
+fit it with a static level far above every measured force. Such levels (`Levels`) get no interval.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour, colour
-from identification.verdict.minimum import Minimum, Trace, lost, minimum, places, positions, trace
+from identification.verdict.minimum import Minimum, Shift, groups, minimum, places, positions, shift
 from symfric.foundation.shown import brief
 
 RANK = 1e-7
-"""Smallest singular value of the scaled sensitivities, over the largest, that counts."""
+"""Smallest singular value of the scaled sensitivities that counts, relative to the largest."""
 
 
 @final
@@ -31,17 +31,17 @@ RANK = 1e-7
 class Sandwich:
     """Linearised uncertainty of k values that depend on n coordinates.
 
-    What the residuals do not tell is left where it is: it adds nothing here, and `null` says so.
+    Directions that the residuals do not determine contribute nothing here; `null` lists them.
 
     Attributes:
-        coloured: covariance of the values with the colour of each channel, shape (k, k).
-        white: the same if residuals were white with the variance of each channel.
+        coloured: covariance of the values with the autocorrelation of each channel, shape (k, k).
+        white: the same for white residuals with the variance of each channel.
         freedom: effective degrees of freedom of the variances on the diagonal (Satterthwaite;
-            that the colour is an estimate counts), shape (k,).
+            includes the uncertainty of the estimated autocorrelation), shape (k,).
         null: directions of the coordinates along which the residuals do not change, orthonormal
             after multiplication by `size`, shape (n, nullity).
         size: norm of the columns of J; one where it is zero, shape (n,).
-        colours: of the channels.
+        colours: autoregressive models of the channels.
     """
 
     coloured: Array
@@ -53,7 +53,7 @@ class Sandwich:
 
 
 def sandwich(found: Minimum) -> Sandwich:
-    """Uncertainty of a least-squares fit; noise of different channels is taken as independent."""
+    """Compute the uncertainty of a least-squares fit with independent noise of the channels."""
     free = ~found.held
     size = np.linalg.norm(found.J * free, axis=0)
     size = np.where(size > 0, size, 1.0)
@@ -65,27 +65,27 @@ def sandwich(found: Minimum) -> Sandwich:
     reach = np.abs(bread).max(axis=0, initial=0.0)
     reach = np.where(reach > 0, reach, 1.0)  # variances of variances would overflow
     bread = bread / reach
-    felt = scaled * found.gain[:, None]
+    sensitivity = scaled * found.gain[:, None]
     k = len(found.names)
     coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
     colours = list[Colour]()
     for channel in found.channels:
         B = bread[channel.rows]
         there = positions(channel, across_windows=True)
-        seen = colour(found.r[channel.rows], felt[channel.rows], there)
+        seen = colour(found.r[channel.rows], sensitivity[channel.rows], there)
         C, wide = _meat(seen, B, places(channel))
         coloured, white, spread = coloured + C, white + seen.white * B.T @ B, spread + wide
         colours.append(seen)
     total = np.diag(coloured) ** 2
     freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
-    null = _rest(Vt[kept], found.held) / size[:, None]
+    null = _null_space(Vt[kept], found.held) / size[:, None]
     back = np.outer(reach, reach)
     coloured, white = back * coloured, back * white
     return Sandwich(coloured, white, np.maximum(freedom, 1.0), null, size, tuple(colours))
 
 
-def _rest(rows: Array, held: NDArray[np.bool_]) -> Array:
-    """Orthonormal basis of what is free and orthogonal to `rows`, shape (n, nullity)."""
+def _null_space(rows: Array, held: NDArray[np.bool_]) -> Array:
+    """Return an orthonormal basis of the free coordinates orthogonal to `rows`, (n, nullity)."""
     free = np.flatnonzero(~held)
     inside = rows[:, free]
     _, _, Vt = np.linalg.svd(inside, full_matrices=True)
@@ -95,7 +95,7 @@ def _rest(rows: Array, held: NDArray[np.bool_]) -> Array:
 
 
 def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
-    """B' Sigma B of one channel, and the variance of the estimates on its diagonal.
+    """Return B' Sigma B of one channel, and the variance of the estimates on its diagonal.
 
     var c_ii = 2 c_ii^2 / freedom + (dc_ii/dphi)' cov(phi) (dc_ii/dphi)
     """
@@ -114,16 +114,16 @@ def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array,
 
 
 FAR = 3.0
-"""Force of a level over the largest friction force in the data from which on it is not told."""
+"""Ratio of a level's force to the largest friction force above which it is not identifiable."""
 
 
 @final
 @dataclass(frozen=True)
 class Levels:
-    """Which of the values are friction levels, and what forces there were.
+    """Friction levels among the values, and the forces in the data.
 
     Attributes:
-        loads: name of a level -> its force over its value: 1, or of a coefficient the normal force.
+        loads: name of a level -> its force over its value: 1, or the normal force of a coefficient.
         largest: largest friction force in the data [N or N m].
         unit: of the forces.
     """
@@ -133,55 +133,56 @@ class Levels:
     unit: str = "N"
 
     def beyond(self, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-        """Names of the levels far above all forces, with a sentence each."""
+        """Yield the name of each level far above all forces, with a message."""
         for name, load in self.loads.items():
             force = abs(values.get(name, 0.0)) * load
             if force > FAR * self.largest > 0:
                 yield (
                     name,
-                    f"{name} is not told: no friction force in the data comes near "
+                    f"{name} is not identifiable: no friction force in the data is near "
                     f"{force:.3g} {self.unit}, the largest is {self.largest:.2g} {self.unit}.",
                 )
 
 
 LEVEL = 0.95
-"""Of the intervals."""
+"""Confidence level of the intervals."""
 TOGETHER = 0.98
-"""Correlation from which on two estimates are said to go together."""
+"""Correlation above which two estimates are reported as strongly correlated."""
 FEW = 3.0
-"""Effective samples for each unknown below which intervals cannot be relied on."""
+"""Effective samples for each unknown below which intervals are unreliable."""
 HARDLY = 0.5
-"""Standard error over the value from which on it is said to be hardly told."""
+"""Standard error over the value above which a value is reported as poorly identified."""
 DECADES = 8.0
-"""Length of the interval of a logarithmic value from which on it is none."""
+"""Width of the interval of a logarithmic value above which it is dropped [decades]."""
 WIDE = 1e4
-"""The same of other values, over the value and its usual magnitude."""
+"""Width of other intervals above which they are dropped, over the value and its usual magnitude."""
 ROUNDING = 1e-14
-"""Slope of a value over its largest one, up to which it is the rounding of none."""
+"""Slope of a value over its largest one below which it is rounding error."""
 CLEAN = 1e-13
-"""Entry of an inverse over its largest one that is rounding: what has no effect keeps none."""
-LOST, BEYOND = "not told: its effect is lost in the noise", "not told: far above all forces"
-"""Why a value has no interval."""
+"""Entry of a pseudo-inverse over its largest one below which it is rounding error, set to zero."""
+LOST = "not identifiable: effect below the noise"
+BEYOND = "not identifiable: far above all forces"
+"""Notes of values without an interval."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Uncertainty of k values; NaN where the data do not tell one or where it stands at a bound.
+    """Uncertainty of k values; NaN where a value is not identifiable or at a bound.
 
     Attributes:
         names: of the values.
-        matrix: covariance with the colour of the residuals, shape (k, k).
-        white: the same as if the residuals were white, shape (k, k).
+        matrix: covariance with the autocorrelation of the residuals, shape (k, k).
+        white: the same for white residuals, shape (k, k).
         freedom: effective degrees of freedom, for quantiles of Student's t, shape (k,).
-        low, high: 95 % intervals, shape (k,). Those of logarithmic unknowns are symmetric in the
-            logarithm, as a stiffness known to a factor of 2 is no stiffness of 1 +- 1.
-        at_bound: values that stand at a bound.
-        undetermined: groups of names of which fewer combinations are told than there are names; a
-            group of one has no influence at all.
+        low, high: 95 % intervals, shape (k,). For logarithmic unknowns they are symmetric in the
+            logarithm: a stiffness known to a factor of 2 stays positive.
+        at_bound: values at a bound.
+        undetermined: groups of names with fewer identifiable combinations than names; a group of
+            one has no influence at all.
         effective: number of independent samples of each channel, by its name.
-        sentences: what is not told or hardly told.
-        notes: name of a value without an interval, for what is no group or bound -> why.
+        sentences: messages on values that are not identifiable or poorly identified.
+        notes: name of a value without an interval that is in no group and at no bound -> reason.
     """
 
     names: tuple[str, ...]
@@ -200,7 +201,7 @@ class Covariance:
 
     @property
     def standard_errors(self) -> Array:
-        """Standard errors with the colour of the residuals, shape (k,)."""
+        """Standard errors with the autocorrelation of the residuals, shape (k,)."""
         return np.sqrt(np.diag(self.matrix))
 
     @property
@@ -210,33 +211,33 @@ class Covariance:
 
     @property
     def correlation(self) -> Array:
-        """Of the estimates, NaN where there is none, shape (k, k)."""
+        """Correlation of the estimates, NaN where undefined, shape (k, k)."""
         error = self.standard_errors
         both = np.outer(error, error)
         return np.divide(self.matrix, both, out=np.full_like(both, np.nan), where=both > 0)
 
 
 def covariance(task: Task, point: Point, levels: Levels | None = None) -> Covariance:
-    """Uncertainty of what a task was solved for, see `covariance_of`."""
+    """Compute the uncertainty of the values of a solved task, see `covariance_of`."""
     found = minimum(task, point)
-    return covariance_of(found, trace(task, found), levels)
+    return covariance_of(found, shift(task, found), levels)
 
 
-def covariance_of(found: Minimum, change: Trace, levels: Levels | None = None) -> Covariance:
-    """Uncertainty of the values at a minimum.
+def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -> Covariance:
+    """Compute the uncertainty of the values at a minimum.
 
     Limits: linear in the values (in logarithms where an unknown is logarithmic), see `profile` for
-    what is not; channels are taken as independent; with fewer effective samples than three times
-    the unknowns the intervals are too small, which is said.
+    nonlinear ones; channels are independent; with fewer effective samples than three times the
+    unknowns the intervals are too small, and a message says so.
 
     Args:
         found: the minimum.
-        change: how much the weighted residuals change at other values, to find the right words.
+        change: change of the weighted residuals at other values, used to word the messages.
         levels: friction levels among the values; those far above every force get no interval.
     """
     inside = sandwich(found)
     names, values = found.names, found.values
-    moved = found.slope @ inside.null  # values along directions without a trace
+    moved = found.slope @ inside.null  # values along directions that leave the residuals unchanged
     own = [names.index(u.name) for u in found.unknowns]
     size = _sensitivity(found, own)
     wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
@@ -246,8 +247,8 @@ def covariance_of(found: Minimum, change: Trace, levels: Levels | None = None) -
     for C in (matrix, white):
         C[wanders | fixed, :] = C[:, wanders | fixed] = np.nan
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
-    groups = list(
-        lost(
+    null_groups = list(
+        groups(
             tuple(names[i] for i in own),
             values[own],
             moved[own],
@@ -266,20 +267,20 @@ def covariance_of(found: Minimum, change: Trace, levels: Levels | None = None) -
         low=low,
         high=high,
         at_bound=at_bound,
-        undetermined=tuple(tuple(names[own[i]] for i in g.members) for g in groups),
+        undetermined=tuple(tuple(names[own[i]] for i in g.members) for g in null_groups),
         effective=effective,
-        sentences=tuple(g.sentence for g in groups),
+        sentences=tuple(g.sentence for g in null_groups),
     )
     far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
-    gone = dict(_gone(found, made))
+    gone = dict(_unlimited(found, made))
     weak = _weak(found, made, (*far, *gone))
-    said = (*made.sentences, *far.values(), *gone.values(), *weak, *_few(found, effective))
+    messages = (*made.sentences, *far.values(), *gone.values(), *weak, *_few(found, effective))
     notes = dict.fromkeys(gone, LOST) | dict.fromkeys(far, BEYOND)
-    return replace(_without(made, notes), sentences=tuple(s for s in said if s), notes=notes)
+    return replace(_without(made, notes), sentences=tuple(s for s in messages if s), notes=notes)
 
 
 def _without(made: Covariance, notes: Collection[str]) -> Covariance:
-    """The same without the intervals of what `notes` names."""
+    """Return `made` without the intervals of the values in `notes`."""
     out = np.array([name in notes for name in made.names], dtype=bool)
     matrix, white = made.matrix.copy(), made.white.copy()
     for C in (matrix, white):
@@ -288,8 +289,8 @@ def _without(made: Covariance, notes: Collection[str]) -> Covariance:
     return replace(made, matrix=matrix, white=white, low=low, high=high)
 
 
-def _gone(found: Minimum, made: Covariance) -> Iterator[tuple[str, str]]:
-    """Names of the values that could be nearly anything, with a sentence of those asked for."""
+def _unlimited(found: Minimum, made: Covariance) -> Iterator[tuple[str, str]]:
+    """Yield the values whose interval is nearly unlimited, with a message (empty for nuisances)."""
     known = {u.name: u for u in found.unknowns}
     for name, value, low, high in zip(made.names, found.values, made.low, made.high, strict=True):
         unknown = known.get(name)
@@ -300,12 +301,12 @@ def _gone(found: Minimum, made: Covariance) -> Iterator[tuple[str, str]]:
         else:
             gone = high - low > WIDE * max(abs(value), abs(unknown.scale))
         if gone:
-            said = f"{name} is not told: what it does to what was measured is lost in the noise."
-            yield name, "" if unknown.nuisance else said
+            text = f"{name} is not identifiable: its effect on the measurements is below the noise."
+            yield name, "" if unknown.nuisance else text
 
 
 def _sensitivity(found: Minimum, own: list[int]) -> Array:
-    """Norm of dr/dvalue of unknowns with the others held; of tied ones the inverse value, (k,)."""
+    """Return norms of dr/dvalue with the other unknowns held; inverse values if tied, (k,)."""
     size = 1 / np.maximum(np.abs(found.values), 1e-300)
     alone = np.linalg.norm(found.J @ _inverse(found.slope[own]), axis=0)
     for i, s in zip(own, alone, strict=True):
@@ -314,7 +315,7 @@ def _sensitivity(found: Minimum, own: list[int]) -> Array:
 
 
 def _spread(found: Minimum, own: list[int], some: Array) -> Array:
-    """All values where those of the unknowns are `some`: tied ones follow in first order."""
+    """Return all values for given values of the unknowns: tied ones follow in first order."""
     w = _inverse(found.slope[own]) @ (some - found.values[own])
     there = found.values + found.slope @ w
     there[own] = some
@@ -322,7 +323,7 @@ def _spread(found: Minimum, own: list[int], some: Array) -> Array:
 
 
 def _inverse(slope: Array) -> Array:
-    """dw/dvalues, shape (n, n); zero of a coordinate without effect, such as exp(-800)."""
+    """Return dw/dvalues, shape (n, n); zero for a coordinate without effect, such as exp(-800)."""
     size = np.abs(slope).max(axis=1)
     size[size == 0.0] = 1.0
     inverse = np.linalg.pinv(slope / size[:, None])
@@ -343,25 +344,25 @@ def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Arr
     return low, high
 
 
-def _weak(found: Minimum, made: Covariance, told_of: Collection[str]) -> Iterator[str]:
-    """What is told, but hardly, beside what there are sentences of."""
+def _weak(found: Minimum, made: Covariance, mentioned: Collection[str]) -> Iterator[str]:
+    """Yield a message for each poorly identified value outside `mentioned`."""
     error, correlation = made.standard_errors, made.correlation
-    told: NDArray[np.bool_] = np.isfinite(error)
+    known: NDArray[np.bool_] = np.isfinite(error)
     nuisance = {u.name for u in found.unknowns if u.nuisance}
     units = {u.name: u.unit for u in found.unknowns}
     for i, name in enumerate(made.names):
-        if not told[i] or name in nuisance or name in told_of:
+        if not known[i] or name in nuisance or name in mentioned:
             continue
         if not error[i] > HARDLY * abs(found.values[i]):
             continue
         unit = units.get(name, "1")
         unit = "" if unit == "1" else f" {unit}"
-        others = np.where(told, np.abs(correlation[i]), 0.0)
+        others = np.where(known, np.abs(correlation[i]), 0.0)
         others[i] = 0.0
         j = int(np.argmax(others))
-        goes = f"; it goes with {made.names[j]}" if others[j] > TOGETHER else ""
+        goes = f"; strongly correlated with {made.names[j]}" if others[j] > TOGETHER else ""
         yield (
-            f"{name} is hardly told: between {made.low[i]:.3g} and {made.high[i]:.3g}{unit} "
+            f"{name} is poorly identified: between {made.low[i]:.3g} and {made.high[i]:.3g}{unit} "
             f"with 95 %{goes}."
         )
 
@@ -371,6 +372,6 @@ def _few(found: Minimum, effective: dict[str, float]) -> Iterator[str]:
     n = int((~found.held).sum())
     if n and count < FEW * n:
         yield (
-            f"The residuals are so coloured that they count as {count:.0f} independent samples "
-            f"for {n} unknowns: the intervals are rather too small."
+            f"The autocorrelated residuals are worth only {count:.0f} independent samples "
+            f"for {n} unknowns: the intervals are likely too small."
         )

@@ -1,14 +1,14 @@
-"""Excitation by design: a model that carries along what a motion would tell of its parameters.
+"""Models for optimal experiment design, with the Fisher information of a motion as states.
 
     S' = df/dx S + df/dp diag(p),           S(0) = dx0/dp diag(p)
     Y  = dg/dx S + dg/dp diag(p)
     I' = sum_y Y_y' Y_y / (sigma_y^2 h),    I(0) = 1/prior^2
 
-S are the sensitivities of the states to relative changes of the parameters, Y those of what is
-measured, y = g(x, u, p), every h with noise sigma_y, and I is Fisher's information.
-The smallest relative standard errors that any unbiased estimator can have of white noise are the
-roots of the diagonal of I^-1 (Cramer and Rao). `information`, the logarithm of det I over the
-number of parameters, is an output, so that an optimal control problem can make it large:
+S are the sensitivities of the states to relative changes of the parameters, Y those of the measured
+signals y = g(x, u, p), sampled every h with noise sigma_y, and I is the Fisher information.
+The smallest relative standard errors of any unbiased estimator under white noise are the square
+roots of the diagonal of I^-1 (Cramer and Rao). `information`, log det I over the number of
+parameters, is an output that an optimal control problem can maximise:
 `Problem(Phase(informative(model, ...), T=2.0), -at_end(lambda s: s.information), bounds=...)`.
 Source: Mehra, IEEE Trans. Autom. Control 19(6), 1974; Swevers et al., IEEE Trans. Robotics 13(5),
 1997 (excitation of robots).
@@ -31,7 +31,7 @@ class Motion(Protocol):
     """Signals by name, such as a trajectory."""
 
     def __getitem__(self, name: str, /) -> Any:
-        """All values of a signal over time."""
+        """Return all values of a signal over time."""
         ...
 
 
@@ -44,24 +44,24 @@ def informative(
     prior: float = 1.0,
     aim: float = 1e-2,
 ) -> Model:
-    """`model` with sensitivities and information as states, and the output "information".
+    """Return `model` with sensitivities and information as states, and the output "information".
 
     Args:
-        model: explicit, without algebraic variables and events, smooth enough to be optimised: the
-            free parameters are among its `p`, where their start values are what one knows before.
-        free: parameters that are to be identified, none of them zero.
-        measured: signal -> standard deviation of its noise in SI units: states or outputs.
+        model: explicit, without algebraic variables and events, smooth enough to be optimised; the
+            free parameters are among its `p`, with prior estimates as start values.
+        free: parameters to be identified, none of them zero.
+        measured: signal (state or output) -> standard deviation of its noise in SI units.
         step: sample time of the measurement [s].
-        prior: relative standard error of what is known before the measurement.
-        aim: relative standard error that is hoped for; it scales the information, without which an
-            optimiser goes nowhere.
+        prior: relative standard error of the prior estimates.
+        aim: desired relative standard error; it scales the information, which an optimiser needs
+            to converge.
 
-    Limits: noise is white and the start state known; the information is that at the start values of
-    the parameters, so a design for a wide range takes `scenarios` of the problem.
+    Limits: noise is white and the start state known; the information is evaluated at the start
+    values of the parameters, so a design for a wide range needs `scenarios` of the problem.
 
     Raises:
         ValueError: an unknown parameter or signal, a parameter that is zero, a noise that is not
-            above zero, a model of another kind.
+            above zero, an unsupported model.
     """
     check_model("informative", model)
     if model.ode is None or model.z or model.events:
@@ -93,7 +93,7 @@ def informative(
     information = ca.SX(len(p), len(p))
     for (i, j), entry in zip(lower, entries, strict=True):
         information[i, j] = information[j, i] = entry.symbol
-    told = Output(_log_det(information) / len(p), "1", "log det of the information per parameter")
+    output = Output(_log_det(information) / len(p), "1", "log det of the information per parameter")
     flat = [(r, c) for r in range(len(model.x)) for c in range(len(p))]
     return replace(
         model,
@@ -103,17 +103,17 @@ def informative(
             model.ode, *(rate[r, c] for r, c in flat), *(growth[i, j] for i, j in lower)
         ),
         xdot=ca.SX(0, 1), residual=ca.SX(0, 1),
-        outputs={**model.outputs, "information": told},
+        outputs={**model.outputs, "information": output},
         holonomic=None, contacts=(), opening=None,
     )  # fmt: skip
 
 
 def expected_errors(free: Sequence[str], motion: Motion) -> dict[str, float]:
-    """Relative standard errors that a motion of an informative model makes possible.
+    """Return the smallest relative standard errors of the parameters after a motion.
 
     Args:
-        free: its parameters, in the order in which they were given to `informative`.
-        motion: of the informative model; the last values count.
+        free: the parameters, in the order given to `informative`.
+        motion: of the informative model; its last values are used.
     """
     I = np.zeros((len(free), len(free)))  # noqa: E741  (the letter of the literature)
     for i, a in enumerate(free):
@@ -136,7 +136,7 @@ def _name(a: str, b: str) -> str:
 
 
 def _log_det(A: ca.SX) -> ca.SX:
-    """Log det A of a symmetric positive matrix, by its Cholesky factor."""
+    """Return log det A of a symmetric positive matrix, by its Cholesky factor."""
     n = A.shape[0]
     L, total = ca.SX(n, n), ca.SX(0)
     for j in range(n):

@@ -1,25 +1,25 @@
-"""Test whether residuals depend on inputs and motion: added variables under coloured noise.
+"""Tests of residuals for dependence on inputs and motion: added variables, autocorrelated noise.
 
-Inputs, and the motion that the model predicts (the measured one shares its noise with the
-residuals), give families of columns. A right model leaves none of them in the residuals; each
-family is what one kind of error leaves:
+Inputs and the predicted motion (the measured one shares its noise with the residuals) give families
+of columns. A correct model leaves no trace of them in the residuals; each family corresponds to
+one type of model error:
 
-| family | columns | what is missing |
+| family | columns | missing in the model |
 |---|---|---|
-| response to a regressor | it, now and earlier | dynamics, delay, mass, viscous |
+| response to a regressor | its present and past values | dynamics, delay, mass, viscous |
 | direction of motion | sign v, v abs(v), v^3, abs(v) | Coulomb level, asymmetry, viscous terms |
-| speed | bins of abs(v), each way | shape of the friction curve: Stribeck |
-| time or distance since reversal | bins, each way | pre-sliding, hysteresis, dwell |
-| place | harmonics of the position | ripple, cogging, gravity |
+| speed | bins of abs(v), each direction | shape of the friction curve: Stribeck |
+| distance since reversal | bins, each direction | pre-sliding, hysteresis, dwell |
+| position | harmonics of the position | ripple, cogging, gravity |
 
-Residuals and columns are whitened by an autoregressive model, what the fit could still take up (J)
-is projected out of both, and the rest is regressed on the columns:
+Residuals and columns are whitened by an autoregressive model, the span of the sensitivities J is
+projected out of both, and the remaining residuals are regressed on the columns:
 
     F = (explained / q) / (rest / (n - k - q))  ~  F(q, n - k - q)     if there is no dependence
 
 For one column this is a cross-correlation with the variance of Bartlett's formula. The
-autoregressive model is first that of the residuals, which takes a missing harmonic for colour; so
-unless F is large already, it is that of what the columns leave of the residuals.
+autoregressive model is first fitted to the residuals, where it may absorb a missing harmonic. So
+unless F is large already, it is fitted to the residuals after the regression on the columns.
 Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 (added variables);
 Ljung, System Identification, 1999, section 16.6.
 """
@@ -38,21 +38,21 @@ from identification.verdict.minimum import Count, Minimum, lagged, positions
 Kind = Literal["position", "velocity", "acceleration", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
-"""Samples by which a regressor may act late."""
+"""Tested delays of a regressor [samples]."""
 BINS = 8
-"""Bins of speed and of the distance since a reversal, each way."""
+"""Bins of speed and of the distance since a reversal, in each direction."""
 HARMONICS = 12
-"""Of the position over its range."""
+"""Largest number of harmonics of the position over its range."""
 ROWS_EACH = 12
-"""Rows that a column needs at least."""
+"""Least number of rows for each column."""
 MOVING = 1e-3
-"""Share of the largest speed below which there is no direction."""
+"""Speed below which there is no direction of motion, over the largest one."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Clue:
-    """A signal that residuals may depend on, shape (n,), and what it is."""
+class Regressor:
+    """A signal that residuals may depend on, shape (n,), with its name and type."""
 
     name: str
     signal: Array
@@ -62,13 +62,13 @@ class Clue:
 @final
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Columns of one kind.
+    """Columns that test for one type of dependence.
 
     Attributes:
-        what: what they are functions of, for a sentence: "the residuals of x depend on ...".
-        hint: what such a dependence means.
+        what: name of the dependence in a message: "the residuals of x depend on ...".
+        hint: likely cause of such a dependence.
         columns: shape (n, q).
-        smoothed: whether they come from a signal that had to be smoothed, which leaves traces.
+        smoothed: whether they come from a smoothed signal, which leaves systematic errors.
     """
 
     what: str
@@ -77,27 +77,27 @@ class Family:
     smoothed: bool = False
 
 
-def families(clues: Sequence[Clue], position: Count) -> Iterator[Family]:
-    """The families that `clues` give; those with too many columns for the rows are thinned."""
+def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Family]:
+    """Yield the families of all `regressors`, with fewer columns if there are few rows."""
     n = position.size
     delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
-    for clue in clues:
-        name, signal = clue.name, clue.signal
+    for one in regressors:
+        name, signal = one.name, one.signal
         if not np.ptp(signal) > 0:
             continue
-        if clue.kind == "position":
+        if one.kind == "position":
             yield _of_place(name, signal, n)
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
         hint = f"dynamics or a delay from {name} is missing"
-        yield Family(f"{name} and its past", hint, columns, clue.kind == "acceleration")
-        if clue.kind == "velocity":
+        yield Family(f"the present and past of {name}", hint, columns, one.kind == "acceleration")
+        if one.kind == "velocity":
             yield from _of_speed(name, signal, n)
             if position.any():
                 since = _since_reversal(signal, position)
                 yield Family(
-                    f"the path since {name} last changed its sign",
-                    "hysteresis or pre-sliding is not described",
+                    f"the distance since {name} last changed its sign",
+                    "hysteresis or pre-sliding is not modelled",
                     _bins(since, _way(signal), _count(n)),
                 )
 
@@ -107,14 +107,14 @@ def _of_place(name: str, x: Array, n: int) -> Family:
     orders = np.arange(1, max(1, min(HARMONICS, n // (2 * ROWS_EACH))) + 1) / 2
     waves = np.outer(turns, orders)
     return Family(
-        f"the place {name}",
-        "something changes along the way: ripple, cogging, a spring, gravity",
+        f"the position {name}",
+        "an effect of the position is missing: ripple, cogging, a spring, gravity",
         np.column_stack([np.cos(waves), np.sin(waves)]),
     )
 
 
 def _count(n: int) -> int:
-    """Bins each way that n rows allow."""
+    """Return the number of bins in each direction for n rows."""
     return max(2, min(BINS, n // (2 * ROWS_EACH)))
 
 
@@ -122,7 +122,7 @@ def _of_speed(name: str, v: Array, n: int) -> Iterator[Family]:
     size = np.abs(v).max()
     yield Family(
         f"the direction and size of {name}",
-        "friction of another level or another power of the speed is there",
+        "the friction level or its dependence on the speed is wrong",
         np.column_stack([_way(v), v * np.abs(v) / size**2, (v / size) ** 3, np.abs(v) / size]),
     )
     yield Family(
@@ -133,12 +133,12 @@ def _of_speed(name: str, v: Array, n: int) -> Iterator[Family]:
 
 
 def _way(v: Array) -> Array:
-    """Sign of v; 0 at standstill."""
+    """Return the sign of v; 0 at standstill."""
     return np.where(np.abs(v) > MOVING * np.abs(v).max(), np.sign(v), 0.0)
 
 
 def _bins(signal: Array, way: Array, count: int) -> Array:
-    """One column for each bin of equal shares of `signal` and each way, (n, up to 2 count)."""
+    """Return one column for each quantile bin of `signal` and direction, (n, up to 2 count)."""
     moving = way != 0
     if not moving.any():
         return np.zeros((signal.size, 0))
@@ -149,7 +149,7 @@ def _bins(signal: Array, way: Array, count: int) -> Array:
 
 
 def _since_reversal(v: Array, position: Count) -> Array:
-    """Sum of abs(v) over the samples since v changed its sign or a run began."""
+    """Return the sum of abs(v) over the samples since the last sign change or start of a run."""
     way = np.sign(v)
     turned = np.ones(v.size, dtype=bool)
     turned[1:] = (way[1:] != way[:-1]) | (position[1:] == 0)
@@ -161,25 +161,25 @@ def _since_reversal(v: Array, position: Count) -> Array:
 POSITIONS, VELOCITIES = ("m", "rad"), ("m/s", "rad/s")
 
 
-def clues_of(found: Minimum, channel: Channel) -> list[Clue]:
-    """The regressors of a channel, and the motion that was simulated for its record."""
-    clues = {n: Clue(n, s, _kind(n)) for n, s in channel.regressors.items()}
+def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
+    """Return the regressors of a channel, and the simulated motion of its record."""
+    regressors = {n: Regressor(n, s, _kind(n)) for n, s in channel.regressors.items()}
     for other in found.channels:
         if other.record != channel.record or not _same_times(other, channel):
             continue
         predicted = other.measured + found.raw[other.rows]
         if other.unit in VELOCITIES:
-            clues.setdefault(other.signal, Clue(other.signal, predicted, "velocity"))
+            regressors.setdefault(other.signal, Regressor(other.signal, predicted, "velocity"))
         elif other.unit in POSITIONS and other.ordered:
-            clues.setdefault(other.signal, Clue(other.signal, predicted, "position"))
+            regressors.setdefault(other.signal, Regressor(other.signal, predicted, "position"))
             rate = "v" if other.signal == "x" else f"the rate of {other.signal}"
             speed = _rate(predicted, other.t, positions(other))
-            clues.setdefault(rate, Clue(rate, speed, "velocity"))
-    return list(clues.values())
+            regressors.setdefault(rate, Regressor(rate, speed, "velocity"))
+    return list(regressors.values())
 
 
 def _kind(name: str) -> Kind:
-    """What a regressor is by its name."""
+    """Return the type of a regressor, deduced from its name."""
     stem = name.replace(".", "_").replace("[", "_").split("_")[0]
     kinds: dict[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleration"}
     return kinds.get(stem, "")
@@ -190,7 +190,7 @@ def _same_times(one: Channel, other: Channel) -> bool:
 
 
 def _rate(x: Array, t: Array, position: Count) -> Array:
-    """Slope of x over time, inside each run."""
+    """Return the time derivative of x, computed inside each run."""
     slope = np.zeros_like(x)
     starts = np.flatnonzero(position == 0)
     for first, last in zip(starts, [*starts[1:], x.size], strict=True):
@@ -200,23 +200,23 @@ def _rate(x: Array, t: Array, position: Count) -> Array:
 
 
 SURE, UNSURE = 1e-6, 0.02
-"""p below which the first test needs no second one, and the second one a better one."""
+"""p-values: below SURE the first test suffices; below UNSURE the second model is refined."""
 
 MANY = 25
-"""Rows for each column, from which on a model of what the columns leave can be believed."""
+"""Rows for each column above which a model of the remaining residuals is reliable."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Dependence:
-    """What one family explains of the residuals of one channel.
+    """Part of the residuals of one channel that one family explains.
 
     Attributes:
         what, hint: see `Family`.
         statistic: F.
         columns: q.
-        p: the chance of a larger F without dependence.
-        size: root mean square of the part of the residuals that the family explains, in their unit.
+        p: probability of a larger F without dependence.
+        size: root mean square of the explained part of the residuals, in their unit.
         share: its square over that of the residuals.
         smoothed: see `Family`.
     """
@@ -232,22 +232,22 @@ class Dependence:
 
 
 def dependences(
-    r: Array, J: Array, colour: Colour, clues: Sequence[Clue], position: Count
+    r: Array, J: Array, colour: Colour, regressors: Sequence[Regressor], position: Count
 ) -> Iterator[Dependence]:
-    """Test of every family that `clues` give.
+    """Test the residuals against every family of `regressors`.
 
     Args:
         r: residuals, shape (n,).
         J: sensitivities, shape (n, k), of any rank.
-        colour: of r.
-        clues: what it may depend on.
+        colour: autoregressive model of r.
+        regressors: signals that r may depend on.
         position: neighbours before each row, see `positions`.
     """
     if not np.any(r):
         return
     basis = span(J)
     power = float(r @ r) / r.size
-    for family in families(clues, position):
+    for family in families(regressors, position):
         columns = family.columns - family.columns.mean(axis=0)
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         found = _added(r, basis, columns, colour.partial, position)
@@ -277,7 +277,7 @@ def dependences(
 @final
 @dataclass(frozen=True, eq=False)
 class _Added:
-    """F of added columns, its p, their number, and the size of what they explain."""
+    """F of added columns, its p-value, their number, and the size of the explained part."""
 
     statistic: float
     p: float
@@ -288,7 +288,7 @@ class _Added:
 def _added(
     r: Array, basis: Array, columns: Array, partial: Array, position: Count
 ) -> _Added | None:
-    """F of `columns` in r beside `basis` in noise with partial autocorrelations `partial`."""
+    """Return F of `columns` added to `basis`, in noise with partial autocorrelations `partial`."""
     from scipy.special import fdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
     known = span(whitened(basis, partial, position))
@@ -307,12 +307,12 @@ def _added(
 
 
 def _without(basis: Array, x: Array) -> Array:
-    """What is left of x without its part in the span of an orthonormal basis."""
+    """Return x without its projection on an orthonormal basis."""
     return x - basis @ (basis.T @ x)
 
 
 def _explained(columns: Array, basis: Array, clean: Array, rest: Array) -> float:
-    """Root mean square of what the columns say of the residuals, before whitening."""
+    """Return the root mean square of the explained part of the residuals, before whitening."""
     weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
     part = _without(basis, columns @ weights)
     return float(np.sqrt(np.mean(part**2)))

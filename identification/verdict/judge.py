@@ -1,19 +1,20 @@
-"""Judge a fit by the residuals that it leaves.
+"""Assess a fit by its residuals.
 
-A least-squares fit ends at a minimum whatever model it is given. A right model leaves noise that
-has nothing to do with what was applied and how the machine moved; white noise of the size that the
-sensor has, if one is lucky. So
+A least-squares fit reaches a minimum for any model. The residuals of a correct model are noise,
+independent of inputs and motion; ideally white noise with the size of the sensor noise. Therefore
 
-* dependence on inputs, speed, direction, place or history makes a fit doubtful: the model is wrong;
-* residuals larger than a noise level that was given do, too;
-* a signal of which nearly all is left does, even if what is left looks like noise, and so does a
-  value at its bound where much is left;
-* colour alone does not: intervals carry it, see `covariance`;
-* errors in the data, a mass at its bound, or residuals as large as the signal are no physics.
+* dependence on inputs, speed, direction, position or history makes a fit doubtful: the model is
+  wrong;
+* so do residuals larger than a given noise level;
+* so does a signal that is almost entirely unexplained, even if its residuals look like noise, and
+  a value at its bound if much is unexplained;
+* autocorrelation alone does not: the intervals account for it, see `covariance`;
+* errors in the data, a mass at its bound, or residuals as large as the signal make a result
+  implausible.
 
-Two limits precede the tests. Below the `resolution` of a measured signal, residuals say nothing of
-a model. Bristles are taken as relaxed where a record begins near rest; if the machine was loaded
-before, the force is wrong until they have slid once, and stiffness and damping make up for it
+The tests have two limits. Residuals below the `resolution` of a measured signal carry no
+information. Bristles are assumed relaxed where a record starts near rest; if the machine was loaded
+before, the force is wrong until they have slid once, which biases stiffness and damping
 (`beginnings`).
 """
 
@@ -30,19 +31,19 @@ from identification.residuals.sampled import moving_start
 from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour, Whiteness, whiteness
 from identification.verdict.covariance import sandwich
-from identification.verdict.independence import Dependence, clues_of, dependences
+from identification.verdict.independence import Dependence, dependences, inputs_of
 from identification.verdict.minimum import Minimum, minimum, positions
 from symfric.foundation.status import Status
 
 ROUNDING = 1e-6
-"""Share of the range of a signal that simulations and interpolation may be off."""
+"""Error of simulation and interpolation, over the range of a signal."""
 BALANCE = 1e-3
-"""The same of a force: filtered and differentiated motions give none that is more exact."""
+"""The same for a force, limited by filtering and differentiation of the motion."""
 FORCES = ("N", "N m")
 
 
 def resolution(measured: Array, unit: str) -> float:
-    """Root mean square of the errors of rounding and of simulation, in the unit of the signal.
+    """Return the rms error of rounding and of simulation, in the unit of the signal.
 
     A signal is rounded if its values are multiples of the smallest step between two of them.
     """
@@ -61,17 +62,19 @@ def resolution(measured: Array, unit: str) -> float:
 
 
 FIRST = 0.05
-"""Share of a record that is its beginning."""
+"""Initial share of a record that is compared with the rest."""
 FEWEST = 8
-"""Samples below which a beginning is none."""
+"""Fewest samples of that share for the test."""
 LARGER = 4.0
-"""Residuals of a beginning over the others; of Gauss's, coloured or not, 1 in 10 000 have it."""
+"""Ratio of initial residuals to the others above which a message is given; Gaussian residuals,
+white or autocorrelated, exceed it in 1 of 10 000 cases.
+"""
 
 
 def beginnings(found: Minimum) -> Iterator[str]:
-    """A sentence for each channel whose record begins with what the model does not know.
+    """Yield a message for each channel whose first residuals are much larger than the others.
 
-    Limits: of records in order of time with a velocity among the regressors. A model that is wrong
+    Limits: records in order of time with a velocity among the regressors. A model that is wrong
     at the beginning for another reason, such as a decay from its largest swing, looks the same.
     """
     for channel in found.channels:
@@ -79,13 +82,13 @@ def beginnings(found: Minimum) -> Iterator[str]:
         if ratio > LARGER:
             yield (
                 f"The residuals of {found.label(channel)} are {ratio:.2g} times as large in its "
-                f"first {count} samples as after: the record begins loaded, or with other states "
-                "unknown; begin it in sliding, or unloaded."
+                f"first {count} samples as after: the record starts under load or in another "
+                "unknown state; start it in sliding, or unloaded."
             )
 
 
 def _ratio(found: Minimum, channel: Channel) -> tuple[float, int]:
-    """Size of the residuals at the beginning over that of the others, and samples of it."""
+    """Return the ratio of initial to later residuals, and the number of initial samples."""
     v, r = channel.regressors.get("v"), found.r[channel.rows]
     count = int(FIRST * r.size)
     if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
@@ -95,38 +98,37 @@ def _ratio(found: Minimum, channel: Channel) -> tuple[float, int]:
 
 
 ALARM = 0.02
-"""Chance of a false alarm over all tests of a fit."""
+"""Probability of a false alarm over all tests of a fit."""
 WHITE = 0.05
-"""Level of the test for white noise of one channel, which decides nothing."""
+"""Level of the test for white noise of one channel, which does not affect the verdict."""
 SHARE = 0.05
-"""Share of the variance of the residuals from which on a dependence counts."""
+"""Share of the variance of the residuals above which a dependence counts."""
 SMOOTHED = 5e-3
-"""Share of the range of a signal that the smoothing of an acceleration may leave of its own."""
+"""Size of a dependence on a smoothed acceleration that is ignored, over the range of a signal."""
 UNEXPLAINED = 0.7
-"""Residuals over the spread of the signal from which on a model says next to nothing."""
+"""Residuals over the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
-"""Residuals over the spread of the signal from which on a fit rests on a fifth of its variance."""
+"""The same without a value at a bound: the fit rests on a fifth of the variance."""
 CHANCE = 10.0
-"""What a model explains, over what as many free numbers explain of noise, that is no chance."""
+"""Smallest ratio of explained variance to that of as many regressors of pure noise."""
 INERTIA = ("kg", "kg m^2")
 NEARLY = 0.1
-"""Share of the cost that a step may still gain of an unfinished search whose residuals fail tests:
-they do not fail them for want of that step."""
+"""Largest remaining gain of an unfinished search, over the cost, at which failed tests count."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Test:
-    """One question to the residuals.
+    """Result of one test of the residuals.
 
     Attributes:
-        channel: signal, with the number of its record where there are several: "force[2]".
+        channel: signal, with the number of its record if there are several: "force[2]".
         name: "whiteness", "independence of ...", "size", "explained", "bound".
-        statistic, p: of the test, and the chance of a larger statistic if the model is right.
-        limit: p below which the test fails; for `size` and `explained` that of the statistic.
-        passed: whether it did not fail.
+        statistic, p: statistic, and the probability of a larger one if the model is correct.
+        limit: p below which the test fails; for `size` and `explained` the limit of the statistic.
+        passed: True unless the test failed.
         decides: whether failing makes the fit doubtful.
-        sentence: what was found.
+        sentence: the finding.
     """
 
     __test__ = False  # not one of pytest
@@ -144,14 +146,14 @@ class Test:
 @final
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What the residuals say of a fit.
+    """Assessment of a fit by its residuals.
 
     Attributes:
-        tests: all that was asked.
+        tests: all tests.
         effective: number of independent samples of each channel.
         whiteness: autocorrelations of each channel with their limits, for a plot over lags.
-        nonsense: why the result is no physics; empty if it may be.
-        sentences: what a reader has to know, worst first.
+        nonsense: reasons why the result is physically implausible; empty if there are none.
+        sentences: messages for the reader, worst first.
     """
 
     tests: tuple[Test, ...]
@@ -162,17 +164,17 @@ class Verdict:
 
     @property
     def good(self) -> bool:
-        """Whether nothing speaks against the model."""
+        """True if no test speaks against the model."""
         return not self.nonsense and all(t.passed for t in self.tests if t.decides)
 
     def status(self, solved: Status, gain: float = inf) -> Status:
-        """How the fit ended, if the solver ended so.
+        """Return the status of the fit from that of the solver.
 
         Args:
-            solved: of the solver.
-            gain: share of the cost that a step promises where the solver ran out of evaluations. Of
-                little, a model that fails its tests is doubtful as one at a minimum; one that
-                passes them, or far from a minimum, is unfinished and nothing else.
+            solved: status of the solver.
+            gain: predicted gain of a further step, over the cost, if the solver ran out of
+                evaluations. If it is small, a model that fails its tests is doubtful, as at
+                a minimum; if it is large, or the tests pass, the fit is unfinished.
         """
         if self.good:
             return solved
@@ -184,16 +186,16 @@ class Verdict:
 
 
 def judge(task: Task, point: Point, findings: Findings | None = None) -> Verdict:
-    """The verdict on a solved task; errors that were found in its data make it no physics."""
+    """Assess a solved task; errors in its data make the result implausible."""
     return judged(minimum(task, point), findings)
 
 
 def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
-    """The verdict on a minimum."""
+    """Assess a minimum."""
     inside = sandwich(found)
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
-    every = list[tuple[Channel, list[Dependence]]]()
+    each = list[tuple[Channel, list[Dependence]]]()
     for channel, colour in zip(found.channels, inside.colours, strict=True):
         name = found.label(channel)
         effective[name] = colour.effective
@@ -202,10 +204,10 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
         J = (found.J * ~found.held * found.gain[:, None])[channel.rows]
         white[name] = whiteness(r, J, position)
         tests.append(_white(name, white[name], colour))
-        every.append((channel, list(dependences(r, J, colour, clues_of(found, channel), position))))
+        each.append((channel, list(dependences(r, J, colour, inputs_of(found, channel), position))))
         tests += _size(found, channel, colour)
-    count = sum(len(some) for _, some in every)
-    for channel, some in every:
+    count = sum(len(some) for _, some in each)
+    for channel, some in each:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
     tests += _explained(found)
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
@@ -213,8 +215,8 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
     bounds = tuple(_bounds(found))
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
-    said = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)
-    return Verdict(tuple(tests), effective, white, nonsense, said)
+    messages = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)
+    return Verdict(tuple(tests), effective, white, nonsense, messages)
 
 
 def _white(name: str, found: Whiteness, colour: Colour) -> Test:
@@ -228,7 +230,7 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
         most = f"correlation {found.correlation[k]:.2f} over {found.lags[k]:.0f} samples"
         text = f"The residuals of {name} are not white ({most})"
         text += (
-            f": {colour.rows} of them count as {colour.effective:.0f}; the intervals allow for it."
+            f": {colour.rows} count as {colour.effective:.0f} independent ones in the intervals."
             if colour.order
             else ", too little to matter for the intervals."
         )
@@ -238,7 +240,7 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
 def _independent(
     found: Minimum, channel: Channel, some: list[Dependence], limit: float
 ) -> Iterator[Test]:
-    """One test a family; what cannot be told from rounding or is a small share does not count."""
+    """Yield one test for each family; effects below the resolution or with a small share pass."""
     name, unit = found.label(channel), channel.unit
     fine = resolution(channel.measured, channel.unit)
     level = _level(found, channel)
@@ -247,7 +249,7 @@ def _independent(
         least = SMOOTHED * float(np.ptp(channel.measured)) if d.smoothed else fine
         passed = d.p >= limit or size <= least or d.share < SHARE
         text = (
-            f"The residuals of {name} depend on {d.what}: {size:.2g} {unit} of them, "
+            f"The residuals of {name} depend on {d.what}: {size:.2g} {unit} rms, "
             f"{100 * min(d.share, 1.0):.0f} % of their variance ({d.hint})."
         )
         if passed:
@@ -257,16 +259,16 @@ def _independent(
 
 
 def _level(found: Minimum, channel: Channel) -> float:
-    """Unit of the signal over that of the weighted residuals."""
+    """Return the unit of the signal over that of the weighted residuals."""
     raw, r = found.raw[channel.rows], found.r[channel.rows]
     size = float(np.linalg.norm(r))
     return float(np.linalg.norm(raw)) / size if size > 0 else 1.0
 
 
 def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
-    """Residuals against a noise level that is known: chi2 with the effective number of samples.
+    """Compare residuals with a given noise level: chi2 with the effective number of samples.
 
-    Outliers count as much as the loss lets them: it was chosen because they are there.
+    With a robust loss, outliers count with their reduced weight.
     """
     from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
@@ -282,14 +284,14 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     limit = ALARM / len(found.channels)
     passed = p >= limit or rms <= resolution(channel.measured, channel.unit)
     text = (
-        f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the noise "
-        f"that was given."
+        f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the given "
+        f"noise level."
     )
     yield Test(name, "size", rms / sigma, p, limit, passed, True, text)
 
 
 def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
-    """Signal, sum of the squares of its residuals, and of what it deviates from its mean."""
+    """Yield each signal, the sum of squares of its residuals, and that of the centred signal."""
     for signal in dict.fromkeys(c.signal for c in found.channels):
         some = [c for c in found.channels if c.signal == signal]
         left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
@@ -297,25 +299,25 @@ def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
 
 
 def _explained(found: Minimum) -> Iterator[Test]:
-    """Whether a fit rests on enough of a signal: on all but its noise, or on a little beside it."""
+    """Test whether the model explains enough of each signal."""
     at = _at_bound(found)
     for signal, left, there in _left(found):
         share = float(np.sqrt(left / there)) if there > 0 else 0.0
         limit = UNEXPLAINED if at else LITTLE
         bound = f" and {', '.join(at)} at a bound" if at else ""
         text = (
-            f"The model leaves {100 * share:.3g} % of {signal} unexplained{bound}: take another "
+            f"The model leaves {100 * share:.3g} % of {signal} unexplained{bound}: use another "
             f"model, or, if {signal} is mostly noise or chatter, a lower cut-off with as many "
-            "samples an equation as it allows, InverseDynamics(filter=Filter(10.0, decimation=10))."
+            "samples per equation as allowed, InverseDynamics(filter=Filter(10.0, decimation=10))."
         )
         yield Test(signal, "explained", share, 0.0, limit, share < limit, True, text)
 
 
 def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:
-    """Signals of which a model leaves nearly everything.
+    """Yield a message for each signal that is almost entirely unexplained.
 
-    Of a signal that is mostly noise a right model leaves much; but what it explains is many times
-    the share k / n_eff that any k numbers explain of n_eff independent samples.
+    A correct model leaves much of a mostly noisy signal unexplained; but it explains many times the
+    share k / n_eff that any k parameters explain of n_eff independent samples of noise.
     """
     for signal, left, there in _left(found):
         some = [c for c in found.channels if c.signal == signal]
@@ -325,7 +327,7 @@ def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str
         if 1 - left / there < CHANCE * by_chance:
             yield (
                 f"The model leaves {100 * np.sqrt(left / there):.0f} % of {signal} unexplained: "
-                "another model, another column, another sign or another unit is needed."
+                "check the model, the columns of the data, their signs and their units."
             )
 
 
@@ -335,8 +337,8 @@ def _no_mass(found: Minimum) -> Iterator[str]:
         near = value <= unknown.lower + 1e-3 * max(abs(unknown.start), abs(unknown.lower))
         if held and unknown.unit in INERTIA and near:
             yield (
-                f"{unknown.name} is at its lower bound, {value:.3g} {unknown.unit}: the force has "
-                "nothing to do with the acceleration, or one of them has the wrong sign."
+                f"{unknown.name} is at its lower bound, {value:.3g} {unknown.unit}: the force does "
+                "not depend on the acceleration, or one of them has the wrong sign."
             )
 
 
@@ -348,4 +350,4 @@ def _at_bound(found: Minimum) -> list[str]:
 def _bounds(found: Minimum) -> Iterator[str]:
     at = _at_bound(found)
     if at:
-        yield f"At a bound: {', '.join(at)}."
+        yield f"Values at a bound: {', '.join(at)}."

@@ -1,8 +1,8 @@
-"""The end of a fit as arrays, and the combinations of parameters that the data cannot tell.
+"""Arrays at the minimum of a fit, and the combinations of parameters that are not identifiable.
 
-A direction of the values along which the residuals do not change, in which two values grow by the
-same factor, leaves their ratio; one in which they grow by the same amount, their difference. Where
-both descriptions fit one point, the residuals are evaluated a little way along both.
+Along a null direction the residuals do not change. If two values grow by the same factor along it,
+only their ratio is identifiable; if they grow by the same amount, only their difference. If both
+descriptions fit at one point, the residuals are evaluated at a small distance along both.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,15 +19,15 @@ from identification.unknowns.spec import Unknown
 Count = NDArray[np.int64]
 
 JITTER = 0.5
-"""Deviation from the usual step, over it, from which on the next row is no neighbour."""
+"""Relative deviation from the usual step above which the next row is no neighbour."""
 
 
 def positions(channel: Channel, *, across_windows: bool = False) -> Count:
-    """How many neighbours in time stand right before each row, shape (n,).
+    """Return the number of consecutive neighbours in time before each row, shape (n,).
 
-    0 starts a run: at the first row, at a break, where time jumps or stands still, and everywhere
-    if the channel has no order. `across_windows` lets a run go on over the breaks of windows
-    where time goes on: the noise of a sensor knows nothing of windows.
+    0 starts a run: at the first row, at a break, where time jumps or repeats, and everywhere if the
+    channel is unordered. `across_windows` continues a run over the breaks of windows if time
+    continues: the noise of a sensor does not depend on windows.
     """
     n = channel.t.size
     if not channel.ordered:
@@ -42,9 +42,9 @@ def positions(channel: Channel, *, across_windows: bool = False) -> Count:
 
 
 def places(channel: Channel) -> Count:
-    """Number of each row on the grid of the usual step, shape (n,); rows of one time share it.
+    """Return the index of each row on the grid of the usual step, shape (n,); equal times share it.
 
-    Where the times are on no grid the rows are counted, with a place left out at every gap.
+    If the times are not on a grid, rows are counted, with one number left out at every gap.
     """
     n = channel.t.size
     if not channel.ordered or n < 2:
@@ -57,13 +57,13 @@ def places(channel: Channel) -> Count:
 
 
 def lagged(signal: Array, position: Count, lag: int) -> Array:
-    """`signal` so many rows earlier; before the start of a run, the value at its start."""
+    """Return `signal` delayed by `lag` rows; before the start of a run, its first value."""
     back = np.minimum(position, lag)
     return signal[np.arange(signal.shape[0]) - back]
 
 
 def _step(t: Array) -> float:
-    """The usual distance of two rows."""
+    """Return the usual distance of two rows."""
     steps = np.diff(t)
     steps = steps[steps > 0]
     return float(np.median(steps)) if steps.size else 1.0
@@ -75,16 +75,16 @@ class Minimum:
     """A minimum of weighted least squares over n coordinates w, with k values that depend on them.
 
     Attributes:
-        channels: what the rows are.
-        unknowns: what has a coordinate, shape (n,).
-        names, values: of what the residuals take, shape (k,).
+        channels: groups of rows.
+        unknowns: one for each coordinate, shape (n,).
+        names, values: arguments of the residuals, shape (k,).
         slope: dvalues/dw, shape (k, n).
-        held: coordinates at a bound, shape (n,).
-        r: weighted residuals, with a robust loss its influence function of them, shape (rows,).
+        held: whether each coordinate is at a bound, shape (n,).
+        r: weighted residuals; with a robust loss their influence function, shape (rows,).
         J: dr/dw of the weighted residuals before the loss, shape (rows, n).
         gain: derivative of the influence function; one for squares, shape (rows,).
         raw: predicted - measured in SI units, shape (rows,).
-        noise: standard deviation of the noise of signals for which it is known.
+        noise: signal -> standard deviation of its noise, if known.
     """
 
     channels: Sequence[Channel]
@@ -100,16 +100,16 @@ class Minimum:
     noise: Mapping[str, float]
 
     def label(self, channel: Channel) -> str:
-        """Name of a channel for a sentence."""
+        """Return the name of a channel for a message."""
         records = {c.record for c in self.channels}
         return channel.signal if len(records) == 1 else f"{channel.signal}[{channel.record}]"
 
 
 def minimum(task: Task, point: Point) -> Minimum:
-    """The arrays of a solved task.
+    """Return the arrays of a solved task.
 
-    The derivative of the influence function psi = rho' r is taken as its mean over a channel
-    (Huber and Ronchetti, Robust Statistics, 2009, section 7.6), which is never negative in effect.
+    The derivative of the influence function psi = rho' r is averaged over each channel (Huber and
+    Ronchetti, Robust Statistics, 2009, section 7.6) and bounded below by 0.05.
     """
     gain = np.ones(point.r.size)
     if point.loss != "squares":
@@ -134,8 +134,8 @@ def minimum(task: Task, point: Point) -> Minimum:
     )
 
 
-def trace(task: Task, found: Minimum) -> Callable[[Array], float]:
-    """How much weighted residuals change with the values: root of the sum of squares."""
+def shift(task: Task, found: Minimum) -> Callable[[Array], float]:
+    """Return a function of the values: norm of the change of the weighted residuals."""
     sigma = task.sigma
 
     def change(values: Array) -> float:
@@ -147,42 +147,42 @@ def trace(task: Task, found: Minimum) -> Callable[[Array], float]:
     return change
 
 
-Trace = Callable[[Array], float]
-"""Values -> how much the residuals change with them."""
+Shift = Callable[[Array], float]
+"""Values -> norm of the change of the residuals."""
 
 SHARE = 1e-4
-"""Share of a direction below which a value has no part in it."""
+"""Share of a direction below which a value does not take part in it."""
 NEAR = 1e-2
-"""Distance from whole numbers that counts as whole."""
+"""Distance from whole numbers that is ignored."""
 STEP = 0.05
-"""Relative change of values with which two descriptions are told apart."""
+"""Relative change of values used to compare two descriptions."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Lost:
-    """A group of values of which the data tell fewer combinations than it has members.
+class Undetermined:
+    """A group of values with fewer identifiable combinations than members.
 
     Attributes:
-        members: numbers of the values.
-        sentence: what is told of them.
+        members: indices of the values.
+        sentence: message on the identifiable combinations.
     """
 
     members: tuple[int, ...]
     sentence: str
 
 
-def lost(
-    names: tuple[str, ...], values: Array, null: Array, size: Array, trace: Trace
-) -> Iterator[Lost]:
-    """Groups of values that the residuals do not determine.
+def groups(
+    names: tuple[str, ...], values: Array, null: Array, size: Array, change: Shift
+) -> Iterator[Undetermined]:
+    """Yield the groups of values that the residuals do not determine.
 
     Args:
         names: of the values.
         values: at the minimum, shape (k,).
-        null: independent directions of the values without a trace, shape (k, nullity).
+        null: independent directions of the values that leave the residuals unchanged, (k, nullity).
         size: sensitivity of the residuals to each value alone, above zero, shape (k,).
-        trace: asked at values a little way off.
+        change: norm of the change of the residuals, evaluated at nearby values.
     """
     scaled = null * size[:, None]
     scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
@@ -192,13 +192,13 @@ def lost(
     touched = np.flatnonzero(np.diag(shared) > SHARE**2)
     for group in _connected(shared > SHARE, touched.tolist()):
         members = list(group)
-        yield Lost(group, _sentence(_Group(names, values, members, basis, size), trace))
+        yield Undetermined(group, _sentence(_Group(names, values, members, basis, size), change))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Members of a group, and the directions of all values without a trace, scaled by `size`."""
+    """Members of a group, and the null directions of all values, scaled by `size`."""
 
     all_names: tuple[str, ...]
     all_values: Array
@@ -219,39 +219,39 @@ class _Group:
         return int((np.linalg.svd(self.basis[self.members], compute_uv=False) > 1e-6).sum())
 
     def gradient(self) -> Array:
-        """Of the one combination that is told, shape (d,)."""
+        """Return the gradient of the only identifiable combination, shape (d,)."""
         U, _, _ = np.linalg.svd(self.basis[self.members], full_matrices=True)
         return U[:, len(self.members) - 1] * self.size[self.members]
 
     def moved(self, change: Array) -> Array:
-        """All values, those of the members changed."""
+        """Return all values after a change of the members."""
         there = self.all_values.copy()
         there[self.members] += change
         return there
 
 
-def _sentence(group: _Group, trace: Trace) -> str:
-    """What is told of a group."""
-    names, told = group.names, len(group.members) - group.nullity
-    if told == 0:
+def _sentence(group: _Group, change: Shift) -> str:
+    """Return the message on a group."""
+    names, known = group.names, len(group.members) - group.nullity
+    if known == 0:
         which = "has" if len(names) == 1 else "have"
-        return f"{_and(names)} {which} no influence on what was measured."
-    if told > 1:
-        return f"Of {_and(names)} only {told} combinations are told, not each."
-    return f"Only {_told(group, trace)} is told, not {_and(names)} each."
+        return f"{_and(names)} {which} no influence on the measured signals."
+    if known > 1:
+        return f"Of {_and(names)} only {known} combinations are identifiable."
+    return f"Only {_combination(group, change)} is identifiable, not {_and(names)} each."
 
 
-def _told(group: _Group, trace: Trace) -> str:
-    """The one combination g'values that is told."""
+def _combination(group: _Group, change: Shift) -> str:
+    """Return the only identifiable combination g'values as text."""
     names, here, g = group.names, group.values, group.gradient()
-    powers, weights = _whole(g * here), _whole(g)
+    powers, weights = _small_integers(g * here), _small_integers(g)
     if powers is not None and weights is not None:
         factor = np.array([STEP / powers[0], -STEP / powers[1]])
         amount = STEP * here[0] * np.array([1 / weights[0], -1 / weights[1]])
         rest = np.zeros(here.size - 2)
         by_factor = group.moved(here * np.expm1(np.append(factor, rest)))
         by_amount = group.moved(np.append(amount, rest))
-        if trace(by_factor) < trace(by_amount):
+        if change(by_factor) < change(by_amount):
             weights = None
         else:
             powers = None
@@ -261,11 +261,11 @@ def _told(group: _Group, trace: Trace) -> str:
         return _sum(names, weights)
     g = g / g[np.argmax(np.abs(g))]
     terms = " + ".join(f"{c:.3g} {n}" for n, c in zip(names, g, strict=True)).replace("+ -", "- ")
-    return f"{terms} (close to what was found)"
+    return f"{terms} (near the estimate)"
 
 
-def _whole(g: Array) -> Array | None:
-    """G over its smallest entry if that makes small whole numbers, the first one positive."""
+def _small_integers(g: Array) -> Array | None:
+    """Return g over its smallest entry if that gives small integers, the first one positive."""
     smallest = float(np.abs(g).min())
     if not smallest > 1e-12 * float(np.abs(g).max()):
         return None
@@ -302,7 +302,7 @@ def _and(names: list[str]) -> str:
 
 
 def _connected(linked: NDArray[np.bool_], members: list[int]) -> Iterator[tuple[int, ...]]:
-    """Connected sets of `members`."""
+    """Yield the connected subsets of `members`."""
     left = set(members)
     while left:
         group, edge = set[int](), {min(left)}

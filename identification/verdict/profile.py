@@ -1,12 +1,11 @@
-"""Profile likelihood: how badly the model fits if one value is held elsewhere and the rest adapt.
+"""Profile likelihood: increase of the cost when one value is held elsewhere and the others adapt.
 
     rise(c) = min over the others of  [cost(value = c) - cost at the minimum] / (s^2 kappa)
 
-s^2 is the variance of the weighted residuals and kappa the factor by which their colour widens the
-linear interval, so that the interval in which rise <= t^2 (Student's t, 95 %) agrees with that of
-`Covariance` where the model is linear, and is right also where it is not. Noise levels stay those
-of the fit. The value is walked away from its minimum to both sides, each point starting where the
-one before ended.
+s^2 is the variance of the weighted residuals and kappa the factor by which their autocorrelation
+widens the linear interval. The interval in which rise <= t^2 (Student's t, 95 %) agrees with that
+of `Covariance` if the model is linear, and also holds if it is not. Noise levels stay those of the
+fit. The value moves away from its minimum to both sides; each point starts from the previous one.
 Sources: Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6; Raue et al.,
 Bioinformatics 25(15), 2009.
 """
@@ -29,13 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 12
-"""Most steps to one side."""
+"""Largest number of additional steps to one side."""
 FLAT = 0.02
 """Share of the limit below which a profile counts as flat."""
 BLIND = 0.1
-"""First step, over the value, where the linear theory knows none."""
+"""First step, over the value, without a linear standard error."""
 EVALUATIONS = 30
-"""Of the residuals, for one point."""
+"""Largest number of residual evaluations for one point."""
 
 
 @final
@@ -45,15 +44,15 @@ class Profile:
 
     Attributes:
         name, unit: of the value.
-        best: where the fit has it.
+        best: the value of the fit.
         values: in increasing order, `best` among them, shape (n,).
         rise: increase of the cost in variances, shape (n,).
-        others: the values of all names at each point, shape (n, k).
+        others: all values at each point, shape (n, k).
         names: of the columns of `others`.
         limit: of the rise, at the ends of the 95 % interval.
-        low, high: 95 % interval; None where the limit was not reached.
-        logarithmic: whether steps were taken in the logarithm.
-        sentences: what a reader has to know: open or flat sides, a better minimum.
+        low, high: 95 % interval; None if the limit was not reached.
+        logarithmic: whether steps are taken in the logarithm.
+        sentences: messages for the reader: open or flat sides, a better minimum.
     """
 
     name: str
@@ -81,16 +80,16 @@ class Profile:
             for x in (self.best, self.low, self.high)
         )
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        said = f"{self.name}: {best}{unit}, 95 %: {' to '.join(sides)}."
-        return " ".join([said, *self.sentences])
+        text = f"{self.name}: {best}{unit}, 95 %: {' to '.join(sides)}."
+        return " ".join([text, *self.sentences])
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data, ready for JSON."""
+        """Return all fields as plain data, ready for JSON."""
         arrays = {n: getattr(self, n).tolist() for n in ("values", "rise", "others")}
         return self.__dict__ | arrays | {n: list(getattr(self, n)) for n in ("names", "sentences")}
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """The rise over the value, with the limit of 95 % and the parabola of the linear theory.
+        """Plot the rise over the value, with the 95 % limit.
 
         Args:
             path: image file.
@@ -100,7 +99,7 @@ class Profile:
 
         figure, (axis,) = panels(1, width=5.5, height=3.2)
         axis.plot(self.values, self.rise, "o-", ms=4, lw=1.3, label="profile")
-        axis.axhline(self.limit, color=colour(1), lw=1, ls="--", label="limit of 95 %")
+        axis.axhline(self.limit, color=colour(1), lw=1, ls="--", label="95 % limit")
         axis.plot([self.best], [0.0], "k|", ms=14, label="fit")
         for end in (self.low, self.high):
             if end is not None:
@@ -119,13 +118,13 @@ class Profile:
 def profile(
     task: Task, point: Point, covariance: Covariance, name: str, points: int = 5
 ) -> Profile:
-    """Walk one value away from its minimum until the fit is worse than 95 % allow.
+    """Move one value away from its minimum until the fit is worse than the 95 % limit.
 
     Args:
         task, point: the solved task and its minimum.
         covariance: its linear intervals; they give steps and the limit.
         name: of the value.
-        points: about how many to each side.
+        points: approximate number of points to each side.
 
     Raises:
         ValueError: an unknown name, or a value that was not fitted.
@@ -138,10 +137,10 @@ def profile(
     values = np.array([s[0] for s in stations])
     rise = np.array([s[1] for s in stations])
     low, high = (_crossing(walk, side.stations) for side in (down, up))
-    said = [*_said(walk, down, low, "below"), *_said(walk, up, high, "above")]
+    messages = [*_open_side(walk, down, low, "below"), *_open_side(walk, up, high, "above")]
     if rise.min() < -FLAT * walk.limit:
         better = float(values[np.argmin(rise)])
-        said.append(f"The model fits better at {name} = {better:.4g}: the fit is no minimum.")
+        messages.append(f"The cost is lower at {name} = {better:.4g}: the fit is not a minimum.")
     return Profile(
         name=name,
         unit=walk.unit,
@@ -154,7 +153,7 @@ def profile(
         low=low,
         high=high,
         logarithmic=walk.logarithmic,
-        sentences=tuple(said),
+        sentences=tuple(messages),
     )
 
 
@@ -172,7 +171,7 @@ class _Side:
 @final
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """What stays the same along a profile."""
+    """Quantities that stay the same along a profile."""
 
     task: Task
     point: Point
@@ -216,11 +215,11 @@ class _Walk:
         )
 
     def at(self, distance: float) -> float:
-        """The value so far away."""
+        """Return the value at a distance from the minimum."""
         return self.best * float(np.exp(distance)) if self.logarithmic else self.best + distance
 
     def side(self, direction: int, points: int) -> _Side:
-        """Stations on one side, nearest first, until the limit is crossed or nothing goes on."""
+        """Return the stations on one side, nearest first, up to the limit or the search's end."""
         stations, w = list[Station](), self.point.w
         distance, step = 0.0, self.step / (points - 1)
         unknown = self.task.unknowns.unknowns[self.own]
@@ -234,22 +233,22 @@ class _Walk:
             except KeyboardInterrupt:
                 return _Side(stations, "an interruption")
             if isinstance(found, str):
-                return _Side(stations, f"a value with which there is no fit ({found})")
+                return _Side(stations, f"a value without a fit ({found})")
             w = found.w
             rise = (found.cost - self.point.cost) / self.scale
             stations.append((c, rise, found.values))
             if rise >= self.limit:
                 return _Side(stations, "")
-            if count >= points:  # the linear theory was too short: go faster
+            if count >= points:  # the linear theory was too short: increase the step
                 step *= 1.6
         return _Side(stations, "the end of the search")
 
 
 def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str:
-    """The minimum over all others with value `index` held at c, from `w`; or why there is none.
+    """Minimise over the others with value `index` held at c, from `w`; a reason if impossible.
 
-    The coordinate of the value is eliminated: w_own solves value(w) = c, and with it the column of
-    the derivatives, J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
+    The coordinate of the value is eliminated: w_own solves value(w) = c. The derivatives become
+    J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
     """
     optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
     box, others = task.unknowns, np.arange(w.size) != own
@@ -296,7 +295,7 @@ def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str
 
 
 def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | None:
-    """`near` with the coordinate `own` moved so that the value is c; None outside its box."""
+    """Return `near` with coordinate `own` solved for value c; None outside its bounds."""
     box, w = task.unknowns, near.copy()
     for _ in range(30):
         miss = c - float(box.values(w)[index])
@@ -309,7 +308,7 @@ def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | 
 
 
 def _crossing(walk: _Walk, stations: list[Station]) -> float | None:
-    """Where the root of the rise, nearly straight, meets that of the limit."""
+    """Return the value at the limit, by interpolation of the square root of the rise."""
     last = (walk.best, 0.0)
     for value, rise, _ in stations:
         if rise >= walk.limit:
@@ -322,12 +321,12 @@ def _crossing(walk: _Walk, stations: list[Station]) -> float | None:
     return None
 
 
-def _said(walk: _Walk, side: _Side, end: float | None, where: str) -> list[str]:
-    """Why a side is open."""
+def _open_side(walk: _Walk, side: _Side, end: float | None, where: str) -> list[str]:
+    """Return the message for a side that does not reach the limit."""
     if end is not None:
         return []
     if not side.stations:
-        return [f"{walk.name} is open {where}: it meets {side.why} at once."]
+        return [f"{walk.name} is open {where}: it reaches {side.why} at once."]
     value, rise, _ = side.stations[-1]
     how = "flat" if rise < FLAT * walk.limit else "open"
     share = f"the rise is {100 * max(rise, 0.0) / walk.limit:.0f} % of the limit"

@@ -1,1 +1,1 @@
-"""Homotopy in the widths of friction laws, modes of contacts, and the exact law as referee."""
+"""Optimal control with friction: homotopy, contact modes, verification by event simulation."""

@@ -1,4 +1,4 @@
-"""A sequence of modes solved: its durations, its motion, and the solution of the user's problem."""
+"""Solution of a mode sequence: durations, motion, and the solution of the user's problem."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,24 +30,24 @@ from symfric.foundation.variable import stacked
 
 Array = NDArray[np.float64]
 LEAST = 3
-"""Intervals of the shortest arc."""
+"""Fewest intervals of an arc."""
 NEAR = 1.5
-"""Margins from its level at which a rest is no closer than it need be."""
+"""Distance of a stick interval from its static level that counts as close, in margins."""
 CLOSE: dict[str, Option] = {"constr_mult_init_max": 1e8}
-"""Options of a start that is nearly a solution: estimated multipliers are kept however large they
-are. Ipopt sets those above 1e3 to zero, and loses the way from the solution on another mesh:
+"""Options for a start near the solution: estimated multipliers are kept even if they are large.
+Ipopt sets those above 1e3 to zero, and then diverges from the solution on another mesh:
 cart-pendulum, twice as many intervals, 9 iterations instead of more than 100."""
 FINER: dict[str, Option] = CLOSE | {"perturb_always_cd": "yes"}
-"""The same on a finer mesh. Where a rest follows its level the rows of short intervals nearly
-depend on each other. Unless Ipopt always regularises them, MUMPS delays pivots until its fronts are
-dense: an arm with 700 intervals, more than 30 s for one factorisation instead of 0.1 s."""
+"""The same for a finer mesh. Where stiction is at its level, the rows of short intervals are nearly
+dependent. Unless Ipopt always regularises them, MUMPS delays pivots until its fronts are dense:
+for an arm with 700 intervals, more than 30 s for one factorisation instead of 0.1 s."""
 KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A sequence with the durations that were found for it."""
+    """A mode sequence with its optimised durations."""
 
     legs: tuple[Leg, ...]
     discretisation: Discretisation
@@ -56,12 +56,12 @@ class Solved:
 
     @cached_property
     def points(self) -> Points:
-        """The motion of all arcs."""
+        """Motion of all arcs."""
         return self.transcription.unpack(self.outcome.iterate.w)
 
     @cached_property
     def known(self) -> Known:
-        """The motion, to start from."""
+        """Motion, as a starting point."""
         t, points = self.transcription, self.points
         spans = list(enumerate(t.problem.spans))
         scheme = t.scheme.coefficients()
@@ -71,23 +71,23 @@ class Solved:
 
     @cached_property
     def losses(self) -> tuple[Array, ...]:
-        """What holding the inputs costs in each interval."""
+        """Cost of holding the inputs in each interval."""
         iterate = self.outcome.iterate
         return zoh_losses(self.transcription, iterate.w, iterate.lam_g)
 
     @property
     def loss(self) -> float:
-        """The same over all intervals."""
+        """Cost of holding the inputs over all intervals."""
         return sum(float(loss.sum()) for loss in self.losses)
 
     @property
     def ideal_cost(self) -> float:
-        """J of inputs that need not be held: compares sequences on different meshes."""
+        """Cost J without the cost of holding the inputs: compares sequences on different meshes."""
         return self.outcome.cost - self.loss
 
     @cached_property
     def overloaded(self) -> tuple[NDArray[np.bool_], ...]:
-        """Intervals at whose start, before their first point, a rest asks for too much force."""
+        """Intervals at whose start, before their first point, stiction exceeds its static level."""
         found: list[NDArray[np.bool_]] = []
         spans, arcs = self.transcription.problem.spans, flat(self.legs)
         for span, arc, points in zip(spans, arcs, self.points.spans, strict=True):
@@ -102,7 +102,7 @@ class Solved:
         return tuple(found)
 
     def pressed(self, margin: float) -> bool:
-        """Whether some rest, or what ends or begins one, is as close to its level as it may be."""
+        """Return True if stiction, or its start or end, is as close to its level as permitted."""
         spans = self.transcription.problem.spans
         for span, points in zip(spans, self.points.spans, strict=True):
             outputs = span.model.outputs
@@ -120,29 +120,29 @@ class Solved:
 
     @property
     def ok(self) -> bool:
-        """Whether this is a solution."""
+        """True if the solver found a solution."""
         return self.outcome.status.ok
 
     @property
     def intervals(self) -> int:
-        """Their number."""
+        """Number of intervals."""
         return sum(mesh.size - 1 for mesh in self.transcription.meshes)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ModeSolver:
-    """What all sequences of one problem share.
+    """Settings common to all sequences of one problem.
 
     Attributes:
-        problem: the user's.
+        problem: the user's problem.
         sizes: contact -> typical static level [N].
-        at_rest: contacts that are at rest at the start.
+        at_rest: contacts that stick at the start.
         solver, scheme, progress: as in `optimise_modes`.
         shortest: least duration of an arc [s].
-        kick: least length of the interval in which a contact breaks away or is caught [s].
-        margin: share of the static level that rests keep from it.
-        clock: when to stop.
+        kick: least length of the interval in which a contact breaks away or is stopped [s].
+        margin: friction margin: share of the static level that stiction keeps from it.
+        clock: time limit.
     """
 
     problem: Problem
@@ -157,13 +157,13 @@ class ModeSolver:
     clock: Clock = field(default_factory=Clock)
 
     def solve(self, legs: Sequence[Leg], known: Known, intervals: int, barrier: float) -> Solved:
-        """Find the durations and the motion of a sequence.
+        """Optimise the durations and the motion of a sequence.
 
         Args:
-            legs: the sequence, where to look for `known`.
-            known: a motion to start from.
-            intervals: about how many, all of a length.
-            barrier: parameter of the interior-point method to start with: small from close by.
+            legs: the sequence, with the times in `known`.
+            known: initial motion.
+            intervals: approximate number of intervals, of equal length.
+            barrier: parameter of the interior-point method at the start: small near a solution.
         """
         whole = sum(leg.duration for leg in legs)
         parts = [max(LEAST, round(intervals * arc.duration / whole)) for arc in flat(legs)]
@@ -171,13 +171,13 @@ class ModeSolver:
         return self.on(legs, self.discretised(legs), meshes, known, barrier, CLOSE)
 
     def discretised(self, legs: Sequence[Leg]) -> Discretisation:
-        """The problem of a sequence, ready for meshes."""
+        """Return the problem of a sequence, discretised except for its meshes."""
         rests = self.sizes, self.at_rest, self.shortest, self.margin
         problem = in_arcs(self.problem, legs, *rests)
         return discretise(problem, self.scheme, _sawn(problem))
 
     def again(self, solved: Solved) -> Solved:
-        """A motion that was found with another margin, on its meshes."""
+        """Solve again with this margin, from a motion with another one, on its meshes."""
         made = self.discretised(solved.legs)
         return self.on(solved.legs, made, solved.transcription.meshes, solved.known, 1e-4)
 
@@ -190,7 +190,7 @@ class ModeSolver:
         barrier: float,
         options: Mapping[str, Option] = FINER,
     ) -> Solved:
-        """The same on given meshes."""
+        """Solve a sequence on given meshes."""
         spans, arcs = discretisation.problem.spans, flat(legs)
         meshes = [
             _with_kick(mesh, self.kick / arc.duration) if breaks_away(span) else mesh
@@ -209,7 +209,7 @@ class ModeSolver:
 
 
 def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> Array:
-    """Return values of expressions at the starts of all intervals of a span, (rows, N)."""
+    """Return values of expressions at the starts of all intervals of a phase, (rows, N)."""
     n = points.u.shape[1]
     rows = ca.Function("rows", span.symbols, [stacked(map(ca.SX, expressions))]).map(n)
     z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
@@ -217,10 +217,10 @@ def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> 
 
 
 def _sawn(problem: Problem) -> dict[int, list[Row]]:
-    """Of each arc the rooms of rests that jump with the inputs: asked for where these begin.
+    """Return the friction margins of each arc that depend on inputs, for starts of intervals.
 
-    Where the force at rest follows its level, inputs that are held make a saw of it, whose teeth
-    stand at the starts of intervals, between collocation points.
+    If the stiction force is at its level, held inputs make it a sawtooth, whose peaks are at the
+    starts of intervals, between collocation points.
     """
     found: dict[int, list[Row]] = {}
     for number, span in enumerate(problem.spans):
@@ -234,10 +234,10 @@ def _sawn(problem: Problem) -> dict[int, list[Row]]:
 
 
 def _with_kick(mesh: Array, kick: float) -> Array:
-    """`mesh` whose first interval is not shorter than `kick`, where two more remain.
+    """Return `mesh` with a first interval of at least `kick`, if enough intervals remain.
 
-    A control may break a contact away by a kick and then go on with less than its static level. The
-    shorter the kick the less it costs, without end: its length has to be given.
+    A control may break a contact away by a pulse and then stay below its static level. The cost
+    decreases with the length of the pulse without limit: its length has to be given.
     """
     kept = mesh[(mesh == 0.0) | (mesh >= kick)]
     return kept if kept.size > LEAST else mesh
@@ -246,9 +246,9 @@ def _with_kick(mesh: Array, kick: float) -> Array:
 def reassemble(
     problem: Problem, solved: Solved, statistics: Sequence[SolverStatistics]
 ) -> Solution:
-    """The solution of `problem` that the arcs of `solved` are.
+    """Reassemble the arcs of `solved` into a solution of `problem`.
 
-    States of laws that mode models do not have are zero in it.
+    Law states that mode models do not have are set to zero.
     """
     points, meshes = _joined(problem, solved)
     t = solved.transcription
@@ -269,14 +269,14 @@ def reassemble(
         scheme=t.scheme,
         meshes=meshes,
         points=points,
-        iterate=Iterate.cold(np.zeros(0), 0),  # its program is not that of the problem
+        iterate=Iterate.cold(np.zeros(0), 0),  # its program differs from that of the problem
         modes=modes_of(solved.legs),
         cause=outcome.cause,
     )
 
 
 def modes_of(legs: Sequence[Leg]) -> dict[str, tuple[Mode, ...]]:
-    """Contact -> what it does when."""
+    """Return contact -> its modes over time."""
     return {
         contact: tuple(Mode(KINDS[run.mode], run.begin, run.end) for run in runs)
         for contact, runs in tracks_of(legs).items()
@@ -284,7 +284,7 @@ def modes_of(legs: Sequence[Leg]) -> dict[str, tuple[Mode, ...]]:
 
 
 def _joined(problem: Problem, solved: Solved) -> tuple[Points, tuple[Array, ...]]:
-    """Points and meshes of the user's phases."""
+    """Return points and meshes of the user's phases."""
     t, points = solved.transcription, solved.points
     arcs = list(zip(t.problem.spans, points.spans, t.meshes, strict=True))
     spans: list[SpanPoints] = []
@@ -299,7 +299,7 @@ def _joined(problem: Problem, solved: Solved) -> tuple[Points, tuple[Array, ...]
 
 
 def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> SpanPoints:
-    """The points of one phase, of its model."""
+    """Return the points of one phase, for its own model."""
     nodes = [_rows(span.model.x, own.model.x, p.nodes)[:, int(k > 0) :]
              for k, (own, p, _) in enumerate(arcs)]  # fmt: skip
     return SpanPoints(
@@ -312,7 +312,7 @@ def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> 
 
 
 def _rows(wanted: Sequence[Variable], there: Sequence[Variable], values: Array) -> Array:
-    """Rows of `values` by name; zero for what is not there."""
+    """Return rows of `values` by name; zero for absent ones."""
     rows = {v.name: row for v, row in zip(there, values, strict=True)}
     zero = np.zeros(values.shape[1])
     return np.array([rows.get(v.name, zero) for v in wanted]).reshape(-1, values.shape[1])
@@ -321,7 +321,7 @@ def _rows(wanted: Sequence[Variable], there: Sequence[Variable], values: Array) 
 def _mesh(
     problem: Problem, number: int, legs: Sequence[Leg], arcs: Sequence[tuple[float, Array]]
 ) -> Array:
-    """Fractions of the duration of a phase, with its via points exactly where they are."""
+    """Return the mesh of a phase as fractions of its duration, with exact via points."""
     fractions = [0.0, *sorted(problem.chain[number].via), 1.0]
     found = [np.zeros(1)]
     first = 0
@@ -337,7 +337,7 @@ def _mesh(
 
 
 def _with_forces(motion: Motion, arcs: Motion) -> Motion:
-    """`motion` with the signals of the arcs, in which friction at rest is a reaction."""
+    """Return `motion` with the signals of the arcs, in which stiction is a reaction."""
     if motion.t.size != arcs.t.size:
         return motion
     signals = {name: arcs.signals.get(name, row) for name, row in motion.signals.items()}

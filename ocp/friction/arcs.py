@@ -1,26 +1,26 @@
-"""From a sequence of modes to a problem of mode models: one phase for each arc.
+"""Multi-phase problem of a mode sequence: one phase of mode models for each arc.
 
-What the user has written holds in all arcs of his phases, by name. To it come the conditions under
-which the arcs are a motion with exact Coulomb friction and stiction, for each contact:
+The user's conditions hold by name in all arcs of his phases. In addition, the following conditions
+make the arcs a motion with exact Coulomb friction and stiction, for each contact:
 
-* it slips to the side of its mode: slip >= 0 or <= 0;
-* at rest the reaction is within the static level to both sides: |F| <= F_s;
-* where it changes its mode, slip = 0: at the end of slipping, and at the start of what follows;
-* what leaves rest, or turns round, breaks away: the force that would hold it at rest under the
-  control *after* that instant reaches the static level to that side. It may exceed it, since
-  controls jump, so that this is an inequality: equality would exclude such motions, and without it
-  a body could leave rest although friction can hold it, which costs less and is wrong.
+* it slips in the direction of its mode: slip >= 0 or <= 0;
+* in stick the reaction is within the static level in both directions: |F| <= F_s;
+* at a change of mode slip = 0: at the end of slipping, and at the start of the next mode;
+* at the end of stick, or at a reversal, it breaks away: the force that would hold it at rest under
+  the control *after* that instant reaches the static level in that direction. It may exceed it,
+  since controls jump, so this is an inequality: an equality would exclude such motions; without
+  the condition a body could leave rest although friction can hold it, with a lower, wrong cost;
 
-* what comes to rest as the control changes is caught: a moment early, and the control before would
-  turn it round. Then it slips back for this moment, and stops only if the force under the control
-  after is below that of sliding, not just below the static level.
+* a contact that sticks when the control changes is caught: slightly earlier, the previous control
+  would reverse it. It would then slip back for a moment, and stop only if the force under the next
+  control is below the sliding force, not just below the static level;
 
-* what comes to rest is stopped by a share of the sliding force: where slip only touches zero, or
-  more than that force would be needed after a jump of the control, the least deviation lets it slip
-  on, past the rest.
+* a contact that sticks is stopped by a share of the sliding force: if slip only touches zero, or
+  a larger force would be needed after a jump of the control, the smallest deviation would let it
+  continue to slip.
 
-Conditions that depend on each other are written once, for solvers need independent ones: at rest
-slip stays zero by itself, so nothing is asked of it at the end of a rest.
+Dependent conditions are stated once, since solvers need independent ones: in stick slip stays zero
+by itself, so no condition is imposed on it at the end of stick.
 Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical Methods for Optimal
 Control, 2nd ed., 2010, 2.8 and 3.7 (phases, linkage conditions).
 """
@@ -42,21 +42,21 @@ from symfric.foundation.variable import stacked
 from symfric.model import Contact, Model
 
 MARGIN = 1e-2
-"""Share of the static level that a rest keeps away from it at first, and by which a control that
-jumps exceeds it where it breaks away: a smooth law creeps over its peak a little below and stays on
-it a little above for long, and where the force follows its limit, controls that are held make a saw
-of it. Where the contact leaves by a force that cannot jump the rest gives that up at last."""
+"""Initial friction margin: share of the static level that stiction keeps from it, and by which a
+jumping control exceeds it at break-away. Near its peak a smooth law creeps below it and stays for
+long above it, and where the force follows its limit, held controls make a sawtooth of it. If the
+contact breaks away by a force that cannot jump, the margin is reduced to zero at the end."""
 
 FADE = 1e-3
-"""For how long before, as a share of the whole duration."""
+"""Duration of that reduction, as a share of the whole duration."""
 
 LEVEL = -1e-6
-"""What is allowed on that side: at its end the rest is at its level, which the condition of
-breaking away says already, and two conditions would depend on each other."""
+"""Friction margin in that direction: at its end stiction is at its level, which the break-away
+condition already states, and two conditions would be dependent."""
 
 SIGN = 1e-7
-"""Sliding velocity by which one that is no state may have the wrong sign: at the ends of slipping,
-where it is zero, two conditions would depend on each other."""
+"""Sliding velocity by which one that is not a state may have the wrong sign: at the ends of
+slipping, where it is zero, two conditions would be dependent."""
 
 Ranges = dict[str, Range]
 Value = TypeVar("Value")
@@ -68,13 +68,13 @@ class Place:
     """An arc among its neighbours.
 
     Attributes:
-        number: of the arc.
+        number: index of the arc.
         model: the user's, with contacts.
-        leg: the leg it is in.
-        opens, closes: whether it is the first, the last one of the user's phase.
-        ends: whether it is the last one of its leg.
-        before, after: modes of the neighbours, where states are continuous; else empty.
-        leaves: resting contact -> the side to which it will leave, 0 where it does not.
+        leg: its mode interval.
+        opens, closes: whether it is the first or last one of the user's phase.
+        ends: whether it is the last one of its mode interval.
+        before, after: modes of the neighbours if states are continuous; else empty.
+        leaves: sticking contact -> direction of its next slip, 0 if it keeps sticking.
     """
 
     number: int
@@ -90,7 +90,7 @@ class Place:
 
 
 def places_of(problem: Problem, legs: Sequence[Leg]) -> tuple[Place, ...]:
-    """All arcs among their neighbours."""
+    """Return all arcs among their neighbours."""
     pairs = [(leg, k) for leg in legs for k in range(len(leg.arcs))]
     arcs = [leg.arcs[k] for leg, k in pairs]
     phases = [leg.phase for leg, _ in pairs]
@@ -132,15 +132,15 @@ def in_arcs(
     shortest: float,
     margin: float = MARGIN,
 ) -> Problem:
-    """The problem of mode models that follows the sequence `legs`, one phase for each arc.
+    """Return the problem of mode models for the sequence `legs`, one phase for each arc.
 
     Args:
-        problem: the user's.
-        legs: its arcs; their durations are where the solver starts.
+        problem: the user's problem.
+        legs: its arcs; their durations are initial values.
         sizes: contact -> typical static level [N], which scales conditions on forces.
-        at_rest: contacts that are at rest at the very start.
+        at_rest: contacts that stick at the start.
         shortest: least duration of an arc [s].
-        margin: share of the static level that rests and controls that break away keep from it.
+        margin: friction margin, as a share of the static level.
     """
     places = places_of(problem, legs)
     margins = margin, FADE * sum(leg.duration for leg in legs)
@@ -167,7 +167,7 @@ def _phase(
     shortest: float,
     margin: tuple[float, float],
 ) -> Phase:
-    """The phase of one arc: what the user says of it, and the conditions of its modes."""
+    """Return the phase of one arc: the user's conditions, and those of its modes."""
     base, modes = problem.chain[place.leg.phase], place.arc.modes
     released = [name for name in modes if _breaks_away(place, name, at_rest)]
     limited = {*problem.rates, *base.rates}
@@ -190,7 +190,7 @@ def _phase(
         end = _end_of(place, contact, end)
         inside = _inside(problem, place, contact, tight, margin[0])
         bounds |= inside
-        if not modes[contact.name]:  # between the start and the first point, too
+        if not modes[contact.name]:  # also between the start and the first point
             for side in SIDES.values():
                 row = inside[f"{contact.name}_{side}"]
                 start[f"{contact.name}{FIRST}{side}"] = row
@@ -218,7 +218,7 @@ def _phase(
 
 
 def _breaks_away(place: Place, name: str, at_rest: Sequence[str]) -> bool:
-    """Whether the contact slips from the start of this arc on, and did not slip that way before."""
+    """Return True if the contact starts to slip at the start of this arc, or reverses there."""
     mode = place.arc.modes[name]
     if not mode:
         return False
@@ -228,9 +228,9 @@ def _breaks_away(place: Place, name: str, at_rest: Sequence[str]) -> bool:
 
 
 def _pull(place: Place, name: str, limited: Collection[str], margin: float) -> Range:
-    """How far the force that would hold a contact exceeds its static level when it breaks away.
+    """Return the range of the excess of the holding force over the static level at break-away.
 
-    One that cannot jump was below it until then: it reaches the level exactly.
+    A force that cannot jump was below it until then: it reaches the level exactly.
     """
     modes = place.arc.modes
     if _jumps(place.model, modes, name, limited):
@@ -240,7 +240,7 @@ def _pull(place: Place, name: str, limited: Collection[str], margin: float) -> R
 
 
 def _starts_at_rest(place: Place, contact: Contact, at_rest: Sequence[str]) -> Ranges:
-    """The state that carries the slip, zero at the start of a rest and where the mode changes."""
+    """Return slip = 0 for its state, at the start of stick and at a change of mode."""
     name, state = contact.name, _state(place, contact)
     mode = place.arc.modes[name]
     was = place.before.get(name)
@@ -250,14 +250,14 @@ def _starts_at_rest(place: Place, contact: Contact, at_rest: Sequence[str]) -> R
 
 
 def _end(base: Phase, place: Place) -> Ranges:
-    """What the user asks for at the end of this arc: that of the phase, or of a via point."""
+    """Return the user's conditions at the end of this arc, if it ends a phase or at a via point."""
     if place.closes:
         return dict(base.end)
     return dict(base.via[sorted(base.via)[place.leg.part]]) if place.ends else {}
 
 
 def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
-    """`end` with slip = 0 where slipping ends, and without it where rest implies it."""
+    """Return `end` with slip = 0 at the end of slipping, and without it if stick implies it."""
     name, state = contact.name, _state(place, contact)
     mode, then = place.arc.modes[name], place.after.get(contact.name)
     if mode and then is not None and then != mode:
@@ -266,9 +266,9 @@ def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
 
 
 def _caught(place: Place, limited: Collection[str]) -> tuple[dict[str, int], dict[str, int]]:
-    """Contacts that come to rest under a control that may jump, and all that come to rest.
+    """Return contacts that stop under a control that may jump, and all contacts that stop.
 
-    With the sides to which they slipped.
+    Both with the direction of the previous slip.
     """
     modes = place.arc.modes
     stopped = {n: side for n, side in place.before.items() if side and modes.get(n) == 0}
@@ -281,7 +281,7 @@ def _caught(place: Place, limited: Collection[str]) -> tuple[dict[str, int], dic
 
 
 def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:
-    """Resting contacts that will leave by a force that cannot jump, and to which side."""
+    """Return sticking contacts that break away by a force that cannot jump -> direction."""
     modes = place.arc.modes
     return {
         name: side
@@ -293,7 +293,7 @@ def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:
 def _inside(
     problem: Problem, place: Place, contact: Contact, tight: Mapping[str, int], margin: float
 ) -> Ranges:
-    """The side of slipping, or the room of a rest, over the whole arc."""
+    """Return the direction of slip, or the friction margins in stick, over the whole arc."""
     name, mode = contact.name, place.arc.modes[contact.name]
     if not mode:
         open_side = tight.get(name)
@@ -310,19 +310,19 @@ def _inside(
 
 
 def _state(place: Place, contact: Contact) -> str | None:
-    """The state that carries the slip of a contact, if there is one."""
+    """Return the state that is proportional to the slip of a contact, if there is one."""
     found = carrier(place.model, contact)
     return None if found is None else found[0]
 
 
 def _jumps(model: Model, modes: Mapping[str, int], name: str, limited: Collection[str]) -> bool:
-    """Whether the force that holds a contact follows an input that may jump."""
+    """Return True if the force that holds a contact depends on an input that may jump."""
     inputs = stacked(v.symbol for v in model.u if v.name not in limited)
     return ca.depends_on(excess(model, modes, name, modes[name]), inputs)
 
 
 def _duration(problem: Problem, place: Place, shortest: float) -> float | Free:
-    """A duration of its own; that of the phase where it is all of that."""
+    """Return a free duration of the arc, or that of the phase if the arc is the whole phase."""
     T = problem.chain[place.leg.phase].T
     if place.opens and place.closes:
         return T
@@ -332,7 +332,7 @@ def _duration(problem: Problem, place: Place, shortest: float) -> float | Free:
 
 
 def _durations(problem: Problem, legs: Sequence[Leg]) -> tuple[Duration, ...]:
-    """What the durations of the arcs add up to: those of legs, and what the user asks for."""
+    """Return the sums of durations: of mode intervals, and as given by the user."""
     first = 0
     found: list[Duration] = []
     of_phase: dict[int, list[int]] = {}
@@ -354,5 +354,5 @@ def _durations(problem: Problem, legs: Sequence[Leg]) -> tuple[Duration, ...]:
 
 
 def _only(given: Mapping[str, Value], names: Collection[str]) -> dict[str, Value]:
-    """What is `given` for these names."""
+    """Return the entries of `given` for these names."""
     return {name: value for name, value in given.items() if name in names}

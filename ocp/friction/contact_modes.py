@@ -1,16 +1,16 @@
-"""Which contacts rest and which slide at an instant: Coulomb friction as a set, decided by trying.
+"""Stick and slip of contacts at an instant: set-valued Coulomb friction, decided by trial.
 
-A contact that stops, or rests already, rests if it can. With the modes of all contacts the
-equations are solved, and
+A contact that stops, or sticks already, sticks if it can. The equations are solved with the modes
+of all contacts, and
 
-    who rests    must hold: its reaction within the static levels of both sides; else it slides
-                 to the side that is overloaded
-    who begins to slide, must move to that side: d slip/dt >= 0 there; else it rests
+    sticking contacts   must have a reaction within the static levels of both directions; else they
+                        slip in the overloaded direction
+    contacts that start to slip must accelerate in that direction: d slip/dt >= 0; else they stick
 
-until nobody objects: one at a time, the most overloaded first, and each change solves everything
-again, since normal forces and what others carry change with it. If that goes round in circles all
-modes of the contacts without velocity are tried; a single consistent choice is taken, and if there
-is none, or more than one, nobody can decide.
+until all modes are consistent. One contact changes at a time, the most overloaded first, and each
+change solves everything again, since normal forces and other reactions change with it. If modes
+repeat, all modes of the contacts without velocity are tried; a single consistent combination is
+accepted. If there is none, or more than one, the modes are undetermined (`SolveError`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -33,22 +33,22 @@ from symfric.model import Contact, Event, Model
 Array = NDArray[np.float64]
 Modes = dict[str, int]
 OVERLOAD = 1e-9
-"""Share of the static level at the start by which a reaction passes it before it breaks away."""
+"""Excess of a reaction over the static level at break-away, over the level at the start."""
 STILL = 1e-11
-"""Sliding velocity over that of its states that counts as none."""
+"""Relative sliding velocity treated as zero, over the nominal values of its states."""
 TURNING = 1e-8
-"""Sliding acceleration, over the largest one, that is taken for rounding."""
+"""Sliding acceleration, over the largest one, that is rounding error."""
 LIFTED = 1e-9
-"""Share of its friction force below minus which a normal force is negative."""
+"""Share of the friction force by which a normal force may be negative."""
 MANY = 8
-"""Contacts without velocity whose modes are tried in all combinations, at most."""
+"""Largest number of contacts without velocity whose modes are tried in all combinations."""
 NEWTON_STEPS, NEWTON_TOLERANCE = 60, 1e-11
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """Where a model is when its modes are decided.
+    """State of a model for which its modes are decided.
 
     Attributes:
         t: time [s].
@@ -66,13 +66,13 @@ class Instant:
 @final
 @dataclass(frozen=True, eq=False)
 class InModes:
-    """A model in one mode of each contact, with its functions.
+    """A model with one mode for each contact, and its functions.
 
     Attributes:
-        model: ends where a contact that slides stops, or one that rests is overloaded.
+        model: with events at which a slipping contact stops or a sticking one is overloaded.
         modes: of the contacts.
         unknowns: (t, x, z, u, p) -> residual of the algebraic equations, and its slopes by z.
-        look: (t, x, z, u, p) -> for each contact room above, room below, d slip/dt, F, N.
+        look: (t, x, z, u, p) -> for each contact: margin above, margin below, d slip/dt, F, N.
     """
 
     model: Model
@@ -83,7 +83,7 @@ class InModes:
 
 @final
 class Machine:
-    """A model whose contacts are told apart by modes; one object for each choice of modes."""
+    """A model with contact modes; one `InModes` for each combination of modes, cached."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -92,18 +92,18 @@ class Machine:
         if bare.events:
             raise ValueError(
                 f"model '{model.name}': expected no events but those of contacts, got "
-                f"{', '.join(e.name for e in bare.events)}; their resets may set sliding off"
+                f"{', '.join(e.name for e in bare.events)}; their resets may start sliding"
             )
         self._made: dict[tuple[int, ...], InModes] = {}
         self.sizes = {c.name: nominal_load(model, c) for c in self.contacts}
-        """Typical loads of the contacts at rest [N]."""
+        """Typical holding forces of the contacts [N]."""
         self.together = {c.name: (c.name,) for c in self.contacts}
-        """Contacts that rest with each one."""
+        """Contacts that stick together with each one."""
         for loop in loops_of(model, self.contacts):
             names = tuple(c.name for c in loop.members)
             self.together |= dict.fromkeys(names, names)
         for c in self.contacts:
-            slip_change(model, c)  # refuses those that rest on an input
+            slip_change(model, c)  # raises for slips that depend on an input
         symbols = [bare.t, bare.vector("x"), model.vector("p")]
         slips = ca.vertcat(ca.SX(0, 1), *(c.slip for c in self.contacts))
         slopes = ca.densify(ca.jacobian(slips, bare.vector("x")))
@@ -111,10 +111,10 @@ class Machine:
         nominal = bare.nominal("x")
         touched = ca.DM(slopes.sparsity(), 1).full() != 0
         self.still = np.array([STILL * max(nominal[row], default=1.0) for row in touched])
-        """Sliding velocity of each contact [m/s] that counts as none."""
+        """Sliding velocity of each contact [m/s] treated as zero."""
 
     def within(self, modes: Modes) -> InModes:
-        """The model in these modes."""
+        """Return the model with these modes."""
         key = tuple(modes[c.name] for c in self.contacts)
         if key not in self._made:
             self._made[key] = self._make(modes)
@@ -151,14 +151,14 @@ class Machine:
         )  # fmt: skip
 
     def slips(self, t: float, x: Array, p: Array) -> tuple[Array, Array]:
-        """Sliding velocities, shape (n,), and their slopes by the states, (n, nx)."""
+        """Return sliding velocities, shape (n,), and their derivatives by the states, (n, nx)."""
         values, slopes = self._slips(t, x, p)
         return values.full()[:, 0], slopes.full()
 
     def at_rest(self, t: float, x: Array, p: Array, modes: Modes) -> Array:
-        """The nearest states in which contacts at rest do not slide at all.
+        """Return the nearest states in which sticking contacts have zero slip.
 
-        What rounding and the location of an event left is some 1e-11 of a velocity.
+        The correction removes rounding and event location errors, about 1e-11 of a velocity.
         """
         values, slopes = self.slips(t, x, p)
         held = [i for i, c in enumerate(self.contacts) if not modes[c.name]]
@@ -167,10 +167,10 @@ class Machine:
         return x - np.linalg.lstsq(slopes[held], values[held], rcond=None)[0]
 
     def solved(self, modes: Modes, at: Instant) -> tuple[dict[str, float], Array]:
-        """Algebraic unknowns in these modes by name, and what `InModes.look` sees.
+        """Return the algebraic unknowns with these modes by name, and the rows of `InModes.look`.
 
         Raises:
-            SolveError: Newton's method does not find them.
+            SolveError: Newton's method fails.
         """
         made = self.within(modes)
         names = [v.name for v in made.model.z]
@@ -192,10 +192,10 @@ class Machine:
                     break
             z = tried
             scale = np.maximum(scale, np.abs(z))
-        raise self.undecided(at.t, f"the reactions with modes {shown(modes)} are not found")
+        raise self.undecided(at.t, f"Newton's method found no reactions with {shown(modes)}")
 
     def room(self, modes: Modes, at: Instant) -> float:
-        """Least room of the contacts at rest over their nominal loads; below zero they slide."""
+        """Return the least friction margin of sticking contacts, over nominal loads; < 0: slip."""
         _, look = self.solved(modes, at)
         found = [
             min(row[0], row[1]) / self.sizes[c.name]
@@ -205,18 +205,18 @@ class Machine:
         return min(found, default=np.inf) + OVERLOAD
 
     def undecided(self, t: float, why: str) -> SolveError:
-        """The error of one who cannot decide."""
+        """Return the SolveError for undetermined contact modes."""
         return SolveError(
-            f"model '{self.model.name}' at t = {t:.9g} s: nobody can decide who rests: {why}",
+            f"model '{self.model.name}' at t = {t:.9g} s: no unique stick/slip mode: {why}",
             Status.SOLVER_FAILED,
         )
 
 
 def _ending(model: Model, events: tuple[Event, ...], rooms: Mapping[str, ca.SX]) -> Model:
-    """`model` with events, and the integrals of `rooms` as states.
+    """Return `model` with events, and the integrals of the margins `rooms` as states.
 
-    Nothing depends on them. They are there for error control, which would else step over a short
-    overload of what rests: nothing moves there.
+    Nothing depends on them. They make error control resolve a short overload of sticking contacts,
+    during which nothing moves.
     """
     states = tuple(Variable(name, "s") for name in rooms)
     rates = ca.vertcat(ca.SX(0, 1), *rooms.values())
@@ -236,21 +236,21 @@ def _guessed(name: str, guess: Mapping[str, float], start: Any, model: Model, p:
 
 
 def shown(modes: Modes) -> str:
-    """Modes in words."""
+    """Return modes as text."""
     words = {1: "slip+", 0: "stick", -1: "slip-"}
     return ", ".join(f"{name} {words[mode]}" for name, mode in modes.items())
 
 
 def decided(machine: Machine, at: Instant, modes: Modes) -> tuple[Modes, dict[str, float]]:
-    """The modes from this instant on, and unknowns and forces "<contact>_F" in them.
+    """Return the modes after this instant, with the unknowns and forces "<contact>_F".
 
     Args:
         machine: the model.
-        at: the instant; contacts without velocity are told by its states.
-        modes: before it; those of contacts that stopped are 0.
+        at: the instant; its states determine the contacts without velocity.
+        modes: modes before it; 0 for contacts that stopped.
 
     Raises:
-        SolveError: nobody can decide.
+        SolveError: no unique consistent modes.
     """
     slips = machine.slips(at.t, at.x, at.p)[0]
     free = [c.name for c, v, still in zip(machine.contacts, slips, machine.still, strict=True)
@@ -273,13 +273,13 @@ def _forces(machine: Machine, look: Array) -> dict[str, float]:
 
 
 def _lifted(machine: Machine, look: Array) -> str:
-    """The first contact whose normal force is negative; empty where there is none."""
+    """Return the first contact with a negative normal force, or ""."""
     pairs = zip(machine.contacts, look, strict=True)
     return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
 
 
 def _objection(machine: Machine, modes: Modes, free: list[str], look: Array) -> Modes | None:
-    """Modes instead of those that cannot be: of the worst contact, with all that rest with it."""
+    """Return corrected modes of the worst inconsistent contact and those that stick with it."""
     largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
     forces = _forces(machine, look)
     found: list[tuple[float, str, Modes]] = []
@@ -303,13 +303,13 @@ def _objection(machine: Machine, modes: Modes, free: list[str], look: Array) -> 
 def _tried(
     machine: Machine, at: Instant, modes: Modes, free: list[str]
 ) -> tuple[Modes, dict[str, float]]:
-    """All modes of the contacts without velocity."""
+    """Try all combinations of modes of the contacts without velocity."""
     if len(free) > MANY or any(len(machine.together[name]) > 1 for name in free):
-        raise machine.undecided(at.t, f"{len(free)} contacts without velocity change in circles")
+        raise machine.undecided(at.t, f"{len(free)} contacts without velocity have cyclic modes")
     fits = list(_consistent(machine, at, modes, free))
     if len(fits) != 1:
         what = "; ".join(shown(m) for m, _ in fits) if fits else "no choice of modes"
-        raise machine.undecided(at.t, f"{what} would do" if fits else f"{what} is consistent")
+        raise machine.undecided(at.t, f"{what} are consistent" if fits else f"{what} is consistent")
     return fits[0]
 
 

@@ -1,22 +1,23 @@
-"""The motion with exact Coulomb friction and stiction, by events: the check of all that smooths.
+"""Event simulation with exact Coulomb friction and stiction: verification of smoothed solutions.
 
     slip    F = law.sliding(v, N, side)     until v = 0
     stick   F with dv/dt = 0                until it reaches the static level of a side
 
-in pieces that end at changes of mode and where an input jumps. Each piece is a run of the model in
-its modes (`mode_models`), smooth from end to end, to a tolerance of its own; between the pieces
-`decided` (`contact_modes`) says which contacts stick. No width, no penalty: what smooth laws tend
-to.
+The motion consists of pieces that end at changes of mode and at jumps of inputs. Each piece is a
+run of the model in its modes (`mode_models`), smooth throughout, with its own tolerance; between
+pieces `decided` (`contact_modes`) determines which contacts stick. It has no smoothing width and no
+penalty: it is the limit of smooth laws.
 
-`simulate` with `ExactCoulomb` moves explicit models and mechanisms alike (the tests compare both).
-This engine stays for what that law does not do: any law by its sliding force and static level,
-without building the model again; normal forces that are algebraic unknowns of the friction itself,
-where `symfric.model.forces` refuses the applied force; the most overloaded contact first, after
-which all is decided again; and a refusal where no motion, or more than one, is consistent.
+`simulate` with `ExactCoulomb` supports explicit models and mechanisms alike (the tests compare
+both). This engine remains for cases that `ExactCoulomb` does not cover: any law by its sliding
+force and static level, without rebuilding the model; normal forces that are algebraic unknowns of
+the friction itself, where `symfric.model.forces` refuses the applied force; the most overloaded
+contact first, after which all modes are decided again; and an error if no motion, or more than one,
+is consistent.
 
-Limits: what it cannot decide it does not (`SolveError`): several consistent motions, none (friction
-that jams), reactions without a solution; contacts of a loop of several degrees of freedom are no
-more than these. Contacts in balls keep their laws.
+Limits: it raises `SolveError` for several consistent motions, none (jamming), or reactions without
+a solution; contacts of a loop with several degrees of freedom included. Contacts in balls keep
+their laws.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ from symfric.model.model import check_model
 
 Array = NDArray[np.float64]
 MOST = 10_000
-"""Changes of mode in a run."""
+"""Largest number of mode changes in a run."""
 PILED = 40
-"""Changes of mode without time between them."""
+"""Largest number of consecutive mode changes without time between them."""
 CREEP = 1e4
-"""Sliding velocity over what counts as none, beyond which a loop moves whose contact stops."""
+"""Sliding velocity over the zero threshold above which a loop moves although one contact stops."""
 APART = 1e-6
-"""Difference of an unknown, over its size, beyond which two solvers found two solutions."""
+"""Relative difference of an unknown above which two solvers found different solutions."""
 TOLERANCE = 1e-4
 RTOL = 1e-9
 
@@ -69,24 +70,24 @@ def set_valued(
     samples: int = 2001,
     throw: bool = True,
 ) -> SetValued:
-    """The motion of `model` with the sliding forces and static levels of its laws, and no width.
+    """Simulate `model` with the sliding forces and static levels of its laws, without smoothing.
 
     Args:
-        model: with contacts; their laws say `sliding` and `static_level`.
-        t_end, t_start: span [s].
-        x0: start values of states by name; those of laws are not asked for.
+        model: with contacts, whose laws define `sliding` and `static_level`.
+        t_end, t_start: time interval [s].
+        x0: start values of states by name; without those of laws.
         u: inputs as for `simulate`; `Hold` and `Linear` end a piece at every sample.
         p: values of the parameters.
-        modes: contact -> 1, 0 or -1 before the start, of contacts that do not move; they rest if
-            nobody says.
+        modes: contact -> 1, 0 or -1 before the start, for contacts that do not move; the default
+            is stick.
         rtol: relative tolerance of the pieces.
         t_eval: times of the result [s]; default `samples` equal intervals.
-        throw: raise on failure; with False what was found is returned.
+        throw: raise on failure; False: return the motion up to the failure.
 
     Raises:
-        ValueError: bad input, a law without the two, events of the model itself.
-        SolveError: nobody can decide which contacts rest, or the engine failed; `partial` has
-            what was found.
+        ValueError: bad input, a law without these functions, events of the model itself.
+        SolveError: no unique consistent modes, or a failure of the integrator; `partial` has the
+            motion found.
     """
     check_model("set_valued", model)
     begin = checks.number("set_valued: t_start", t_start)
@@ -126,7 +127,7 @@ class _State:
 
 @final
 class _Run:
-    """Piece by piece."""
+    """Simulation in pieces."""
 
     def __init__(self, machine: Machine, inputs: Inputs, p: dict[str, float], rtol: float) -> None:
         self.machine, self.inputs, self.p, self.rtol = machine, inputs, p, rtol
@@ -134,7 +135,7 @@ class _Run:
         self.pieces: list[Piece] = []
 
     def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> _State:
-        """The state at the start; contacts without velocity rest if nobody says."""
+        """Return the state at the start; contacts without velocity stick by default."""
         machine, model = self.machine, self.machine.model
         names = [c.name for c in machine.contacts]
         checks.check_names("set_valued: modes", modes, names)
@@ -152,7 +153,7 @@ class _Run:
         return _State(t, machine.at_rest(t, x, self.values, found), found, {})
 
     def go(self, state: _State, end: float) -> None:
-        """All pieces up to `end`."""
+        """Simulate all pieces up to `end`."""
         piled = 0
         for _ in range(MOST + self.inputs.knots.size):
             before = state.t
@@ -167,7 +168,7 @@ class _Run:
         raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
 
     def piece(self, state: _State, end: float) -> _State:
-        """Decide, run to the next change, and see who stopped."""
+        """Decide the modes, simulate to the next change, and update modes of stopped contacts."""
         t, machine = state.t, self.machine
         at = Instant(t, state.x, self.inputs.at(t), self.values, state.guess)
         modes, guess = decided(machine, at, state.modes)
@@ -188,7 +189,7 @@ class _Run:
         return _State(reached, machine.at_rest(reached, x, self.values, modes), modes, guess)
 
     def _stopped(self, modes: Modes, slips: Array) -> Modes:
-        """Modes of contacts that stopped: they rest, but turn in a dead centre of their loop."""
+        """Return modes of stopped contacts: stick, or reversal at a dead centre of their loop."""
         machine, found = self.machine, Modes()
         pairs = list(zip(machine.contacts, slips, machine.still, strict=True))
         moving = {c.name for c, v, still in pairs if abs(v) > CREEP * still}
@@ -222,9 +223,9 @@ class _Run:
     def _overloaded(
         self, run: Trajectory, modes: Modes, guess: Mapping[str, float], t: float
     ) -> float:
-        """When a contact at rest reached its level [s], if that was before `t`, by regula falsi.
+        """Return when a sticking contact reached its level [s], if before `t`, by regula falsi.
 
-        Between steps the engine's reactions are as smooth as its formula makes them; here the
+        Between steps the integrator's reactions have the accuracy of its interpolation; here the
         algebraic equations are solved at each time.
         """
 
@@ -259,7 +260,7 @@ class _Run:
     def _same_unknowns(
         self, run: Trajectory, model: Model, guess: Mapping[str, float], t: float
     ) -> None:
-        """The engine solves the algebraic equations on its own: both have to find the same."""
+        """Raise SolveError if the integrator found other algebraic unknowns than `guess`."""
         if not model.z:
             return
         found = run.express(symbols_of(model.z), np.array([t]))[:, 0]
@@ -273,19 +274,19 @@ class _Run:
 def verify_exactly(
     solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL
 ) -> Verification:
-    """The verification of `solution` with exact friction in the place of its laws.
+    """Verify `solution` with exact friction in place of its laws.
 
-    Start, via points, end, joints, periodicity, bounds, path conditions and cost; what is asked of
-    an expression in which a law itself stands, as of an output "friction", is looked at with the
-    law. `Verification.trajectories` are those of exact friction; `motions` gives their modes.
+    Checks start, via points, end, joints, periodicity, bounds, path conditions and cost. An
+    expression that contains a law itself, such as an output "friction", is evaluated with that law.
+    `Verification.trajectories` are the exact motions; `motions` returns their modes.
 
     Args:
         solution: of a problem whose models have contacts.
-        tolerance: relative miss that is allowed.
-        rtol: of the motion.
+        tolerance: largest relative deviation.
+        rtol: relative tolerance of the simulation.
 
     Raises:
-        ValueError: no solution, or a law without a sliding force and a static level.
+        ValueError: not a solution, or a law without a sliding force and a static level.
     """
     checks.kind("verify_exactly", solution, Solution, "a solution, such as solve(...)")
     tolerance = checks.number("verify_exactly: tolerance", tolerance, above=0.0)
@@ -310,7 +311,7 @@ def verify_exactly(
 
 
 def motions(solution: Solution, rtol: float = RTOL) -> tuple[SetValued, ...]:
-    """The exact motion of each span, with the modes of its contacts, as far as it can be followed.
+    """Return the exact motion of each phase, with its contact modes, as far as it can be simulated.
 
     Raises:
         ValueError: as `verify_exactly`.
@@ -320,7 +321,7 @@ def motions(solution: Solution, rtol: float = RTOL) -> tuple[SetValued, ...]:
 
 
 def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[SetValued], str]:
-    """Runs of the arcs with exact friction, their motions, and why that of one has no end."""
+    """Return runs of the arcs with exact friction, their motions, and a failure message or ""."""
     found, failures = list[SetValued](), list[str]()
 
     def follow(arc: Arc, start: Mapping[str, float]) -> Run | None:

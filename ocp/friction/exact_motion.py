@@ -1,4 +1,4 @@
-"""A motion in pieces, each in one mode of every contact and without jumps of inputs, as one."""
+"""A piecewise motion with constant contact modes and continuous inputs in each piece."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -19,13 +19,13 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Given = float | Hold | Linear | Callable[[ca.SX], Any]
 LATER = 1e-13
-"""Share of a time by which what is behind it is told from what is before."""
+"""Relative time difference that separates before from after an instant."""
 KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
 @final
 class Inputs:
-    """Inputs in pieces between their jumps, and their values at an instant."""
+    """Inputs between their jumps, and their values at an instant."""
 
     def __init__(self, model: Model, given: dict[str, Given], end: float) -> None:
         self.model = model
@@ -40,25 +40,25 @@ class Inputs:
         self.knots = np.unique(np.concatenate([*knots, [end]]))
 
     def within_piece(self, begin: float, t: float) -> Array:
-        """Values at `t` in the piece that begins at `begin`: what is held there, is held."""
+        """Return values at `t` in the piece that begins at `begin`; held inputs stay held."""
         found = {
             n: self._at(n, v, begin if isinstance(v, Hold) else t) for n, v in self.given.items()
         }
         return self.model.values("u", found)
 
     def next(self, t: float, end: float) -> float:
-        """End of the piece that begins at `t`."""
+        """Return the end of the piece that begins at `t`."""
         after = self.knots[self.knots > t + LATER * max(1.0, abs(t))]
         return min(float(after[0]) if after.size else end, end)
 
     def within(self, t: float) -> dict[str, Any]:
-        """The inputs of the piece that begins at `t`."""
+        """Return the inputs of the piece that begins at `t`."""
         return {
             n: float(self._at(n, v, t)) if isinstance(v, Hold) else v for n, v in self.given.items()
         }
 
     def at(self, t: float) -> Array:
-        """Values behind the instant `t`, in the order of the model."""
+        """Return values just after the instant `t`, in the order of the model."""
         found = {n: self._at(n, v, t) for n, v in self.given.items()}
         return self.model.values("u", found)
 
@@ -91,17 +91,17 @@ class Piece:
 @final
 @dataclass(frozen=True, eq=False)
 class SetValued:
-    """A motion with exact Coulomb friction, as far as it was followed.
+    """A motion with exact Coulomb friction, as far as it was simulated.
 
-    `motion["v"]` is a signal at the times `motion.t`; `motion.at(times)` has all of them anywhere:
-    what the model has but states of laws, and "<contact>_F", the friction force. See `trajectory`
-    for pictures, files and expressions.
+    `motion["v"]` is a signal at the times `motion.t`; `motion.at(times)` returns all signals at any
+    times: those of the model except law states, and "<contact>_F", the friction force. See
+    `trajectory` for plots, files and expressions.
 
     Attributes:
         model: the user's model.
         t: times of the result [s].
         pieces: runs between changes of mode and of inputs.
-        status, message: how it ended.
+        status, message: of the end.
     """
 
     model: Model
@@ -118,7 +118,7 @@ class SetValued:
 
     @cached_property
     def modes(self) -> dict[str, tuple[Mode, ...]]:
-        """Contact -> what it does when."""
+        """Contact -> its modes over time."""
         found: dict[str, tuple[Mode, ...]] = {}
         for name in self.contacts:
             merged: list[Mode] = []
@@ -133,15 +133,14 @@ class SetValued:
 
     @cached_property
     def last(self) -> Modes:
-        """The modes at the end, for a run that goes on from there."""
+        """Modes at the end, to continue the run."""
         return dict(self.pieces[-1].modes)
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The motion as one of the user's model, with "<contact>_F" beside its signals.
+        """The motion as a trajectory of the user's model, with "<contact>_F" as additional signals.
 
-        It plots and writes itself. Expressions with states of laws, or with what other laws have as
-        unknowns, are NaN.
+        Expressions with law states, or with algebraic unknowns of other laws, are NaN.
         """
         units = {n: u for n, u in self.model.signals.items() if n in self._known}
         contacts = {c.name: c for c in self.model.contacts}
@@ -165,7 +164,7 @@ class SetValued:
 
     @cached_property
     def _known(self) -> set[str]:
-        """Signals that all pieces have, but states of laws."""
+        """Signals common to all pieces, without law states."""
         of_laws = {v.name for c in self.model.contacts for v in c.states}
         return set.intersection(*(set(p.run.units) for p in self.pieces)) - of_laws
 
@@ -182,7 +181,7 @@ class SetValued:
         return np.unique(np.concatenate([*inner, [self.span[1]]]))
 
     def _pieces_at(self, at: Array) -> Iterator[tuple[Piece, NDArray[np.bool_], Array]]:
-        """Each piece with the times that it holds; at a change of mode the later one."""
+        """Yield each piece with its times; at a change of mode the later piece."""
         edges = np.array([p.begin for p in self.pieces[1:]])
         which = np.searchsorted(edges, at, side="right")
         for k in np.unique(which):
@@ -223,11 +222,11 @@ class SetValued:
         return self.t if name == "t" else self.trajectory[name]
 
     def at(self, times: ArrayLike) -> dict[str, Array]:
-        """All signals at `times` [s]; at a change of mode those behind it."""
+        """Return all signals at `times` [s]; at a change of mode those after it."""
         return self.trajectory.at(times)
 
     def final(self) -> dict[str, float]:
-        """States at the end by name, but those of laws."""
+        """Return the states at the end by name, without law states."""
         piece = self.pieces[-1]
         found = piece.run.states(np.array([piece.end]))
         return {v.name: float(found[v.name][-1]) for v in self.model.open.x}

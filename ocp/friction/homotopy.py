@@ -1,22 +1,22 @@
-"""From friction smoothed over wide layers of velocities to sharp friction, step by step.
+"""Homotopy in the smoothing width: from wide friction layers to sharp friction, step by step.
 
-A sharp law has many local optima and no usable derivatives where a body reverses. A law that is
-smooth over a third of the largest sliding velocity has few, and a motion that is optimal for it
-leads to a good one for the sharp law. So:
+A sharp law has many local optima and no usable derivatives at reversals. A law that is smoothed
+over a third of the largest sliding velocity has few, and an optimal motion for it leads to a good
+one for the sharp law. Therefore:
 
-1. Coarse solves with wide layers, from several starts; the best one goes on. Among local optima
-   the order of the costs there is that of the costs at the end, and such a solve takes a tenth of
+1. Coarse solves with wide layers, from several starts; the best one continues. The order of the
+   costs of local optima there agrees with the order at the end, and such a solve takes a tenth of
    a second.
-2. The layers become narrower, by a factor that adapts itself, while the mesh is refined where an
-   interval errs. A step is taken back, and made shorter, where it does not converge or where it
-   jumps to a motion that is worse: the Lagrangian with the multipliers of the step before,
+2. The layers become narrower by an adaptive factor, while the mesh is refined where an interval has
+   large errors. A step is rejected and shortened if it does not converge or if it jumps to a worse
+   motion: the Lagrangian with the multipliers of the previous step,
 
        J(widths + step) ~ L(w, lam, widths + step),
 
-   says what the cost should be, and costs one evaluation. A jump to something better is welcome.
+   predicts the cost and takes one evaluation. A jump to a better motion is accepted.
 
-Widths and mesh fractions are parameters of the nonlinear program: a step builds nothing anew
-unless the number of intervals changes.
+Widths and mesh fractions are parameters of the nonlinear program: a step rebuilds nothing unless
+the number of intervals changes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,50 +50,50 @@ from symfric.foundation.status import Status
 Array = NDArray[np.float64]
 ENDED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 FINALISTS = 3
-"""Solutions on the coarse mesh that are solved on the finer one, where the best of them is seen."""
+"""Number of coarse solutions that are solved again on the finer mesh to find the best one."""
 ALIKE = 1e-3
-"""Share of J by which different motions differ at least."""
+"""Smallest relative difference of J between different motions."""
 FIRST = 0.3
-"""Width of the layers of the first solves, in multiples of the largest sliding velocity."""
+"""Smoothing width of the first solves, in multiples of the largest sliding velocity."""
 LAST = 1e-2
-"""Width at which the modes of a motion can be read from it."""
+"""Smoothing width at which the modes of a motion can be deduced from it."""
 FACTOR = 10**0.25
-"""Factor between one width and the next, while all goes well."""
+"""Largest factor between successive widths."""
 LEAST_FACTOR = 1.03
-"""Steps shorter than this get nowhere."""
+"""Smallest factor; the homotopy stops below it."""
 QUICK = 15
-"""Iterations below which the next step may be longer."""
+"""Iterations up to which the next step may be longer."""
 ABOVE = 0.01
-"""Share of J by which a step may cost more than predicted."""
+"""Relative excess of J over the prediction at which a step is rejected."""
 COARSE = 30
-"""Intervals of the whole motion in the first solves, and `FINE` afterwards."""
+"""Intervals of the whole motion in the first solves; `FINE` afterwards."""
 FINE = 60
 MOST = 300
-"""More intervals are not made on the way."""
+"""Largest number of intervals during the homotopy."""
 MOST_PARTS = 4
-"""Into which one interval is cut at once."""
+"""Largest number of parts into which one interval is divided at once."""
 TOLERANCE = 1e-3
-"""Local error of an interval, relative to the size of the states, that asks for no refinement."""
+"""Local error of an interval, relative to the size of the states, that needs no refinement."""
 PASSES = 4
-"""Refinements at one width."""
+"""Largest number of meshes at one width."""
 SPREAD = 0.5
-"""How far the further starts are from the given one; see `starts_around`."""
+"""Spread of additional starts around the given one; see `starts_around`."""
 FURTHER = 2
-"""Times that so many starts are made round straight lines when none has led to a solution."""
+"""Repetitions with new starts around straight lines if none has led to a solution."""
 SAME = 3.0
-"""Factor by which the speeds of the first motion may differ from those the widths were made for."""
+"""Largest ratio between the speeds of the first motion and those assumed for the widths."""
 EARLY = {"tol": 1e-4, "max_iter": 100}
 LATER = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
 BOUNDING = {"max_iter": 80}
-"""Where the largest cost counts: with a small barrier parameter the multipliers of the bounds of
-the costs start wrong, and with them all curvature."""
+"""Options for worst-case costs: with a small initial barrier parameter the multipliers of the
+bounds on the costs start wrong, and so does the curvature."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One solve: what was solved, and what came out."""
+    """A solve and its result."""
 
     transcription: Transcription
     values: Array
@@ -106,16 +106,16 @@ class Step:
 
     @property
     def good(self) -> bool:
-        """Whether the path may go on from here."""
+        """True if the homotopy can continue from here."""
         return self.accepted and self.outcome.status.ok
 
     @property
     def ended(self) -> bool:
-        """Whether the user or the clock has stopped the solver."""
+        """True if the user or the time limit has stopped the solver."""
         return self.outcome.status in ENDED
 
     def better_than(self, other: "Step") -> bool:
-        """Solved before not solved, then the lower cost, or the smaller violation."""
+        """Return True if solved and the other is not, at a lower cost, or with less violation."""
         if self.outcome.status.ok != other.outcome.status.ok:
             return self.outcome.status.ok
         if self.outcome.status.ok:
@@ -124,7 +124,7 @@ class Step:
 
 
 def least(steps: Sequence[Step]) -> Step:
-    """The best of several steps, or the one that was stopped."""
+    """Return the best of several steps, or the one that was stopped."""
     best = steps[0]
     for step in steps[1:]:
         best = step if step.ended or (not best.ended and step.better_than(best)) else best
@@ -132,7 +132,7 @@ def least(steps: Sequence[Step]) -> Step:
 
 
 def finalists(steps: Sequence[Step]) -> list[Step]:
-    """The best few of several steps that are not the same motion: what costs the same is."""
+    """Return the best few steps with different motions; equal costs count as the same motion."""
     found: list[Step] = []
     for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
         costs = [one.outcome.cost for one in found]
@@ -145,13 +145,13 @@ def finalists(steps: Sequence[Step]) -> list[Step]:
 @final
 @dataclass(frozen=True, eq=False)
 class Sharp:
-    """A solution with smooth friction, on the way to sharp friction.
+    """A solution with smooth friction, at one level of the homotopy.
 
     Attributes:
         solution: of the problem with smooth models, its widths among the values of `p`.
-        level: width of the layers, in multiples of the largest sliding velocity of each contact.
+        level: smoothing width, in multiples of the largest sliding velocity of each contact.
         scales: of each contact.
-        steady: whether the step to it was a plain one; False where steps were taken back.
+        steady: True if no step before it was rejected.
         error: largest local error of an interval.
     """
 
@@ -175,20 +175,20 @@ def sharpened(
     clock: Clock | None = None,
     progress: Report | None = None,
 ) -> Iterator[Sharp]:
-    """Solutions with narrower and narrower layers, each solved when it is taken.
+    """Yield solutions with decreasing smoothing widths; each item triggers a solve.
 
-    The first has layers of `FIRST`, the last one of `last`, or as narrow as it got: where the
-    solver fails or is stopped, the solution says so.
+    The first has the width `FIRST`, the last one `last`, or the narrowest one reached: if the
+    solver fails or is stopped, the status of the solution reports it.
 
     Args:
-        problem: the user's, with contacts.
-        scheme, solver: as in `solve`; of Ipopt the user's options win.
-        guess: where to start; further starts are made around it.
+        problem: the user's problem, with contacts.
+        scheme, solver: as in `solve`; the user's options of Ipopt take precedence.
+        guess: initial guess; additional starts are generated around it.
         intervals: of the whole motion, before refinement.
         tolerance: local error of an interval.
         starts: coarse solves from different starts, the best of which goes on.
-        last: width of the layers to stop at.
-        clock: when to stop.
+        last: final smoothing width.
+        clock: time limit.
         progress: called after each iteration.
     """
     smooth = smooth_models.smoothed(problem)
@@ -218,7 +218,7 @@ def sharpened(
 @final
 @dataclass
 class _Path:
-    """What the steps share."""
+    """State common to all steps."""
 
     user: Problem
     problem: Problem
@@ -235,7 +235,7 @@ class _Path:
         self.prepared: dict[tuple[int, str], Prepared] = {}
 
     def first(self, guess: Start, starts: int, intervals: int) -> Step:
-        """The best of several coarse solves with wide layers, on the mesh to go on with."""
+        """Return the best of several coarse solves with wide layers, on the finer mesh."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
         straight = coarse.unpack(start_of(coarse, None)[0].w)
@@ -260,7 +260,7 @@ class _Path:
             again = self.each(coarse, [best.points, *tries])
             if least(again).good or least(again).ended:
                 found = again
-            else:  # layers that much narrower are too far away
+            else:  # the change of the widths is too large
                 self.scales = before
         fine = self.discretisation.on(_meshes(self.problem, intervals))
         step = least(self.each(fine, [self.moved(one, fine) for one in finalists(found)], ONTO))
@@ -276,7 +276,7 @@ class _Path:
         tries: Sequence[Points],
         options: Mapping[str, float | int] = EARLY,
     ) -> list[Step]:
-        """Solves with the widest layers from several starts, until one is stopped."""
+        """Solve with the widest layers from several starts, until one is stopped."""
         found: list[Step] = []
         for number, points in enumerate(tries, 1):
             found.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
@@ -285,14 +285,14 @@ class _Path:
         return found
 
     def settled(self, before: Step, level: float, limit: float) -> Step:
-        """The step to another width, on a mesh that is fine enough for it."""
+        """Solve with another width, on a mesh that is fine enough for it."""
         step = self.solve(before.transcription, before.points, level, LATER, f"width {level:.2g}")
         if not step.good or step.outcome.cost > limit:
             return replace(step, accepted=False)
         return self.refined(step, limit)
 
     def refined(self, step: Step, limit: float | None) -> Step:
-        """`step` on finer and finer meshes, until its intervals are right or enough."""
+        """Refine the mesh of `step` until its errors are small enough or a limit is reached."""
         step = self.judged(step)
         for _ in range(PASSES - 1):
             meshes = self.finer(step)
@@ -316,7 +316,7 @@ class _Path:
         options: Mapping[str, float | int],
         stage: str,
     ) -> Step:
-        """One solve with layers of `level`."""
+        """Solve once with the smoothing width `level`."""
         widths = widths_at(self.user, self.scales, level)
         values = transcription.values(widths)
         if self.problem.kind == "worst":
@@ -335,13 +335,13 @@ class _Path:
         return Step(transcription, values, outcome, found, level)
 
     def moved(self, step: Step, into: Transcription) -> Points:
-        """The motion of a step on other meshes."""
+        """Interpolate the motion of a step to other meshes."""
         spans = stored_spans(self.problem, self.scheme, step.transcription.meshes, step.points)
         chosen, iterate = step.points.chosen, step.outcome.iterate
         return resample(into, Stored("", "", "", 0.0, "", spans, chosen, iterate))
 
     def judged(self, step: Step) -> Step:
-        """`step` with the local errors of its intervals."""
+        """Return `step` with the local errors of its intervals."""
         widths = widths_at(self.user, self.scales, step.level)
         arcs = [*arcs_of(self.problem, step.transcription.meshes, step.points)]
         for k, arc in enumerate(arcs):
@@ -352,16 +352,16 @@ class _Path:
         return replace(step, error=worst, errors=errors)
 
     def finer(self, step: Step) -> list[Array] | None:
-        """Meshes with the intervals that err cut into pieces; None where there are none."""
+        """Return meshes with inaccurate intervals divided; None if there are none."""
         meshes, phases = step.transcription.meshes, len(self.problem.chain)
         if sum(m.size - 1 for m in meshes) > MOST:
             return None
         return cut_meshes(meshes, step.errors, phases, self.tolerance, order=3, most=MOST_PARTS)
 
     def predicted(self, step: Step, level: float) -> float:
-        """The largest cost at another width that belongs to the motion of `step`.
+        """Return the largest cost at another width that belongs to the motion of `step`.
 
-        Its Lagrangian there, with a share of J more, and of what the step is to change.
+        It is its Lagrangian there, plus a share of J and of the predicted decrease.
         """
         program, iterate = step.transcription.program, step.outcome.iterate
         values = step.transcription.values(widths_at(self.user, self.scales, level))
@@ -374,7 +374,7 @@ class _Path:
         return cost + ABOVE * abs(now) + 0.3 * max(0.0, now - cost)
 
     def told(self, step: Step, steady: bool) -> Sharp:
-        """A step as a solution of the problem with these widths."""
+        """Return a step as a solution of the problem with these widths."""
         widths = widths_at(self.user, self.scales, step.level)
         solution = solution_of(step.transcription, step.outcome)
         problem = replace(self.problem, p=dict(self.problem.p) | widths)
@@ -384,7 +384,7 @@ class _Path:
 
 
 def _meshes(problem: Problem, intervals: int) -> list[Array]:
-    """Even meshes, so many intervals in all phases together."""
+    """Return uniform meshes with a total number of intervals over all phases."""
     T = [phase.T.start if isinstance(phase.T, Free) else float(phase.T) for phase in problem.chain]
     counts = [max(4, round(intervals * one / sum(T))) for one in T]
     return make_meshes(problem, counts)

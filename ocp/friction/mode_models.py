@@ -1,30 +1,30 @@
-"""The models in one mode of each contact, and what would hold a contact that slips.
+"""Models with fixed contact modes, and the force that would hold a slipping contact.
 
     slip, +-1   F = law.sliding(v, N, side)              its force on that side of v = 0
     stick, 0    F with dv/dt = 0, an algebraic unknown   while -level(-1) <= F <= level(+1)
 
-They have the names of the user's model, so that a cost, a bound or an output written for it holds
-for them; only the states of laws are gone. Mechanisms keep their implicit equations, with `F` and
-`0 = dv/dt` in the accelerations among them, and normal forces that follow from reactions.
+They have the names of the user's model, so that its costs, bounds and outputs apply to them; only
+law states are absent. Mechanisms keep their implicit equations, with `F` and `0 = dv/dt` in the
+accelerations among them, and normal forces that follow from reactions.
 
-Contacts of a loop of one degree of freedom rest together. The slips are s_i = g_i(q) omega, with
-omega the speed along the tangent of the constraints. No equation tells how the contacts share the
-force T = sum g_i F_i that holds the loop. They hold it as long as they can, and that is with equal
-shares of what each can hold at most,
+Contacts of a loop of one degree of freedom stick together. The slips are s_i = g_i(q) omega, with
+omega the speed along the tangent of the constraints. The equations do not determine how the
+contacts share the force T = sum g_i F_i that holds the loop. They hold it as long as possible,
+which requires shares proportional to their static levels,
 
     F_i = sign(g_i) S_i T / sum |g_k| S_k,   S_i the static level
 
-as in `symfric.multibody.applied`. All of them are at their levels at the same instant.
+as in `symfric.multibody.applied`. All of them reach their levels at the same instant.
 
-A contact at rest stays there while the force this takes is below its static level. Whether it
-leaves rest depends on the control *after* that instant, which may differ from the one before, and
-is evaluated in the mode of slipping, where nothing holds the contact (`holding`): the force is part
-of the algebraic unknowns of the model in which it rests,
+A sticking contact keeps sticking while the force needed is below its static level. Break-away
+depends on the control *after* that instant, which may differ from the one before, and is evaluated
+in the slip mode, where nothing holds the contact (`holding`): the force is part of the algebraic
+unknowns of the model in which it sticks,
 
     0 = alg(x, z, u),    with 0 = d slip / dt among its rows and the force among z,
 
-found by Newton's method from the values of slipping: in one step where the equations are affine in
-z, as without normal forces that follow from reactions.
+found by Newton's method from the values of the slip mode: in one step if the equations are affine
+in z, as without normal forces that follow from reactions.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,21 +45,21 @@ from symfric.model import Contact, Model, Output
 from symfric.multibody.applied import null_direction
 
 MINORS = 8
-"""Coordinates of a loop at most; its tangent is made of their minors."""
+"""Largest number of coordinates of a loop, whose tangent is computed from minors."""
 RANK = 1e-11
 """Singular values below this share of the scaled equations count as zero."""
 UNLOADED = 1e-9
-"""Static level [N] at the start below which nothing presses there."""
+"""Static level [N] at the start below which a contact is unloaded."""
 SIDES = {1: "up", -1: "down"}
-"""Outputs of mode models: room of a contact at rest to both sides, "<contact>_grip_<side>"."""
+"""Suffixes of the outputs "<contact>_grip_<side>": friction margin of a sticking contact."""
 NEWTON_STEPS = 2
-"""A normal force is the smoothed absolute value of reactions, affine but near zero."""
+"""Newton steps; a normal force is a smoothed absolute value of reactions, affine except near 0."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Contacts that rest together.
+    """Contacts that stick together.
 
     Attributes:
         members: the contacts, two or more.
@@ -71,11 +71,11 @@ class Loop:
 
     @property
     def name(self) -> str:
-        """Of the force that holds it."""
+        """Name of the force that holds the loop."""
         return f"{self.members[0].name}_loop"
 
     def shares(self, force: ca.SX) -> list[ca.SX]:
-        """F_i [N] of each member, where `force` T holds the loop."""
+        """Return F_i [N] of each member for a holding force T."""
         levels = [(c.static_level(1) + c.static_level(-1)) / 2 for c in self.members]
         weights = [
             ca.SX(smooth.choose(g < 0, -1.0, 1.0)) * S
@@ -85,13 +85,13 @@ class Loop:
         return [w / total * force for w in weights]
 
     def projected(self, changes: Sequence[ca.SX]) -> ca.SX:
-        """What is zero at rest, of the rates of change of the members' slips."""
+        """Return the combination of the members' slip rates that is zero in stick."""
         pairs = zip(self.along, changes, strict=True)
         return sum((g * change for g, change in pairs), start=ca.SX(0))
 
 
 def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
-    """The loops of a mechanism in which several of `contacts` rest together."""
+    """Return the loops of a mechanism in which several of `contacts` stick together."""
     mechanics = model.holonomic
     if mechanics is None or not mechanics.phi.numel() or ca.depends_on(mechanics.phi, model.t):
         return ()
@@ -116,18 +116,18 @@ def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
 
 
 def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
-    """`model` with each contact in one mode: sliding forward 1, backward -1, at rest 0.
+    """Return `model` with a mode for each contact: slip forward 1, slip backward -1, stick 0.
 
-    At rest the friction force is the algebraic unknown "<contact>_reaction", and the outputs
-    "<contact>_grip_up" and "<contact>_grip_down" are what the static level leaves of it to both
-    sides; both are above zero while the contact holds. What started at rest stays so; a sliding
-    velocity that is not zero at the start of rest is kept. Contacts without a level at rest may be
-    left out. Contacts of a loop of one degree of freedom rest together (see above); their
-    reactions are outputs. The same modes of the same model give the same object.
+    In stick the friction force is the algebraic unknown "<contact>_reaction", and the outputs
+    "<contact>_grip_up" and "<contact>_grip_down" are its margins to the static level in both
+    directions, both positive while the contact holds. A contact without slip keeps it zero; a
+    nonzero slip at the start of stick is kept. Contacts without a static level may be omitted.
+    Contacts of a loop of one degree of freedom stick together (see above); their reactions are
+    outputs. The same modes of the same model return the same object.
 
     Raises:
-        ValueError: names that are no contacts, contacts without a mode, modes that are none, and
-            contacts at rest that share what holds them, so that no equation tells the shares.
+        ValueError: names that are not contacts, contacts without a mode, invalid modes, and
+            sticking contacts whose forces the equations do not determine.
     """
     where = f"model '{model.name}': modes"
     names = [c.name for c in model.contacts]
@@ -147,12 +147,12 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
 
 
 def restless(model: Model) -> str:
-    """Why the contacts of `model` cannot rest one by one; mostly empty."""
+    """Return the reason why contacts of `model` cannot stick individually, or ""."""
     contacts = [c for c in model.contacts if jumps(model, c)]
     if loops := loops_of(model, contacts):
         names = ", ".join(c.name for c in loops[0].members)
         return (
-            f"expected contacts that rest one by one, got {names}, which do so together in a loop"
+            f"expected contacts that stick one by one, got {names}, which stick together in a loop"
         )
     try:
         mode_model(model, dict.fromkeys((c.name for c in model.contacts), 0))
@@ -189,12 +189,12 @@ def _in_modes(model: Model, modes: Mapping[str, int]) -> Model:
 
 
 def _reaction(name: str, unit: str, nominal: float) -> Variable:
-    doc = "friction force that holds at rest"
+    doc = "friction force in stick"
     return Variable(f"{name}_reaction", unit, nominal=nominal, doc=doc)
 
 
 def _resting_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
-    """Loops whose contacts rest: all of them, or none."""
+    """Return the loops whose contacts stick, all of them."""
     found: list[Loop] = []
     for loop in loops_of(model, [c for c in model.contacts if jumps(model, c)]):
         resting = [c.name for c in loop.members if not modes[c.name]]
@@ -211,24 +211,24 @@ def _resting_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
 def _grips(held: Sequence[Contact], forces: Mapping[str, ca.SX]) -> Iterator[tuple[str, Output]]:
     for c in held:
         F, unit = forces[c.name], c.unit("N")
-        yield f"{c.name}_grip_up", Output(c.static_level(1) - F, unit, "room below the level")
-        yield f"{c.name}_grip_down", Output(c.static_level(-1) + F, unit, "room above minus that")
+        yield f"{c.name}_grip_up", Output(c.static_level(1) - F, unit, "margin to the level")
+        yield f"{c.name}_grip_down", Output(c.static_level(-1) + F, unit, "margin to minus that")
 
 
 def with_outputs(model: Model, outputs: Mapping[str, Output]) -> Model:
-    """`model` with further outputs."""
+    """Return `model` with additional outputs."""
     if not outputs:
         return model
     changes: dict[str, Any] = {"outputs": {**model.outputs, **outputs}}
     if model.holonomic is not None:
-        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # made of `holonomic` once more
+        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # derived again from `holonomic`
     return replace(model, **changes)
 
 
 def slip_change(model: Model, contact: Contact) -> ca.SX:
-    """Rate of change of a sliding velocity [m/s^2], in the forces of `model.open`.
+    """Return the rate of change of a sliding velocity [m/s^2], in the forces of `model.open`.
 
-    In a mechanism in its accelerations `holonomic.a`.
+    For a mechanism it is a function of the accelerations `holonomic.a`.
 
     Raises:
         ValueError: the sliding velocity depends on an input or an algebraic variable.
@@ -238,7 +238,7 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
     if ca.depends_on(slip, ca.vertcat(bare.vector("u"), bare.vector("z"))):
         raise checks.refused(
             f"contact '{contact.name}': slip", "one of states, time and parameters", slip,
-            "an input jumps, and a contact cannot rest on it",
+            "an input may jump, so the contact cannot stick",
         )  # fmt: skip
     mechanics = bare.holonomic
     if mechanics is None:
@@ -250,7 +250,7 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
 
 
 def nominal_load(model: Model, contact: Contact) -> float:
-    """Typical size [N] of what holds a contact: its static level at the start."""
+    """Return the typical holding force [N] of a contact: its static level at the start."""
     symbols = ca.vertcat(model.vector("x"), model.vector("z"), model.vector("u"), model.t)
     level = ca.SX(contact.static_level())
     starts = [v.start for group in (model.x, model.z, model.u) for v in group]
@@ -261,9 +261,9 @@ def nominal_load(model: Model, contact: Contact) -> float:
 
 
 def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
-    """Refuse rest that the equations do not determine, in numbers at the start and near it.
+    """Raise ValueError if the equations do not determine the stiction forces, near the start.
 
-    Loops may have fewer degrees of freedom than contacts, and a drive may prescribe a sliding.
+    Loops may have fewer degrees of freedom than contacts, and a drive may prescribe a slip.
     """
     z = made.vector("z")
     symbols = [made.t, *(made.vector(letter) for letter in "xzup")]
@@ -283,28 +283,28 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
     raise ValueError(
         f"model '{model.name}': modes: expected contacts at rest whose forces the equations "
         f"determine, got {names} at rest together; in a loop of few degrees of freedom, or under a "
-        "prescribed motion, how they share what holds them is open: let friction act in one of them"
+        "prescribed motion, their shares are undetermined: use friction in one of them"
     )
 
 
 def rubbing(model: Model) -> tuple[Contact, ...]:
-    """The contacts that can rest: friction that is zero at v = 0 has no modes."""
+    """Return the contacts that can stick: friction that is zero at v = 0 has no modes."""
     return tuple(contact for contact in model.contacts if jumps(model, contact))
 
 
 def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX, dict[int, ca.SX]]:
-    """The force [N] that holds `contact` at rest, or would, and what the static level leaves of it.
+    """Return the force [N] that holds `contact`, or would, and its margins to the static level.
 
     Args:
         model: the model with contacts.
-        modes: +1, 0 or -1 of each contact; `contact` may slip or rest.
-        contact: name of the one in question.
+        modes: +1, 0 or -1 of each contact; `contact` may slip or stick.
+        contact: name of the contact.
 
     Returns:
-        The force, and side -> room to that side, negative where friction cannot hold; SX (1, 1) in
-        the symbols of the mode model of `modes`. They do not depend on algebraic variables where
-        the equations are affine in these: at the start of an interval they are what states and
-        inputs there ask for.
+        The force, and side -> margin in that direction, negative if friction cannot hold; SX (1, 1)
+        in the symbols of the mode model of `modes`. They do not depend on algebraic variables if
+        the equations are affine in these: at the start of an interval they follow from states and
+        inputs there.
     """
     moving, held = mode_model(model, modes), mode_model(model, {**modes, contact: 0})
     symbols = [held.t, *(held.vector(letter) for letter in "xzup")]
@@ -312,16 +312,16 @@ def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX
     newton = z - ca.solve(ca.densify(ca.jacobian(held.alg, z)), held.alg)
     step = ca.Function("step", symbols, [newton])
     names = [f"{contact}_reaction", *(f"{contact}_grip_{side}" for side in SIDES.values())]
-    asked = ca.Function("asked", symbols, [held.expression(name) for name in names])
+    outputs = ca.Function("outputs", symbols, [held.expression(name) for name in names])
     t, x, u, p = moving.t, *(moving.vector(letter) for letter in "xup")
     known = {v.name: v.symbol for v in moving.z}  # each mode model has its own reactions
     found = ca.vertcat(*(known.get(v.name, ca.SX(0)) for v in held.z))
     for _ in range(NEWTON_STEPS):
         found = step(t, x, found, u, p)
-    force, *rooms = (ca.SX(value) for value in asked.call([t, x, found, u, p]))
+    force, *rooms = (ca.SX(value) for value in outputs.call([t, x, found, u, p]))
     return force, dict(zip(SIDES, rooms, strict=True))
 
 
 def excess(model: Model, modes: Mapping[str, int], contact: str, side: int) -> ca.SX:
-    """By how much [N] the force that would hold `contact` exceeds its static level to a side."""
+    """Return the excess [N] of the holding force of `contact` over its static level."""
     return -holding(model, modes, contact)[1][side]

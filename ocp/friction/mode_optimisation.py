@@ -1,15 +1,15 @@
-"""From a sharpened motion to one that is exact: modes, their order and their instants.
+"""Optimisation of contact modes, their order and their instants from a sharpened motion.
 
-Smooth friction with a width of a hundredth of the speed shows who slips when. The sequence of modes
-that is read off it turns friction into what it is: a known force while a contact slips, a reaction
-while it rests. The problem of these arcs is smooth, and the instants of change are among its
-unknowns, so that a solver finds them to its full precision, on few intervals:
+Smooth friction with a width of a hundredth of the speed shows which contacts slip and when. With
+the mode sequence deduced from it, friction is a known force while a contact slips and a reaction
+while it sticks. The problem of these arcs is smooth, and the switching instants are unknowns, so a
+solver finds them with full precision, on few intervals:
 
-1. read the sequence; put a rest at every reversal and at the ends (`ocp.friction.sequence`);
+1. deduce the sequence; insert stick at every reversal and at the ends (`ocp.friction.sequence`);
 2. solve the problem of mode models with free durations (`ocp.friction.arcs`);
-3. prune arcs that have shrunk to nothing, repair the sequence where the motion presses against the
-   bounds of its modes (`ocp.friction.sequence`), and solve again from there;
-4. refine the intervals until holding the controls on each of them costs next to nothing.
+3. remove arcs that have shrunk to zero, repair the sequence where the motion is at the bounds of
+   its modes (`ocp.friction.sequence`), and solve again from there;
+4. refine the intervals until holding the controls on each of them costs almost nothing.
 
 The result holds for exact Coulomb friction with stiction, the limit of smooth laws.
 Source: Betts, Practical Methods for Optimal Control, 2nd ed., 2010, 3.7 (phases); Bryson and Ho,
@@ -43,39 +43,39 @@ from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 TOUCH = 1e-5
-"""Share of the largest sliding velocity of a contact below which it touches zero: what an interior
-point leaves of a bound that presses."""
+"""Share of the largest sliding velocity of a contact below which it touches zero: the distance that
+an interior-point method leaves to an active bound."""
 CREEP = (3.0, 1.0, 10.0)
-"""Multiples of the width below which a contact counts as resting: the first that leads to a
+"""Multiples of the width below which a contact counts as sticking: the first that leads to a
 solution. A smooth law is back at its dynamic level at a few widths."""
 SHORTEST = 5e-5
-"""Least duration of an arc, as a share of the whole: what is needed is longer."""
+"""Least duration of an arc, as a share of the whole; necessary arcs are longer."""
 AGAIN = 0.1
-"""Barrier parameter where the sequence is another one: smaller ones lose the way at times."""
+"""Initial barrier parameter after a change of the sequence: smaller ones may diverge."""
 KICK = 2e-3
-"""Share of the whole duration that an interval has at least in which a contact breaks away."""
+"""Least length of an interval in which a contact breaks away, over the whole duration."""
 GONE = 4.0
-"""Arcs shorter than so many times the least duration are pruned."""
+"""Duration below which arcs are removed, in least durations."""
 ROUNDS = 4
-"""How often the sequence may be changed."""
+"""Largest number of changes of the sequence."""
 NEW_ARC = 5e-3
-"""Share of the whole duration that an arc has where it is tried."""
+"""Initial duration of an inserted arc, over the whole duration."""
 WORTH = 1e-4
-"""Share of the cost by which another sequence must be better: more than the estimate of what
-holding the inputs costs on few intervals is wrong by."""
+"""Relative cost by which another sequence must be better: more than the error of the estimated cost
+of holding the inputs on few intervals."""
 FINE = 3e-4
-"""Share of the cost that holding the inputs over the intervals may cost."""
+"""Tolerable cost of holding the inputs over the intervals, over the cost."""
 ZERO = 1e-8
-"""Costs that differ less are the same to a solver."""
+"""Smallest significant difference of costs."""
 LOCAL = 1e-7
 """Largest local error of an interval, relative."""
 HALVED = 4.0
-"""Multiple of the largest local error that has an interval halved, of order 5."""
+"""Multiple of the largest local error assigned to an interval to halve it, for order 5."""
 MOST_ITERATIONS, PATIENT = 100, 400
-"""Of one solve: a sequence that needs more is a wrong one as a rule. Where no sequence leads to a
+"""Iterations of one solve: a sequence that needs more is usually wrong. If no sequence leads to a
 solution the first solves are repeated with more: an arm whose joints stop needs 350."""
 CLOSER = 5.0
-"""Factor to the margin of a motion that only shows what a margin costs."""
+"""Divisor of the margin for a motion that only shows the cost of a margin."""
 LEAST_INTERVALS = 40
 MOST = 800
 Keep = Callable[[Solved], Solved]
@@ -83,7 +83,7 @@ STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 
 
 def rests_inside(solved: Solved) -> tuple[Leg, ...] | None:
-    """The sequence with rests where contacts touch zero as they slip; None where none does."""
+    """Return the sequence with stick where slipping contacts touch zero; None if none does."""
     legs, shift = solved.legs, 0
     found = False
     slips = [_slips(solved, k) for k in range(len(flat(legs)))]
@@ -105,7 +105,7 @@ def rests_inside(solved: Solved) -> tuple[Leg, ...] | None:
 
 
 def _slips(solved: Solved, number: int) -> tuple[Array, dict[str, Array]]:
-    """Times of all points of an arc, and sliding velocities there by contact."""
+    """Return times of all points of an arc, and sliding velocities there by contact."""
     span = solved.transcription.problem.spans[number]
     arc = flat(solved.legs)[number]
     fractions = solved.transcription.fractions(number)
@@ -119,7 +119,7 @@ def _slips(solved: Solved, number: int) -> tuple[Array, dict[str, Array]]:
 
 
 def _touching(t: Array, slip: Array, touch: float) -> tuple[float, float] | None:
-    """From when to when the slip is next to nothing, away from the ends of the arc."""
+    """Return the interval in which the slip is almost zero, away from the ends of the arc."""
     near = np.flatnonzero(np.abs(slip[1:-1]) < touch) + 1
     if not near.size:
         return None
@@ -127,7 +127,7 @@ def _touching(t: Array, slip: Array, touch: float) -> tuple[float, float] | None
 
 
 class _StoppedError(Exception):
-    """The user or the clock has stopped a solve: no further one is begun."""
+    """Raised after the user or the time limit has stopped a solve."""
 
 
 def optimise_modes(
@@ -141,32 +141,32 @@ def optimise_modes(
     margin: float = MARGIN,
     clock: Clock | None = None,
 ) -> Iterator[tuple[Solution, float]]:
-    """Exact motions next to a sharpened one, in the terms of `problem`, with their margins.
+    """Yield exact motions near a sharpened one, for `problem`, with their friction margins.
 
-    The rests of the first keep `MARGIN` of their static levels, or `margin` if that is more. Where
-    that costs anything others follow that start there: with `margin`, and between both, for who
-    finds that too close; where it is `MARGIN` or more, with less, to see what it costs.
+    In the first motion stiction keeps the margin `MARGIN` or `margin`, the larger one. If that
+    costs anything, further motions follow from there: with `margin`, and with a value between both;
+    if `margin` is `MARGIN` or more, with less, to show its cost.
 
     Args:
         smooth: solution of `problem` with smooth friction, of widths of about a hundredth of the
             speeds; it need not be verified.
-        problem: what the user has written.
+        problem: the user's problem.
         widths: contact -> sliding velocity [m/s] over which its friction is smoothed in `smooth`.
         solver, scheme, progress: as in `ocp.solve`.
-        margin: share of the static level that rests keep from it.
-        clock: when to stop.
+        margin: friction margin: share of the static level that stiction keeps from it.
+        clock: time limit.
 
     Yields:
-        A solution with `modes`, valid for exact Coulomb friction with stiction; not verified. One
-        whose status is not ok where no sequence led to a solution; where that was stopped before
-        any did, without `modes`.
+        A solution with `modes`, valid for exact Coulomb friction with stiction; not verified. Its
+        status is not ok if no sequence led to a solution; if the search was stopped before any
+        did, it has no `modes`.
 
     Raises:
-        ValueError: a problem without modes, see `refusal`.
+        ValueError: an unsuitable problem, see `refusal`.
 
-    Limits: the sequence is that of the sharpened motion but for rests, superfluous arcs and what
-    bounds tell of: a motion of another kind is not found. Contacts whose slips depend on each
-    other at rest (a loop of one degree of freedom) have no unique reactions and are refused by the
+    Limits: the sequence is that of the sharpened motion except for stick intervals, superfluous
+    arcs and active bounds: a qualitatively different motion is not found. Contacts with dependent
+    slips in stick (a loop of one degree of freedom) have no unique reactions and are refused by the
     mode model.
     """
     if reason := refusal(problem):
@@ -222,7 +222,7 @@ def optimise_modes(
 
 
 def _solution(problem: Problem, best: Solved | None, tried: Sequence[Solved]) -> Solution:
-    """The best of several sequences, or the first, with what all have cost; why it ended early."""
+    """Return the best sequence, or the first, with the effort of all and the reason it ended."""
     found = reassemble(problem, best or tried[0], [s.outcome.statistics for s in tried])
     last = tried[-1].outcome
     if last.status not in STOPPED:
@@ -230,12 +230,12 @@ def _solution(problem: Problem, best: Solved | None, tried: Sequence[Solved]) ->
     message = f"ocp '{problem.name}': {last.sentence}"
     if best is None:
         return replace(found, status=last.status, message=message, cause=last.cause, modes={})
-    message += " What there is are the best modes so far."
+    message += " The result has the best modes so far."
     return replace(found, status=last.status, message=message, cause=last.cause)
 
 
 def refusal(problem: Problem) -> str:
-    """Why a problem has no optimise_modes, in a sentence; empty where it has one."""
+    """Return the reason why modes of a problem cannot be optimised, or ""."""
     if not any(phase.model.contacts for phase in problem.chain):
         return "expected a model with contacts, got none"
     if problem.scenarios:
@@ -244,14 +244,14 @@ def refusal(problem: Problem) -> str:
             "times under one control"
         )
     if any(phase.via and not isinstance(phase.T, float | int) for phase in problem.chain):
-        return "expected phases of fixed duration where there are via points; split them there"
+        return "expected phases of fixed duration with via points; split them at the via points"
     if reasons := [text for phase in problem.chain if (text := restless(phase.model))]:
         return reasons[0]
     return ""
 
 
 def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, float]:
-    """Numbers of all parameters of the models by name."""
+    """Return values of all parameters of the models by name."""
     found: dict[str, float] = {}
     for span in problem.spans:
         found |= {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
@@ -261,7 +261,7 @@ def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, fl
 def _readings(
     problem: Problem, known: Known, widths: Mapping[str, float]
 ) -> Iterator[tuple[Leg, ...]]:
-    """Sequences that the motion may be read as, the most likely one first."""
+    """Yield possible mode sequences of the motion, the most likely one first."""
     seen: set[str] = set()
     for rests in (True, False):
         for factor in CREEP:
@@ -275,7 +275,7 @@ def _readings(
 def _attempts(
     limits: Sequence[int], problem: Problem, known: Known, widths: Mapping[str, float]
 ) -> Iterator[tuple[int, tuple[Leg, ...]]]:
-    """Limits of iterations and sequences: all of these with the first limit, then with the next."""
+    """Yield iteration limits and sequences: all sequences with one limit, then with the next."""
     sequences: list[tuple[Leg, ...]] = []
     for legs in _readings(problem, known, widths):
         sequences.append(legs)
@@ -284,7 +284,7 @@ def _attempts(
 
 
 def settled(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
-    """Without superfluous arcs, and with rests where contacts touch zero as they slip."""
+    """Remove superfluous arcs, and insert stick where slipping contacts touch zero."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
         legs = pruned(solved.legs, GONE * modes_solver.shortest)
@@ -301,7 +301,7 @@ def settled(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
 
 
 def better(modes_solver: ModeSolver, solved: Solved, width: float, keep: Keep) -> Solved:
-    """The best of the sequence and of those next to it."""
+    """Return the best of the sequence and its neighbours."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
         for legs in neighbours(solved.legs, width):
@@ -322,11 +322,11 @@ def better(modes_solver: ModeSolver, solved: Solved, width: float, keep: Keep) -
 
 
 def _fine(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
-    """On intervals so short that holding the inputs costs next to nothing.
+    """Refine the intervals until holding the inputs costs almost nothing.
 
-    What that costs is estimated, well enough where two meshes agree on the cost without it. As long
-    as they do not, all intervals are halved. Where a rest follows its level the estimate is too
-    large, and what the last mesh has gained decides.
+    That cost is estimated, reliably if two meshes agree on the cost without it. Until they do, all
+    intervals are halved. If stiction follows its level the estimate is too large, and the gain of
+    the last mesh decides.
     """
     before = inf, inf
     for _ in range(ROUNDS):
@@ -349,7 +349,7 @@ def _fine(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
         )
         parts = solved.legs, solved.discretisation, meshes
         finer = keep(modes_solver.on(*parts, solved.known, 1e-4))
-        if not finer.ok:  # a long way along a flat valley
+        if not finer.ok:  # a flat minimum: a long distance to the solution
             finer = keep(modes_solver.on(*parts, finer.known, 1e-2))
         if not finer.ok:
             break

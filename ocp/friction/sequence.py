@@ -1,9 +1,9 @@
-"""Sequences of modes: who slips which way and who rests, and from when to when.
+"""Mode sequences: slip directions and stick of contacts over time.
 
-A contact slips forwards (+1), rests (0) or slips backwards (-1). A `Run` is the time it spends in
-one of these, a `Track` its runs in order. Where several contacts meet, a motion is a row of
-`Arc`s between the instants at which any of them changes; instants that the user has set, ends
-of phases and via points, bound the `Leg`s, inside which durations are free.
+A contact slips forwards (+1), sticks (0) or slips backwards (-1). A `Run` is the time it spends in
+one of these modes, a `Track` its runs in order. For several contacts, a motion is a sequence of
+`Arc`s between the instants at which any of them changes; instants set by the user, ends of phases
+and via points, bound the `Leg`s, inside which durations are free.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SAME_INSTANT = 1e-9
-"""Part of the whole duration below which two instants are one."""
+"""Share of the whole duration below which two instants coincide."""
 
 
 @final
 @dataclass(frozen=True)
 class Run:
-    """A contact in one mode from `begin` to `end` [s]: +1 and -1 slip, 0 rest."""
+    """A contact in one mode from `begin` to `end` [s]: +1 and -1 slip, 0 stick."""
 
     mode: int
     begin: float
@@ -32,20 +32,20 @@ class Run:
 @final
 @dataclass(frozen=True)
 class Track:
-    """The runs of one contact, without gaps; the contact may exist for a part of the motion."""
+    """Runs of one contact, without gaps; the contact may exist for a part of the motion."""
 
     contact: str
     runs: tuple[Run, ...]
 
     def at(self, t: float) -> int | None:
-        """The mode at a time; None where there is no such contact then."""
+        """Return the mode at a time; None if the contact does not exist then."""
         return next((run.mode for run in self.runs if run.begin <= t <= run.end), None)
 
 
 @final
 @dataclass(frozen=True)
 class Arc:
-    """All contacts keep their modes from `begin` to `end` [s]; modes by the name of the contact."""
+    """Interval [s] with constant modes of all contacts; modes by the name of the contact."""
 
     modes: Mapping[str, int]
     begin: float
@@ -53,19 +53,19 @@ class Arc:
 
     @property
     def duration(self) -> float:
-        """How long it lasts [s]."""
+        """Duration [s]."""
         return self.end - self.begin
 
 
 @final
 @dataclass(frozen=True)
 class Leg:
-    """Arcs between two instants that the user has set.
+    """Arcs between two instants set by the user.
 
     Attributes:
-        phase: number of the user's phase.
-        part: how many of its via points lie before.
-        arcs: in order; their durations add up to that of the leg.
+        phase: index of the user's phase.
+        part: number of its via points before.
+        arcs: in order; their durations add up to the duration of the leg.
     """
 
     phase: int
@@ -79,12 +79,12 @@ class Leg:
 
 
 def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> Track:
-    """The track of one contact from its sliding velocities.
+    """Deduce the track of one contact from its sliding velocities.
 
     Args:
         t, slip: times [s], and sliding velocities there, shape (n,).
-        creep: slower than this it rests: a smooth law creeps under load.
-        shortest: runs shorter than this [s] belong to their neighbours.
+        creep: slower than this it sticks: a smooth law creeps under load.
+        shortest: runs shorter than this [s] are merged with their neighbours.
     """
     modes = np.where(np.abs(slip) < creep, 0, np.sign(slip)).astype(int)
     first = np.flatnonzero(np.append(True, np.diff(modes) != 0))
@@ -106,15 +106,15 @@ def with_rests(
     width: float,
     ends: tuple[bool, bool] = (True, True),
 ) -> Track:
-    """`track` with a rest of about `width` [s] at every reversal, and where asked at its ends.
+    """Return `track` with stick of about `width` [s] at every reversal, and optionally at its ends.
 
-    One that is not needed shrinks when the durations are chosen, and is pruned; one that is
-    missing cannot grow.
+    Unnecessary stick intervals shrink when the durations are optimised, and are removed; missing
+    ones cannot appear.
 
     Args:
-        can_rest: whether some control can hold the contact at a time: a rest that nothing can hold
-            would leave the program without a solution.
-        ends: whether the contact is at rest at the start and at the end.
+        can_rest: whether some control can hold the contact at a time: stick that nothing can hold
+            would make the program infeasible.
+        ends: whether the contact sticks at the start and at the end.
     """
     runs: list[Run] = []
     for run in track.runs:
@@ -136,7 +136,7 @@ def with_rests(
 
 
 def cut(tracks: Sequence[Track], leg: tuple[int, int], begin: float, end: float) -> Leg:
-    """The leg (phase, part) from `begin` to `end`: cut where any contact changes its mode."""
+    """Return the leg (phase, part) from `begin` to `end`, cut at every change of mode."""
     inside = {run.end for track in tracks for run in track.runs if begin < run.end < end}
     near = SAME_INSTANT * (end - begin)
     times = [begin]
@@ -150,7 +150,7 @@ def cut(tracks: Sequence[Track], leg: tuple[int, int], begin: float, end: float)
 
 
 def placed(legs: Sequence[Leg], durations: Sequence[float]) -> tuple[Leg, ...]:
-    """`legs` with other durations of their arcs, one after the other from the same start."""
+    """Return `legs` with other durations of their arcs, in sequence from the same start."""
     times = iter(durations)
     t = legs[0].arcs[0].begin
     found: list[Leg] = []
@@ -164,27 +164,27 @@ def placed(legs: Sequence[Leg], durations: Sequence[float]) -> tuple[Leg, ...]:
 
 
 def pruned(legs: Sequence[Leg], shortest: float) -> tuple[Leg, ...]:
-    """`legs` without the arcs that are not longer than `shortest` [s].
+    """Return `legs` without arcs up to `shortest` [s] long.
 
-    Neighbours that now are alike become one; the last arc of a leg stays whatever it is.
+    Equal neighbours are merged; the last arc of a leg always stays.
     """
     return tuple(_without(leg, shortest) for leg in legs)
 
 
 def count(legs: Sequence[Leg]) -> int:
-    """Number of arcs."""
+    """Return the number of arcs."""
     return sum(len(leg.arcs) for leg in legs)
 
 
 def flat(legs: Sequence[Leg]) -> tuple[Arc, ...]:
-    """All arcs in order."""
+    """Return all arcs in order."""
     return tuple(arc for leg in legs for arc in leg.arcs)
 
 
 def inserted(
     legs: Sequence[Leg], number: int, contact: str, mode: int, begin: float, end: float
 ) -> tuple[Leg, ...]:
-    """`legs` with the `contact` in another mode from `begin` to `end` inside arc `number`."""
+    """Return `legs` with `contact` in another mode from `begin` to `end` inside arc `number`."""
     found: list[Leg] = []
     seen = 0
     for leg in legs:
@@ -203,7 +203,7 @@ def inserted(
 
 
 def tracks_of(legs: Sequence[Leg]) -> dict[str, tuple[Run, ...]]:
-    """Contact -> its runs, over all legs."""
+    """Return contact -> its runs, over all legs."""
     found: dict[str, list[Run]] = {}
     for arc in flat(legs):
         for contact, mode in arc.modes.items():
@@ -212,7 +212,7 @@ def tracks_of(legs: Sequence[Leg]) -> dict[str, tuple[Run, ...]]:
 
 
 def shown(legs: Sequence[Leg]) -> str:
-    """The sequence in short, such as "0+0- | -0": legs apart, contacts of a arc in brackets."""
+    """Return the sequence as text, such as "0+0- | -0": legs separated, contacts in brackets."""
 
     def sign(modes: Mapping[str, int]) -> str:
         signs = "".join("-0+"[mode + 1] for mode in modes.values())
@@ -222,7 +222,7 @@ def shown(legs: Sequence[Leg]) -> str:
 
 
 def _merged(runs: Sequence[Run]) -> Iterator[Run]:
-    """Runs of which no neighbours are alike."""
+    """Yield runs with equal neighbours merged."""
     held: Run | None = None
     for run in runs:
         if held is not None and held.mode == run.mode:
@@ -253,10 +253,10 @@ def _without(leg: Leg, shortest: float) -> Leg:
 
 
 def neighbours(legs: Sequence[Leg], width: float) -> Iterator[tuple[Leg, ...]]:
-    """Sequences with one arc more, of about `width` [s], where changes of mode meet.
+    """Yield sequences with an additional arc of about `width` [s] where changes of mode coincide.
 
-    At the end of a leg the modes of the next one come earlier, or its own last longer, contact by
-    contact; inside a leg contacts that change together change one after the other.
+    At the end of a leg the modes of the next one start earlier, or its own last modes end later,
+    for each contact; inside a leg simultaneous changes of contacts become consecutive.
     """
     for k, (leg, then) in enumerate(pairwise(legs)):
         last, first = leg.arcs[-1], then.arcs[0]
@@ -283,7 +283,7 @@ def neighbours(legs: Sequence[Leg], width: float) -> Iterator[tuple[Leg, ...]]:
 
 
 def _changes(before: Arc, after: Arc) -> list[str]:
-    """Contacts of both arcs whose modes differ."""
+    """Return contacts of both arcs whose modes differ."""
     both = [name for name in before.modes if name in after.modes]
     return [name for name in both if before.modes[name] != after.modes[name]]
 

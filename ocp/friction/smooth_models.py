@@ -1,4 +1,4 @@
-"""The models with smooth friction, and how wide it is smoothed: in multiples of the speeds."""
+"""Models with smooth friction, and their smoothing widths in multiples of the speeds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,23 +22,23 @@ from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
 
 WIDTH = 1e-3
-"""Width [m/s] of a stand-in by default, where the law has no velocity scale."""
+"""Default width [m/s] of a substitute for a law without a velocity scale."""
 Array = NDArray[np.float64]
 LEAST = 0.1
-"""Share of the scale before that a contact keeps which hardly moves: at rest it has none."""
+"""Least ratio of a contact's scale to the previous one, for contacts that barely move."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Width:
-    """A parameter of a smooth model that sets how wide the layer around v = 0 is.
+    """A parameter of a smooth model that sets the smoothing width around v = 0.
 
     Attributes:
-        contact: whose it is.
+        contact: name of the contact.
         parameter: its name in `Model.p`, "<contact>_<width>".
         number: its value in the user's model.
         exponent: of the width in it: 1 for a width, -1 for a steepness.
-        layer: width of the layer [m/s] at `number`; None for one of a load, as `JointFriction.eps`.
+        layer: smoothing width [m/s] at `number`; None for one of a load, as `JointFriction.eps`.
     """
 
     contact: str
@@ -48,10 +48,10 @@ class Width:
     layer: float | None
 
     def at(self, layer: float) -> float:
-        """Its value for a layer of that width [m/s].
+        """Return its value for a smoothing width [m/s].
 
         Raises:
-            ValueError: it is not one of velocities.
+            ValueError: it is not a width of velocities.
         """
         if self.layer is None:
             raise checks.refused(self.parameter, "a width of velocities", "one of a load [N]")
@@ -59,21 +59,21 @@ class Width:
 
 
 def smooth_model(model: Model) -> Model:
-    """`model` with the widths of all contacts as parameters, see `widths`.
+    """Return `model` with the widths of all contacts as parameters, see `widths`.
 
-    Laws that neither smooth nor are smooth (with modes, with states, without regularisation) have
-    a stand-in with the same sliding force and static level. With s = tanh 4x, x = v / width,
+    Laws that neither smooth nor are smooth (with modes, with states, without regularisation) are
+    replaced by one with the same sliding force and static level. With s = tanh 4x, x = v / width,
 
         F = (1 + s)/2 sliding(|v|, +1) + (1 - s)/2 sliding(-|v|, -1) + excess x / (x^2/4 + 3/4)^2
 
-    where the excess is what the static level has above sliding at v = 0.
+    where the excess is the static level minus the sliding force at v = 0.
     Raises ValueError for laws without a force on each side of v = 0.
     """
     return _smoothed(model)[0]
 
 
 def widths(model: Model) -> tuple[Width, ...]:
-    """The widths of `smooth_model(model)`."""
+    """Return the widths of `smooth_model(model)`."""
     return _smoothed(model)[1]
 
 
@@ -113,7 +113,7 @@ def _local(contact: Contact, parameter: Variable) -> str:
 
 
 def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable], Any]:
-    """Force [N], its widths as parameters, and the velocity [m/s] over which it changes."""
+    """Return the force [N], its widths as parameters, and the velocity scale [m/s]."""
     law = _law(contact)
     by_itself = not law.states and not any(i.name not in contact.further for i in law.inputs)
     if by_itself and (law.widths or not jumps(model, contact)):
@@ -132,7 +132,7 @@ def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable]
 
 
 def _parameter(model: Model, contact: Contact, width: Parameter) -> Variable:
-    """A width of a law as a parameter of the model."""
+    """Return a width of a law as a parameter of the model."""
     number = float(at_start(width.value, model.p))
     return Variable(
         f"{contact.name}_{width.name}", contact.unit(width.unit), start=number, nominal=number,
@@ -161,9 +161,9 @@ def _law(contact: Contact) -> Law:
 
 
 def jumps(model: Model, contact: Contact) -> bool:
-    """Whether friction holds at rest at all, at the start of the parameters.
+    """Return True if friction is nonzero at rest, at the start values of the parameters.
 
-    Viscous friction does not, nor does a contact that nothing presses.
+    It is zero for viscous friction and for an unloaded contact.
     """
     law = _law(contact)
     if ca.SX(contact.N).is_zero():
@@ -175,11 +175,11 @@ def jumps(model: Model, contact: Contact) -> bool:
 @final
 @dataclass(frozen=True)
 class Scale:
-    """What the widths of one contact are relative to.
+    """Scales of the widths of one contact.
 
     Attributes:
-        speed: largest sliding velocity on the way [m/s or rad/s].
-        load: largest normal force [N]; 1 where it is not known.
+        speed: largest sliding velocity of the motion [m/s or rad/s].
+        load: largest normal force [N]; 1 if unknown.
     """
 
     speed: float
@@ -191,7 +191,7 @@ Scales = Mapping[str, Scale]
 
 
 def smoothed(problem: Problem) -> Problem:
-    """`problem` with smooth friction everywhere, its widths as parameters."""
+    """Return `problem` with smooth friction everywhere, its widths as parameters."""
     made = {id(phase.model): smooth_model(phase.model) for phase in problem.chain}
     phases = tuple(replace(phase, model=made[id(phase.model)]) for phase in problem.chain)
     return replace(problem, phases=Chain(phases))
@@ -200,11 +200,11 @@ def smoothed(problem: Problem) -> Problem:
 def scales_of(
     problem: Problem, smooth: Problem, points: Points, before: Scales | None = None
 ) -> Scales:
-    """The scales of the motion `points`; none is below `LEAST` of that before.
+    """Return the scales of the motion `points`, at least `LEAST` times the previous ones.
 
     Args:
-        problem: the user's.
-        smooth: the same with smooth models, to which the points belong.
+        problem: the user's problem.
+        smooth: the problem of `points`, with smooth models.
     """
     found: dict[str, list[float]] = {}
     for span, own in zip(smooth.spans, points.spans, strict=True):
@@ -222,16 +222,16 @@ def scales_of(
 
 
 def same_size(a: Scales, b: Scales, factor: float) -> bool:
-    """Whether no speed differs by more than `factor`."""
+    """Return True if no speed differs by more than `factor`."""
     speeds = [(a[name].speed, b[name].speed) for name in a]
     return all(max(pair) <= factor * min(pair) for pair in speeds)
 
 
 def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
-    """What to expect of a motion from those of several starts.
+    """Return the expected scales of a motion from those of several starts.
 
-    The largest median speed of all contacts that slide, or that turn: a body that stands still in
-    straight lines from end to end will move, and layers that are too wide do no harm.
+    The speed is the largest median speed of all contacts that slide, or that turn: a body at rest
+    in straight lines from end to end will move, and too wide layers do no harm.
     """
     turning = {c.name: c.turning for phase in problem.chain for c in phase.model.contacts}
     speeds = {name: float(np.median([s[name].speed for s in scales])) for name in turning}
@@ -245,9 +245,9 @@ def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
 
 
 def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
-    """Values of the widths of the smooth models: layers of `level` times the scales.
+    """Return values of the widths of the smooth models: `level` times the scales.
 
-    Those of the user's laws are the smallest.
+    The widths of the user's laws are lower bounds.
     """
     found: dict[str, float] = {}
     for phase in problem.chain:
@@ -263,7 +263,7 @@ def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
 
 
 def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
-    """Contact -> width of its layer [m/s or rad/s] at `level`."""
+    """Return contact -> smoothing width [m/s or rad/s] at `level`."""
     found: dict[str, float] = {}
     for phase in problem.chain:
         laws = {c.name: c.law for c in phase.model.contacts}
@@ -275,9 +275,9 @@ def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
 
 
 def own_level(problem: Problem, scales: Scales) -> float:
-    """How wide the layers of the user's own laws are, in multiples of the speeds.
+    """Return the smoothing width of the user's laws, in multiples of the speeds.
 
-    The narrowest counts; 0 for laws without layers.
+    The narrowest counts; 0 for laws without smoothing.
     """
     found = [
         width.layer / scales[width.contact].speed
@@ -290,14 +290,14 @@ def own_level(problem: Problem, scales: Scales) -> float:
 
 
 def has_jumps(problem: Problem) -> bool:
-    """Whether any contact of any phase holds at rest, so that there is something to sharpen."""
+    """Return True if any contact of any phase has stiction, so that a homotopy is needed."""
     return any(jumps(phase.model, c) for phase in problem.chain for c in phase.model.contacts)
 
 
 def values_at(span: Span, contact: Contact, points: SpanPoints) -> Array:
-    """Sliding velocities and normal forces at the collocation points, shape (2, N d).
+    """Return sliding velocities and normal forces at the collocation points, shape (2, N d).
 
-    A normal force that needs the friction force of another contact is zero here.
+    A normal force that depends on the friction force of another contact is zero here.
     """
     column = ca.vertcat(contact.slip, ca.SX(contact.N))
     if strays(column, ca.vertcat(*span.symbols)):

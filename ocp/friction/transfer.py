@@ -1,4 +1,4 @@
-"""Models of arcs, motions taken over to them by name and time, and their sequence of modes."""
+"""Models of arcs, transfer of motions to them by name and time, and their mode sequence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,25 +22,25 @@ from symfric.model import Contact, Model, Output
 
 CATCH = 5.0
 """Margins of the sliding force that catch a contact which has slipped back for an instant, or that
-stop one: with none it would only graze rest, and the least deviation lets it slip on."""
+stop one: with none the stop is only grazed, and the smallest deviation lets the contact slip on."""
 
 FIRST = "_first_"
 PULLED = "_pull"
 CAUGHT = "_catch"
 STOPPED = "_stop"
 LEFT = "rest_left"
-"""State of an arc at whose end a contact leaves rest: the time that is left of it [s]."""
+"""State of an arc at whose end a contact breaks away: its remaining time [s]."""
 
 
 def breaks_away(span: Span) -> bool:
-    """Whether some contact breaks away or is caught at the start of an arc."""
+    """Return True if some contact breaks away or is caught at the start of an arc."""
     return any(name.endswith((PULLED, CAUGHT)) for name in span.model.outputs)
 
 
 def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
-    """The state that is zero when `contact` rests, and the side to which it grows with the slip.
+    """Return the state proportional to the slip of `contact`, and the sign of the factor.
 
-    None where slip is not a multiple of one state.
+    None if the slip is not a multiple of one state.
     """
     x = model.vector("x")
     slope = ca.SX(ca.jacobian(contact.slip, x))
@@ -62,27 +62,27 @@ def arc_model(
     sizes: Mapping[str, float],
     margin: tuple[float, float],
 ) -> Model:
-    """The mode model of `modes` with what the conditions of an arc are about as outputs.
+    """Return the mode model of `modes` with the quantities of an arc's conditions as outputs.
 
     Args:
-        model: the user's.
-        modes: of all contacts that can rest.
+        model: the user's model.
+        modes: of all contacts that can stick.
         released: contacts that break away at the start of the arc.
-        leaving: contacts that leave rest at its end by a force that cannot jump, and to which side.
-        caught: contacts that come to rest at its start under a control that may jump, and to which
-            side they slipped until then.
-        stopped: the same of all contacts that come to rest.
+        leaving: contacts that break away at its end by a force that cannot jump -> direction.
+        caught: contacts that stop at its start under a control that may jump -> direction of the
+            previous slip.
+        stopped: the same for all contacts that stop.
         sizes: contact -> typical static level [N].
-        margin: share of the level that a rest keeps away from it, and how long before the end of
-            the arc it begins to give that up where it leaves [s].
+        margin: friction margin in stick as a share of the level, and the time before the end of
+            the arc in which it decreases to zero if the contact breaks away [s].
 
     Returns:
-        One with "<contact>_slip"; as shares of the level "<contact>_up" and "<contact>_down", the
-        room of a rest to both sides, less margin times tanh (time left / that time)^2 where it
-        leaves; "<contact>_first_up" and "<contact>_first_down", the same for what states and inputs
-        at the start of an interval ask for; "<contact>_pull", excess of what is released; and
-        "<contact>_catch", room below the force of sliding back of what is caught, "<contact>_stop"
-        below that of sliding on of what is stopped.
+        A model with "<contact>_slip"; as shares of the level "<contact>_up" and "<contact>_down",
+        the friction margins in both directions, minus margin times tanh (remaining time / that
+        time)^2 before break-away; "<contact>_first_up" and "<contact>_first_down", the same for
+        states and inputs at the start of an interval; "<contact>_pull", the excess of released
+        contacts; "<contact>_catch", the margin to the force of sliding back of caught contacts,
+        and "<contact>_stop" to that of sliding on of stopped contacts.
     """
     kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
     key = (
@@ -127,22 +127,22 @@ def arc_model(
 
 
 def _with_clock(model: Model) -> tuple[Model, ca.SX]:
-    """`model` with the time that is left as a state, and its symbol."""
+    """Return `model` with the remaining time as a state, and its symbol."""
     left = Variable(LEFT, "s", nominal=0.1)
     return replace(model, **further_states(model, (left,), ca.SX(-1.0))), left.symbol
 
 
 Array = NDArray[np.float64]
 SHORT_RUN = 5e-3
-"""Share of the whole duration below which a run counts to its neighbours."""
+"""Share of the whole duration below which a run is merged with its neighbours."""
 NEW_REST = 2.5e-3
-"""Share of the whole duration that a rest has where it is put into a sequence."""
+"""Initial duration of an inserted stick interval, over the whole duration."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of a motion over its whole time.
+    """A known motion over its whole time.
 
     Attributes:
         motion: signals at times, and inputs held from times on.
@@ -155,7 +155,7 @@ class Known:
     chosen: Mapping[str, float]
 
     def signal(self, name: str, t: Array) -> Array:
-        """Values at times, on straight lines between the known ones; zero where nobody knows."""
+        """Return values at times by linear interpolation; zero if unknown."""
         values = self.motion.signals.get(name, np.zeros(0))
         known = np.isfinite(values)
         if not known.any():
@@ -163,16 +163,16 @@ class Known:
         return np.interp(t, self.motion.t[known], values[known])
 
     def held(self, name: str, t: Array) -> Array:
-        """An input at times."""
+        """Return the values of an input at times."""
         values = self.motion.controls.get(name)
-        if values is None:  # a state there: an input with bounded rate
+        if values is None:  # there a state: an input with bounded rate
             return self.signal(name, t)
         at = np.searchsorted(self.motion.t_control, t, side="right") - 1
         found = values[np.maximum(at, 0)]
         return np.where(np.isfinite(found), found, 0.0)
 
     def along(self, model: Model, expression: ca.SX, t: Array) -> Array:
-        """Values of an expression in the symbols of `model`, shape (n, times)."""
+        """Return values of an expression in the symbols of `model`, shape (n, times)."""
         groups = [np.zeros((0, t.size)), np.zeros((0, t.size)), np.zeros((0, t.size))]
         for k, (letter, take) in enumerate(
             zip("xzu", (self.signal, self.signal, self.held), strict=True)
@@ -186,7 +186,7 @@ class Known:
 
 
 def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Points:
-    """Where the solver starts: span k of `into` takes what was known while arc k lasts."""
+    """Return the initial guess: phase k of `into` takes the known motion during arc k."""
     pairs = enumerate(zip(into.problem.spans, arcs, strict=True))
     return Points(
         tuple(_in_span(into, k, span, arc, known) for k, (span, arc) in pairs), dict(known.chosen)
@@ -214,7 +214,7 @@ def _in_span(into: Transcription, number: int, span: Span, arc: Arc, known: Know
 
 
 def _consistent(span: Span, t: Array, x: Array, u: Array, known: Known) -> Array:
-    """Algebraic variables that solve their equations at the points, one step of Newton's method."""
+    """Return algebraic variables at the points, after one step of Newton's method."""
     model = span.model
     z = np.array([known.signal(v.name, t) for v in model.z]).reshape(-1, t.size)
     if not model.z:
@@ -230,11 +230,11 @@ def _consistent(span: Span, t: Array, x: Array, u: Array, known: Known) -> Array
 @final
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """How a motion is read.
+    """Settings for deducing modes from a motion.
 
     Attributes:
-        creep: contact -> sliding velocity below which it rests.
-        rests: whether rests are put in at reversals and at the ends.
+        creep: contact -> sliding velocity below which it sticks.
+        rests: whether stick is inserted at reversals and at the ends.
     """
 
     creep: Mapping[str, float]
@@ -242,12 +242,12 @@ class Reading:
 
 
 def sequence_of(problem: Problem, known: Known, reading: Reading) -> tuple[Leg, ...]:
-    """The legs of `problem` with the arcs of a motion.
+    """Return the legs of `problem` with the arcs of a motion.
 
     Args:
-        problem: the user's, one scenario.
+        problem: the user's problem, one scenario.
         known: its sharpened motion.
-        reading: how fast creeping is.
+        reading: thresholds of stick.
     """
     tracks: list[Track] = []
     for stay in _stays(problem):
@@ -264,7 +264,7 @@ def sequence_of(problem: Problem, known: Known, reading: Reading) -> tuple[Leg, 
 
 
 def sizes_of(problem: Problem, known: Known) -> dict[str, float]:
-    """Typical static level of each contact [N]: its mean over the motion."""
+    """Return the typical static level of each contact [N]: its mean over the motion."""
     found: dict[str, float] = {}
     for phase in problem.chain:
         held = mode_model(phase.model, {c.name: 0 for c in rubbing(phase.model)})
@@ -277,7 +277,7 @@ def sizes_of(problem: Problem, known: Known) -> dict[str, float]:
 
 
 def starts_at_rest(problem: Problem, known: Known, creep: Mapping[str, float]) -> tuple[str, ...]:
-    """Contacts that do not slide at the very start."""
+    """Return contacts without slip at the start."""
     model, start = problem.chain[0].model, known.motion.t[:1]
     return tuple(
         c.name
@@ -287,7 +287,7 @@ def starts_at_rest(problem: Problem, known: Known, creep: Mapping[str, float]) -
 
 
 def _stays(problem: Problem) -> list[tuple[int, int, str]]:
-    """(first phase, last phase, contact): where a contact is without a break."""
+    """Return (first phase, last phase, contact) of each uninterrupted contact."""
     found: list[tuple[int, int, str]] = []
     for number, phase in enumerate(problem.chain):
         for contact in rubbing(phase.model):
@@ -319,7 +319,7 @@ def _track(
 def _rested(
     problem: Problem, known: Known, reading: Reading, track: Track, tracks: Sequence[Track]
 ) -> Track:
-    """`track` with rests where something can hold the contact."""
+    """Return `track` with stick where inputs can hold the contact."""
     phases = known.motion.phases
     whole = phases[-1].end - phases[0].begin
     ends = np.array([track.runs[0].begin, track.runs[-1].end])
@@ -344,9 +344,9 @@ def _rested(
 def _holdable(
     problem: Problem, number: int, known: Known, name: str, tracks: Sequence[Track], t: float
 ) -> bool:
-    """Whether inputs within their bounds can hold a contact at a time.
+    """Return True if inputs within their bounds can hold a contact at a time.
 
-    The force that this takes is affine in the inputs of most models; of others this is its tangent.
+    The force needed is affine in the inputs of most models; for others this is its tangent.
     """
     model, span = problem.chain[number].model, problem.spans[number]
     others = {track.contact: track.at(t) or 0 for track in tracks}

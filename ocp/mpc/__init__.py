@@ -1,10 +1,17 @@
 """Receding horizons: quadratic programs on implicit steps, as C, and in closed loop."""
 
-from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
-from ocp.mpc.controller import Controller as Controller
-from ocp.mpc.controller import ControllerCheck as ControllerCheck
-from ocp.mpc.controller import GeneratedController as GeneratedController
-from ocp.mpc.controller import controller_of as controller_of
-from ocp.mpc.design import CycleStatus as CycleStatus
-from ocp.mpc.session import Action as Action
-from ocp.mpc.session import Session as Session
+from typing import TYPE_CHECKING
+
+from symfric.foundation.lazy import load_lazily
+
+if TYPE_CHECKING:
+    from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
+    from ocp.mpc.controller import Controller as Controller
+    from ocp.mpc.controller import ControllerCheck as ControllerCheck
+    from ocp.mpc.controller import GeneratedController as GeneratedController
+    from ocp.mpc.controller import controller_of as controller_of
+    from ocp.mpc.design import CycleStatus as CycleStatus
+    from ocp.mpc.session import Action as Action
+    from ocp.mpc.session import Session as Session
+
+load_lazily(__name__)

@@ -75,9 +75,10 @@ class CallBenchmark(table.Report):
     def shown(self) -> Iterator[table.Table | str]:
         """Each task by each way, and what that costs."""
         yield table.of(
-            "Processor time; ratio: over the first way of the task", self.rows,
-            {"task": "task", "by": "who", "time [us]": table.shortened("time_us"), "per": "per",
-             "error": table.known_only("error"), "ratio": table.rounded("ratio", 2)},
+            "Processor time of short tasks", self.rows,
+            {"task": "task", "method": "who", "time [us]": table.shortened("time_us"),
+             "per": "per", "relative error": table.shortened("error"),
+             "ratio to the first": table.rounded("ratio", 2)},
         )  # fmt: skip
 
 

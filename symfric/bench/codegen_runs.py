@@ -1,8 +1,8 @@
-"""Generated code as it runs: units and `simulate`; compensators in the loop of a drive."""
+"""Generated code at run time: FMUs compared with `simulate`, compensators in a control loop."""
 
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, ExactCoulomb, Hold, Law, LuGre, SolveError, simulate
-from symfric.bench.table import Cell, Goal, Section
+from symfric.bench.table import Cell, Goal, Table
 from symfric.codegen import Block, law_block
 from symfric.compensation import (
     Cascade,
@@ -37,33 +37,34 @@ from symfric.scenes import ALL_SCENES, Scene, drive
 Array = NDArray[np.float64]
 RTOL, STEP, TINY = 1e-9, 0.1, 1e-4
 MOST = 10.0
-"""Largest difference of a state, in rtol."""
+"""Goal for the largest difference of a state [rtol]."""
 LAWS: Mapping[str, Callable[[], Law]] = {
     "bm": BrownMcPhee,
     "lugre": LuGre,
     "exact": ExactCoulomb,
 }
 QUICK = ("rabinowicz", "drive", "pendulum")
-UNIT_TITLE = (
-    f"FMI 3.0 co-simulation at rtol {RTOL:g}, communication step {STEP:g} s: kB; seconds of the "
-    "compiler; largest difference of a state from simulate, in rtol of its size; attempts; us of a "
-    f"communication step; us and attempts of one of {TINY:g} s; messages of FMPy's validator. bm "
-    "is Brown and McPhee's law, exact Coulomb's by modes"
-)
-UNIT_HEAD = ("scene, law", "kB", "cc", "rtol", "attempts", "us", "tiny", "a tiny", "fmpy")
+UNIT_TABLE = Table(
+    f"FMI 3.0 co-simulation at rtol {RTOL:g}, communication step {STEP:g} s; largest difference of "
+    "a state from `simulate`, relative to its largest value. Laws: bm: Brown-McPhee, exact: "
+    "Coulomb with events",
+    ("scene, law", "size [kB]", "compile time [s]", "largest difference [rtol]", "attempts",
+     "time per step [us]", f"time per step of {TINY:g} s [us]", f"attempts per step of {TINY:g} s",
+     "messages of FMPy's validator"),
+    (),
+    ("scene, law", "kB", "cc", "rtol", "attempts", "us", "tiny", "a tiny", "fmpy"),
+)  # fmt: skip
 
 
 @final
 class _UnfinishedError(Exception):
-    """A scene that `simulate` does not finish either."""
+    """Error for a scene that `simulate` does not finish either."""
 
 
-def units(quick: bool) -> Section:
-    """A row for every scene and law that `simulate` finishes; `quick` leaves most out."""
+def units(quick: bool) -> Table:
+    """Measure every scene and law that `simulate` finishes; `quick`: three scenes."""
     if find_compiler() is None:
-        return Section(
-            UNIT_TITLE, UNIT_HEAD, (), notes=("found no C compiler ($CC, gcc, clang or cc)",)
-        )
+        return replace(UNIT_TABLE, notes=("found no C compiler ($CC, gcc, clang or cc)",))
     rows: list[list[Cell]] = []
     goals: list[Goal] = []
     left: list[str] = []
@@ -71,23 +72,23 @@ def units(quick: bool) -> Section:
         for law, make in LAWS.items():
             name = f"{scene} {law}"
             try:
-                row, worst, said = _unit_row(ALL_SCENES[scene](make()))
+                row, worst, messages = _unit_row(ALL_SCENES[scene](make()))
             except _UnfinishedError:
                 left.append(name)
                 continue
-            rows.append([name, *row, said if isinstance(said, str) else float(said)])
+            rows.append([name, *row, messages if isinstance(messages, str) else float(messages)])
             if law != "exact":
                 goals.append(Goal(f"{name}: difference [rtol]", worst, MOST))
-            if not isinstance(said, str):
-                goals.append(Goal(f"{name}: messages of FMPy", float(said), 0.0))
+            if not isinstance(messages, str):
+                goals.append(Goal(f"{name}: messages of FMPy", float(messages), 0.0))
     notes = [f"simulate itself does not finish {', '.join(left)}"] if left else []
     if find_spec("fmpy") is None:
-        notes.append("FMPy's validator did not look: pip install fmpy")
-    return Section(UNIT_TITLE, UNIT_HEAD, rows, goals, notes)
+        notes.append("FMPy's validator was not run: pip install fmpy")
+    return replace(UNIT_TABLE, rows=rows, goals=goals, notes=notes)
 
 
 def _unit_row(scene: Scene) -> tuple[list[Cell], float, str | int]:
-    """Numbers of a unit, its largest difference in rtol, and messages of the validator."""
+    """Return the cells of an FMU, its largest difference [rtol], and messages of the validator."""
     with tempfile.TemporaryDirectory() as folder:
         times: Array = STEP * np.arange(round(scene.t_end / STEP) + 1, dtype=float)
         unit = export_fmu(scene, Path(folder) / "unit.fmu", rtol=RTOL, t_end=float(times[-1]))
@@ -99,7 +100,7 @@ def _unit_row(scene: Scene) -> tuple[list[Cell], float, str | int]:
             same = simulate(model, float(times[-1]), t_eval=times, rtol=RTOL, u=held)
         except SolveError as error:
             raise _UnfinishedError from error
-        # an event at a communication point, or at the start, happens in the step behind it
+        # an event at a communication point, or at the start, occurs in the step after it
         names = [v.name for v in model.x if not v.name.endswith("mode")]
         found, attempts, each = _stepped(unit, names, times, given)
         worst = max(
@@ -118,7 +119,7 @@ def _unit_row(scene: Scene) -> tuple[list[Cell], float, str | int]:
 def _stepped(
     unit: Exported, names: list[str], times: Array, given: Mapping[str, Array]
 ) -> tuple[Array, float, float]:
-    """States at `times`, attempts, and seconds of a communication step."""
+    """Return states at `times`, attempts, and time of a communication step [s]."""
     rows: list[Array] = []
     with running(unit.path, **{name: float(values[0]) for name, values in given.items()}) as one:
         rows.append(one.get(names))
@@ -132,7 +133,7 @@ def _stepped(
 
 
 def _tiny(unit: Exported) -> tuple[float, float]:
-    """Seconds and attempts of a tiny communication step, of many over a tenth of a second."""
+    """Return mean time [s] and attempts of tiny communication steps over a tenth of a second."""
     count = round(0.1 / TINY)
     with running(unit.path) as one:
         begin = perf_counter()
@@ -143,28 +144,28 @@ def _tiny(unit: Exported) -> tuple[float, float]:
 
 
 def _validated(unit: Exported) -> str | int:
-    """Number of messages of FMPy's validator, or a dash."""
+    """Return the number of messages of FMPy's validator, or a dash."""
     if find_spec("fmpy") is None:
         return "-"
     return len(import_module("fmpy.validation").validate_fmu(str(unit.path)))
 
 
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
-"""With N = 1 N the coefficients are newtons."""
+"""Coefficients of friction; with N = 1 N they are forces in newtons."""
 BELIEVED = LuGre(sigma_0=1e5, sigma_1=300.0, **CURVE)
 SPRINGS = tuple(Element(k, 0.25) for k in (1.5e5, 7.5e4, 4.5e4, 3e4))
 SOFTER = tuple(Element(element.k / 2, element.alpha) for element in SPRINGS)
 CONTROLLER = Cascade(kp=20.0, kv=60.0, ki=10.0)
 GOAL = 5.0
-"""Times that the RMS error is to be smaller."""
+"""Goal for the reduction factor of the RMS error."""
 PROVEN = "excess 0"
-"""The case whose numbers have goals."""
+"""Case whose numbers have goals."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Blocks that are tried together, with their cases."""
+    """Blocks that act together, with their cases."""
 
     blocks: tuple[Block, ...]
     cases: Mapping[str, Mapping[str, float]]
@@ -172,7 +173,7 @@ class Trial:
 
 
 def plants(quick: bool) -> dict[str, Law]:
-    """Friction that the compensators do not know; those with events take longer."""
+    """Return the friction laws of the plants; those with events take longer."""
     found: dict[str, Law] = {
         "LuGre": LuGre(sigma_0=2e5, sigma_1=400.0, **CURVE),
         "elasto": ElastoPlastic(sigma_0=2e5, sigma_1=400.0, **CURVE),
@@ -184,7 +185,7 @@ def plants(quick: bool) -> dict[str, Law]:
 
 
 def trials() -> list[Trial]:
-    """The compensator of LuGre with numbers that are right and off, observers, and both."""
+    """Return LuGre compensators with exact and wrong parameters, observers, and combinations."""
     law = compensator(BELIEVED, v_blend=0.02, error_gain=CONTROLLER.kp)
     plain = compensator(BELIEVED, v_blend=0.02)
     levels = {f"levels x {s:g}": _levels(s) for s in (1.0, 0.5, 0.8, 1.2)}
@@ -205,8 +206,8 @@ def _levels(s: float) -> dict[str, float]:
     return {"scale_coulomb": s, "scale_stribeck": s}
 
 
-def compensation(quick: bool) -> Section:
-    """The table: a row a case, two columns a plant."""
+def compensation(quick: bool) -> Table:
+    """Measure every case on every plant."""
     known, ended = plants(quick), dict[str, str]()
     columns = {name: _column(name, law, ended) for name, law in known.items()}
     first = next(iter(columns.values()))
@@ -217,22 +218,22 @@ def compensation(quick: bool) -> Section:
         goal
         for name, column in columns.items()
         for goal in (
-            Goal(f"{name}: RMS error, times smaller", column[PROVEN][0], GOAL, ">="),
+            Goal(f"{name}: reduction of the RMS error [1]", column[PROVEN][0], GOAL, ">="),
             Goal(f"{name}: hunting [counts]", column[PROVEN][1], 1.0),
         )
     ]
-    return Section(
-        "Compensators in C in a position loop (1 kg, 1 kHz, counts of 1 um, one sample late): "
-        "times that the RMS error of a sine is smaller / hunting after a step [counts]",
+    return Table(
+        "Compensators in C in a position loop (1 kg, 1 kHz, counts of 1 um, delay of one sample): "
+        "reduction factor of the RMS error of a sine / hunting after a step [counts]",
         ["case", *known],
         rows,
-        goals,
-        _notes(ended),
+        goals=goals,
+        notes=_notes(ended),
     )
 
 
 def _column(name: str, law: Law, ended: dict[str, str]) -> dict[str, tuple[float, float]]:
-    """Case -> times smaller, counts of hunting; the first case is without compensation."""
+    """Return case -> (reduction factor, hunting [counts]); the first case has no compensation."""
     plant = drive(law, m=CONTROLLER.inertia, N=1.0)
     found: dict[str, tuple[float, float]] = {}
     for trial in trials():
@@ -256,12 +257,12 @@ def _compensated(smaller: float, hunting: float) -> str:
 
 
 def _size() -> str:
-    """The cost of the compensator's C on a small core."""
+    """Describe the cost of the compensator's C on a small core."""
     whole, alone = on_core(trials()[0].blocks[0]), on_core(law_block(BELIEVED))
     if not whole.ok:
         return f"No instructions counted: {whole.status}"
     return (
-        f"Cortex-M4F, float, guards: {whole.average:.0f} instructions a sample (LuGre alone "
+        f"Cortex-M4F, float, guards: {whole.average:.0f} instructions per sample (LuGre alone "
         f"{alone.average:.0f}), text {whole.text:.0f} B, stack {whole.stack:.0f} B."
     )
 
@@ -270,8 +271,9 @@ def _notes(ended: Mapping[str, str]) -> list[str]:
     return [
         *(f"{case}: {why}" for case, why in ended.items()),
         _size(),
-        "RMS: times smaller than without; hunts: to and fro in the last half of 20 s at rest.",
-        "Believed: LuGre with half the stiffness of the plants; levels x s: both levels of it.",
-        f"{PROVEN}: without the excess of break-away over sliding, the one beside the goals.",
-        "its k = 0: LuGre moved by the measured velocity alone, as a law without a reference is.",
+        "Hunting: peak-to-peak motion in the second half of 20 s at rest.",
+        "Compensators use LuGre with half the stiffness of the plants; levels x s scales both "
+        "levels of it.",
+        f"{PROVEN}: without the excess of break-away over sliding friction; this case has goals.",
+        "its k = 0: LuGre driven by the measured velocity alone, without correction.",
     ]

@@ -110,25 +110,31 @@ class LaneBenchmark(table.Report):
     def shown(self) -> Iterator[table.Table | str]:
         """Members side by side and one by one."""
         yield table.of(
-            "Processor time of a member on one core; ratio: alone over side by side", self.rows,
-            {"case": "case", "lanes": "lanes", "us each": table.rounded("member_us", 1),
-             "alone": table.rounded("alone_us", 1), "ratio": table.rounded("ratio", 2),
-             "attempts": table.rounded("attempts")},
+            "Processor time of an ensemble and of the same runs one by one, on one core",
+            self.rows,
+            {"case": "case", "lanes": "lanes",
+             "time per member [us]": table.rounded("member_us", 1),
+             "one by one [us]": table.rounded("alone_us", 1),
+             "ratio to the ensemble": table.rounded("ratio", 2),
+             "attempts per member": table.rounded("attempts")},
         )  # fmt: skip
         yield table.of(
-            "again: another call, one member; equal: with the same attempts; differ: at the end",
+            "Overhead of a call, and agreement of the ensemble with single runs",
             self.rows,
-            {"case": "case", "members": "members", "again [ms]": table.rounded("again_ms", 2),
-             "equal": lambda r: f"{r.equal:.0%}", "differ": table.shortened("difference")},
+            {"case": "case", "members": "members",
+             "repeated call, one member [ms]": table.rounded("again_ms", 2),
+             "members with equal attempts": lambda r: f"{r.equal:.0%}",
+             "relative difference at the end": table.shortened("difference")},
         )  # fmt: skip
         yield from on_graphics_processor(self.cuda)
 
 
 def on_graphics_processor(rows: Sequence[CudaRow]) -> Iterator[table.Table | str]:
-    """Members a second, or why none was run."""
+    """Yield the table of members per second, and devices or the reasons why nothing was run."""
     yield table.Table(
-        "Members a second on a graphics processor, beside all cores",
-        ["case", "type", "a second", "on cores", "ratio", "differ"],
+        "Ensembles on a graphics processor and on all cores",
+        ["case", "type", "members per second", "members per second, all cores",
+         "ratio to all cores", "relative difference at the end"],
         [
             [r.case, r.real, r.device, "", "", ""] if r.why else
             [r.case, r.real, round(r.per_second), round(r.cores_per_second), round(r.ratio, 1),

@@ -4,52 +4,31 @@ import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from time import process_time
-from typing import Any, Literal, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 from identification import Dataset, Fit, Fitted, InverseDynamics
 from symfric.bench import table
 from symfric.bench.file_campaign import File, campaign
+from symfric.bench.table import Goal
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import SolveError
 
 CASES = {
-    "lugre": "memory",
-    "coverage": "repeats",
-    "emps": "measured",
-    "laws": "measured",
-    "franka": "measured",
-    "starts": "repeats",
-    "gms": "memory",
+    "lugre": "_memory",
+    "coverage": "_repeats",
+    "emps": "_measured",
+    "laws": "_measured",
+    "franka": "_measured",
+    "starts": "_repeats",
+    "gms": "_memory",
     "files": "",
 }
-"""Case -> module `symfric.bench.identification_<module>`, this one for none, whose function of the
-name of the case measures its rows: `case(quick)`."""
-
-
-@final
-@dataclass(frozen=True)
-class Row(table.Judged):
-    """One measured number and its goal.
-
-    Attributes:
-        case, what: which problem, and what was measured with its unit.
-        value, goal: the number, and what it should be.
-        better: whether it should be at most ("<=") or at least (">=") the goal.
-        seconds: processor time of the measurement [s].
-        note: what a reader has to know, such as data that are absent.
-    """
-
-    case: str
-    what: str
-    value: float
-    goal: float
-    better: Literal["<=", ">="]
-    seconds: float
-    note: str = ""
+"""Case -> end of the name of the module `symfric.bench.identification...`, whose function
+`case(quick)` yields the rows."""
 
 
 @final
@@ -57,16 +36,16 @@ class Row(table.Judged):
 class IdentificationBenchmark(table.Report):
     """Measurements by case."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[Goal, ...]
 
     def shown(self) -> Iterator[table.Table | str]:
         """Numbers and their goals."""
         yield table.of(
-            "Identification beside its goals", self.rows,
-            {"case": "case", "what": "what", "measured": table.known_only("value"),
+            "Identification: measured numbers and goals", self.rows,
+            {"case": "case", "quantity": "what", "measured": table.shortened("value"),
              "goal": lambda r: f"{r.better} {r.goal:g}",
-             "met": lambda r: "yes" if r.met else "no", "cpu [s]": table.rounded("seconds", 1),
-             "note": "note"},
+             "met": lambda r: "yes" if r.met else "no",
+             "processor time [s]": table.rounded("seconds", 1), "note": "note"},
         )  # fmt: skip
 
     def drawn(self) -> tuple[Any, ...]:
@@ -87,15 +66,12 @@ def bench_identification(
     """
     check_names("bench identification: cases", cases, CASES)
     every = table.each(cases, progress, str)
-    rows = (row for case in every for row in _measure_of(case)(quick))
+    rows = (replace(row, case=case) for case in every for row in _measure_of(case)(quick))
     return IdentificationBenchmark(table.until_stopped(rows))
 
 
-def _measure_of(case: str) -> Callable[[bool], Iterator[Row]]:
-    module = CASES[case]
-    if not module:
-        return files
-    return getattr(import_module(f"symfric.bench.identification_{module}"), case)
+def _measure_of(case: str) -> Callable[[bool], Iterator[Goal]]:
+    return getattr(import_module(f"symfric.bench.identification{CASES[case]}"), case)
 
 
 TRUTH = {"m": 95.0, "offset": -3.0, "mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
@@ -172,7 +148,7 @@ def _is_close(fit: Fitted, name: str) -> bool:
     return error <= CLOSE * abs(TRUTH[name]) or inside
 
 
-def files(quick: bool = False) -> Iterator[Row]:
+def files(quick: bool = False) -> Iterator[Goal]:
     """Rows of the bench: files answered wrongly in silence, crashes, good files that are right.
 
     Each file of `symfric.bench.file_campaign` is read, checked and fitted by inverse dynamics with
@@ -198,11 +174,11 @@ def files(quick: bool = False) -> Iterator[Row]:
     hidden = sum(o.truth == "hidden" for o in found)
     refused, flagged = counts["bad", "refused"], counts["bad", "flagged"]
     note = f"{bad} bad: {refused} refused, {flagged} flagged, {counts['bad', 'right']} right"
-    yield Row("files", "bad files wrong in silence", len(silent), 0, "<=", seconds,
-              "; ".join([note, *silent]))  # fmt: skip
-    yield Row("files", "good files right", (len(good) - len(lost)) / max(len(good), 1), 1.0, ">=",
-              0.0, ", ".join(lost))  # fmt: skip
+    note = "; ".join([note, *silent])
+    yield Goal("bad files with a wrong result and no warning", len(silent), 0, "<=", seconds, note)
+    share = (len(good) - len(lost)) / max(len(good), 1)
+    yield Goal("fraction of good files with a right result", share, 1.0, ">=", note=", ".join(lost))
     crashed = [o.file for o in found if o.kind == "crashed"]
-    yield Row("files", "crashes", len(crashed), 0, "<=", 0.0, ", ".join(crashed))
-    yield Row("files", "files", len(found), 20 if quick else 100, ">=", 0.0,
-              f"{hidden} with what no file can show")  # fmt: skip
+    yield Goal("crashes", len(crashed), 0, note=", ".join(crashed))
+    note = f"{hidden} with defects that the file cannot reveal"
+    yield Goal("files", len(found), 20 if quick else 100, ">=", note=note)

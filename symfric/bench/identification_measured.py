@@ -22,7 +22,7 @@ from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from symfric import GMS, Element, LuGre
-from symfric.bench.identification import Row
+from symfric.bench.table import Goal
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law, law_from_text
 from symfric.laws.catalogue import ALL_LAWS
@@ -146,7 +146,7 @@ def free_run(model: Model, record: Record, first: int = 0, end: int | None = Non
 # ---- rows
 
 
-def emps(quick: bool) -> Iterator[Row]:
+def emps(quick: bool) -> Iterator[Goal]:
     """Errors on the validation record, and what the engine takes.
 
     Source of data and measure: Janot, Gautier, Brunot, "Data set and reference models of EMPS",
@@ -181,7 +181,7 @@ def emps(quick: bool) -> Iterator[Row]:
     if not (EMPS / VALIDATION).is_file():
         for what, goal in (("closed loop x [%]", 1.4e-3), ("closed loop force [%]", 4.65),
                            ("open loop [mm]", 5.5)):  # fmt: skip
-            yield Row("emps", what, nan, goal, "<=", 0.0, "data absent (../shared/data/EMPS)")
+            yield Goal(what, nan, goal, note="data absent (../shared/data/EMPS)")
         return
     data, other = (Dataset.read(str(EMPS / name)) for name in (ESTIMATION, VALIDATION))
     began = process_time()
@@ -190,8 +190,8 @@ def emps(quick: bool) -> Iterator[Row]:
     errors, seconds = loop_errors(fit, other), process_time() - began
     widths = ", widths fitted" if chosen.free else ""
     note = f"{chosen.law}{widths}: {chosen.error:.2f} % of the force in the half left out"
-    yield Row("emps", "closed loop x [%]", errors["x"], 1.4e-3, "<=", seconds, note)
-    yield Row("emps", "closed loop force [%]", errors["force"], 4.65, "<=", seconds, note)
+    yield Goal("closed loop x [%]", errors["x"], 1.4e-3, "<=", seconds, note)
+    yield Goal("closed loop force [%]", errors["force"], 4.65, "<=", seconds, note)
     laws, some = (DIRECTIONS[1:], SOME) if quick else (DIRECTIONS, slice(None))
     rows = [
         _open_row("", data, other, HALVES[some], laws),
@@ -205,7 +205,7 @@ def emps(quick: bool) -> Iterator[Row]:
 
 def _open_row(
     what: str, data: Dataset, other: Dataset, lengths: Sequence[float], laws: Sequence[str]
-) -> Row:
+) -> Goal:
     """Choose by `data`, judge by `other`."""
     began = process_time()
     chosen = open_loop(data, lengths, laws)
@@ -214,10 +214,10 @@ def _open_row(
         f"{chosen.law} in windows of {chosen.kind.windows:g} s, {1e3 * chosen.error:.2f} mm on the "
         "blocks left out; the other record has 3 % more friction"
     )
-    return Row("emps", f"open loop{what} [mm]", value, 5.5, "<=", process_time() - began, note)
+    return Goal(f"open loop{what} [mm]", value, 5.5, "<=", process_time() - began, note)
 
 
-def _speed(data: Dataset, law: str) -> Row:
+def _speed(data: Dataset, law: str) -> Goal:
     """Processor time of all positions of the record with their derivatives."""
     asked = Fit(Shooting(["x"], engine="sampled"), law, data).prepared()
     residuals = replace(asked.task.residuals, substeps=1)  # type: ignore[type-var]
@@ -229,7 +229,7 @@ def _speed(data: Dataset, law: str) -> Row:
         residuals.at(values)
         times.append(process_time() - began)
     note = f"{data.size} samples, {len(residuals.names)} unknowns, best of 5"
-    return Row("emps", "record and its derivatives [s]", min(times), 0.15, "<=", sum(times), note)
+    return Goal("record and its derivatives [s]", min(times), 0.15, "<=", sum(times), note)
 
 
 FRANKA = Path(__file__).resolve().parents[3] / "shared" / "data" / "franka_low_speed"
@@ -243,7 +243,7 @@ GEARED = (
 )
 
 
-def franka(quick: bool) -> Iterator[Row]:
+def franka(quick: bool) -> Iterator[Goal]:
     """LuGre and GMS under the measured velocity, from the data's own starts; some 15 s in all.
 
     Measured at joints 2 and 7 with reversals (some 400 Hz); the paper that published them reports
@@ -256,12 +256,12 @@ def franka(quick: bool) -> Iterator[Row]:
         for name, law, free in _bristles():
             what = f"case {case}, {name}: RMSE of the second half [N m]"
             if not path.is_file():
-                yield Row("franka", what, np.nan, goal, "<=", 0.0, f"{path} is not here")
+                yield Goal(what, nan, goal, note=f"data absent ({path})")
                 continue
             begun = process_time()
             value = _rest_error(path, joint, law, free)
             note = GEARED if (case, name) == (4, "LuGre") else ""
-            yield Row("franka", what, value, goal, "<=", process_time() - begun, note)
+            yield Goal(what, value, goal, "<=", process_time() - begun, note)
 
 
 def _bristles() -> Iterator[tuple[str, Law, list[str]]]:
@@ -295,7 +295,7 @@ BEST = "asymmetric(andersson)"
 ENDED = (Status.SOLVED, Status.DOUBTFUL)
 
 
-def laws(quick: bool) -> Iterator[Row]:
+def laws(quick: bool) -> Iterator[Goal]:
     """The rows; `quick` takes every fourth law.
 
     Each law of the catalogue without states is fitted by inverse dynamics, as it is and with its
@@ -304,9 +304,7 @@ def laws(quick: bool) -> Iterator[Row]:
     """
     if not (EMPS / ESTIMATION).is_file():
         note = "data absent (../shared/data/EMPS)"
-        yield Row(
-            "laws", "laws that neither fit nor are refused", float("nan"), 0.0, "<=", 0.0, note
-        )
+        yield Goal("laws that neither fit nor are refused", nan, 0.0, note=note)
         return
     data, begun = Dataset.read(EMPS / ESTIMATION), process_time()
     names = [n for n in static_laws() for n in (n, f"asymmetric({n})")][:: 4 if quick else 1]
@@ -316,12 +314,12 @@ def laws(quick: bool) -> Iterator[Row]:
     note = f"of {len(names)}; refused: {sum(t == 'refused' for t in outcomes.values())}"
     note += "".join(f"; {name}: {outcomes[name]}" for name in lost)
     what = "laws that neither fit nor are refused"
-    yield Row("laws", what, float(len(lost)), 0.0, "<=", seconds, note)
+    yield Goal(what, float(len(lost)), 0.0, "<=", seconds, note)
     begun = process_time()
     best = Fit(InverseDynamics(), BEST, data).solve(throw=False)
     (error,) = best.errors.values()
     took = process_time() - begun
-    yield Row("laws", f"force error of {BEST} [%]", error.relative, 3.0, "<=", took)
+    yield Goal(f"force error of {BEST} [%]", error.relative, 3.0, "<=", took)
 
 
 def static_laws() -> list[str]:

@@ -20,7 +20,7 @@ from identification.select import Ranking, select
 from identification.starts.maxwell_slip import fit_elements
 from identification.starts.measured import Measured
 from symfric import GMS, Element, MaxwellSlip, Slider
-from symfric.bench.identification import Row
+from symfric.bench.table import Goal
 from symfric.foundation.status import Status
 from symfric.integrator import Hold, simulate
 from symfric.laws import Law, LuGre
@@ -154,7 +154,7 @@ def _shoot(names: list[str], u: Array) -> tuple[ca.Function, ca.Function]:
     return ca.Function("y", [Q], [y]), ca.Function("J", [Q], [ca.jacobian(y, Q)])
 
 
-def lugre(quick: bool) -> Iterator[Row]:
+def lugre(quick: bool) -> Iterator[Goal]:
     """Seeds that find the truth, time of a fit, and time against cvodes on the same seeds.
 
     A mass of 1 kg is driven by a force that is held for each millisecond: pre-sliding, break-away
@@ -175,9 +175,9 @@ def lugre(quick: bool) -> Iterator[Row]:
         doubted += fit.status not in (Status.SOLVED, Status.ACCEPTABLE)
     total = process_time() - begun
     spread = f"{min(seconds):.2f} to {max(seconds):.2f} s"
-    yield Row("lugre", "found, % of seeds", 100 * found / seeds, 95, ">=", total)
-    yield Row("lugre", "median of a fit, s", float(np.median(seconds)), 4, "<=", total, spread)
-    yield Row("lugre", "right model doubted, % of seeds", 100 * doubted / seeds, 5, "<=", total)
+    yield Goal("found, % of seeds", 100 * found / seeds, 95, ">=", total)
+    yield Goal("median of a fit, s", float(np.median(seconds)), 4, "<=", total, spread)
+    yield Goal("right model doubted, % of seeds", 100 * doubted / seeds, 5, "<=", total)
     times, note = list[float](), list[str]()
     for seed in range(against):
         given = case(seed)
@@ -187,7 +187,7 @@ def lugre(quick: bool) -> Iterator[Row]:
         error = max(abs(values[n] / x - 1) for n, x in TRUTH.items())
         note.append(f"{times[-1]:.1f} s, error {100 * error:.2g} %")
     ratio = float(np.median(times) / np.median(seconds[:against]))
-    yield Row("lugre", "cvodes, times as long", ratio, 5, ">=", sum(times), "; ".join(note))
+    yield Goal("cvodes, times as long", ratio, 5, ">=", sum(times), "; ".join(note))
 
 
 FORCE_NOISE = 0.01
@@ -200,37 +200,35 @@ TURNS = {
 """Amplitudes [um] and frequencies [Hz] of slow paths."""
 
 
-def gms(quick: bool) -> Iterator[Row]:
+def gms(quick: bool) -> Iterator[Goal]:
     """A law fitted to a slow path and a fast one, and what it says of another path."""
     count, thin = (4, 2) if quick else (10, 1)
     law, rng = _true(count), np.random.default_rng(1)
     paths = [_slow("hysteresis", 0.02 * thin), _fast(2e-3 * thin)]
     begun = process_time()
     elements = _elements(law, paths[0], rng)
-    yield Row(
-        "gms", f"Maxwell-slip, {count} elements: error of the true force over the noise",
-        elements, 0.3, "<=", process_time() - begun, "convex, then radii; no start values",
-    )  # fmt: skip
+    what = f"Maxwell-slip, {count} elements: error of the true force over the noise"
+    note = "convex, then radii; no start values"
+    yield Goal(what, elements, 0.3, "<=", process_time() - begun, note)
     begun = process_time()
     fit = _fitted(law, count, paths, rng)
     seconds = process_time() - begun
     left = max(e.rms for e in fit.errors.values()) / FORCE_NOISE
-    yield Row("gms", f"GMS, {count} elements: residual over the noise", left, 1.1, "<=", seconds)
+    yield Goal(f"GMS, {count} elements: residual over the noise", left, 1.1, "<=", seconds)
     if fit.law is not None:
         t, x = _slow("other", 0.02)
         wrong = forces(fit.law, t, x) - forces(law, t, x)
         value = float(np.sqrt(np.mean(wrong**2))) / FORCE_NOISE
-        yield Row("gms", "the same on another path: error over the noise", value, 1.0, "<=", 0.0)
+        yield Goal("the same on another path: error over the noise", value, 1.0)
     for name, true in (("mu_s", 1.05), ("v_s", 98 * MICRO), ("C", 24.0)):
         off = 100 * abs(fit.parameters[name].value / true - 1)
-        yield Row("gms", f"error of {name} [%]", off, 10.0, "<=", 0.0)
+        yield Goal(f"error of {name} [%]", off, 10.0)
     begun = process_time()
     ranking = ranked()
     gms, lugre = (ranking[name].validation for name in ("gms", "lugre"))
-    yield Row(
-        "gms", "GMS data: error of LuGre on another path over that of GMS", lugre / gms, 1.0, ">=",
-        process_time() - begun, f"LuGre is called {ranking['lugre'].status}",
-    )  # fmt: skip
+    what = "GMS data: error of LuGre on another path over that of GMS"
+    note = f"status of LuGre: {ranking['lugre'].status}"
+    yield Goal(what, lugre / gms, 1.0, ">=", process_time() - begun, note)
 
 
 def ranked() -> Ranking:

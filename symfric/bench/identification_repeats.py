@@ -17,7 +17,7 @@ from identification.residuals.inverse import InverseDynamics
 from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from symfric import law_from_text
-from symfric.bench.identification import Row
+from symfric.bench.table import Goal
 from symfric.foundation.parameters import Variable, with_values
 from symfric.foundation.status import Status
 from symfric.integrator import Linear, Trajectory, simulate
@@ -27,7 +27,6 @@ from symfric.scenes import Drive, QuarterCar
 
 Array = NDArray[np.float64]
 
-CASE = "coverage"
 SEEDS, QUICK = 200, 20
 STAGE = {"m": 95.0, "offset": -3.0, "mu_d": 20.0, "sigma_2": 200.0}
 """Truth of the inverse dynamics, with levels like those of EMPS."""
@@ -40,7 +39,7 @@ T = np.linspace(0.0, 4.0, 201)
 U = 3 * np.sin(2 * np.pi * 0.7 * T) + 2 * np.sin(2 * np.pi * 1.9 * T + 1)
 
 
-def coverage(quick: bool) -> Iterator[Row]:
+def coverage(quick: bool) -> Iterator[Goal]:
     """The rows; `quick` takes a tenth of the seeds.
 
     A known drive is measured again and again with other noise, white or AR(1) with 0.9 from sample
@@ -107,7 +106,7 @@ def _seed(fit: Fitted, truth: dict[str, float], begun: float) -> _Seed:
     )  # fmt: skip
 
 
-def _covered(kind: str, rho: float, truth: dict[str, float], found: list[_Seed]) -> Iterator[Row]:
+def _covered(kind: str, rho: float, truth: dict[str, float], found: list[_Seed]) -> Iterator[Goal]:
     """Coverage over the parameters, bias of the mass, false alarms."""
     noise = "AR(1) 0.9" if rho else "white"
     where, n = f"{kind}, {noise} noise", len(found)
@@ -116,15 +115,15 @@ def _covered(kind: str, rho: float, truth: dict[str, float], found: list[_Seed])
     shown = ", ".join(f"{name} {c:.3f}" for name, c in zip(truth, each, strict=True))
     all_of = f"{where}: 95 % intervals that hold the truth"
     mean = float(each.mean())
-    yield Row(CASE, all_of, mean, 0.90, ">=", seconds, f"{shown}; {n} seeds")
-    yield Row(CASE, all_of, mean, 0.99, "<=", 0.0)
+    yield Goal(all_of, mean, 0.90, ">=", seconds, f"{shown}; {n} seeds")
+    yield Goal(all_of, mean, 0.99)
     bias = abs(np.mean([one.off[0] for one in found])) / np.mean([one.error[0] for one in found])
-    yield Row(CASE, f"{where}: bias of the mass [standard errors]", float(bias), 1.0, "<=", 0.0)
+    yield Goal(f"{where}: bias of the mass [standard errors]", float(bias), 1.0)
     doubted = float(np.mean([one.doubtful for one in found]))
-    yield Row(CASE, f"{where}: right model not called solved", doubted, 0.05, "<=", 0.0)
+    yield Goal(f"{where}: right model not called solved", doubted, 0.05)
 
 
-def _added(seeds: int) -> Row:
+def _added(seeds: int) -> Goal:
     """Scatter of the estimates with a noisy velocity besides the position, over that without."""
     begun = process_time()
     off: dict[str, list[Array]] = {"x": [], "x and v": []}
@@ -139,10 +138,10 @@ def _added(seeds: int) -> Row:
     alone, both = (np.sqrt(np.mean(np.square(some), axis=0)) for some in off.values())
     worst = float(np.max(both / alone))
     what = "a noisy velocity added: largest rms error over that without"
-    return Row(CASE, what, worst, 1.1, "<=", process_time() - begun, f"{len(off['x'])} seeds")
+    return Goal(what, worst, 1.1, "<=", process_time() - begun, f"{len(off['x'])} seeds")
 
 
-def _wrong(seeds: int) -> Row:
+def _wrong(seeds: int) -> Goal:
     """Data with a Stribeck peak, fitted without one."""
     begun = process_time()
     peak = Stribeck(mu_s=28.0, mu_d=20.0, v_s=0.01, v_eps=1e-4, sigma_2=200.0)
@@ -152,7 +151,7 @@ def _wrong(seeds: int) -> Row:
         fit = Fit(INVERSE, "coulomb+viscous", data, starts=1).solve(throw=False)
         missed += fit.status is Status.SOLVED
     what = "a Stribeck peak fitted without one: called solved"
-    return Row(CASE, what, missed / seeds, 0.0, "<=", process_time() - begun, f"{seeds} seeds")
+    return Goal(what, missed / seeds, 0.0, "<=", process_time() - begun, f"{seeds} seeds")
 
 
 def _drive() -> Drive:
@@ -276,7 +275,7 @@ def was_found(fit: Fitted, truth: Mapping[str, float]) -> bool:
     return fit.status.ok
 
 
-def starts(quick: bool = False) -> Iterator[Row]:
+def starts(quick: bool = False) -> Iterator[Goal]:
     """The number of 20 fits that find the truth, and the time of the slowest.
 
     Each seed has other noise and another start, all parameters multiplied by factors drawn
@@ -302,20 +301,13 @@ def starts(quick: bool = False) -> Iterator[Row]:
         yield from _counted(f"quarter car, {name}, starts off by 2", fits, truth)
 
 
-def _counted(what: str, fits: Iterator[Fit], truth: Mapping[str, float]) -> Iterator[Row]:
+def _counted(what: str, fits: Iterator[Fit], truth: Mapping[str, float]) -> Iterator[Goal]:
     good, times = list[bool](), list[float]()
     for fit in fits:
         begin = process_time()
         good.append(was_found(fit.solve(throw=False), truth))
         times.append(process_time() - begin)
     share = 100.0 * sum(good) / len(good)
-    note = f"{sum(good)} of {len(good)}; CPU a fit: median {np.median(times):.1f} s, largest "
-    yield Row(
-        "starts",
-        f"{what}: found [%]",
-        share,
-        100.0,
-        ">=",
-        sum(times),
-        note + f"{max(times):.1f} s",
-    )
+    note = f"{sum(good)} of {len(good)}; processor time per fit: median {np.median(times):.1f} s, "
+    note += f"largest {max(times):.1f} s"
+    yield Goal(f"{what}: found [%]", share, 100.0, ">=", sum(times), note)

@@ -139,28 +139,32 @@ class Benchmark(table.Report):
         yield table.of(
             "Time of a run of 20 s against its error", self.rows,
             {"case": "case", "integrator": "integrator", "rtol": "rtol",
-             "error": table.shortened("error"), "time [ms]": lambda r: 1e3 * r.time_s,
-             "steps": "steps"},
+             "relative error": table.shortened("error"),
+             "time per run [ms]": table.shortened("time_s", 1e3), "steps": "steps"},
         )  # fmt: skip
         yield table.Table(
-            "At equal error, time over that of symfric compiled",
-            ["case", "error", "integrator", "time [ms]", "ratio"],
-            [[r["case"], r["error"], r["integrator"], 1e3 * r["time_s"], round(r["ratio"], 2)]
+            "Time at equal error",
+            ["case", "relative error", "integrator", "time per run [ms]",
+             "ratio to symfric compiled"],
+            [[r["case"], r["error"], r["integrator"], table.short(1e3 * r["time_s"]),
+              round(r["ratio"], 2)]
              for r in self.ratios()],
         )  # fmt: skip
         yield table.of(
-            "Ensembles; cvodes: time of a Python loop over cvodes at the same rtol over ours",
+            "Ensembles, and a Python loop over cvodes at the same rtol",
             self.ensemble,
             {"case": "case", "members": "members", "threads": "workers",
-             "us each": table.rounded("member_s", 1, 1e6),
-             "efficiency": table.rounded("efficiency", 2), "cvodes": table.rounded("ratio", 1)},
+             "time per member [us]": table.rounded("member_s", 1, 1e6),
+             "parallel efficiency": table.rounded("efficiency", 2),
+             "ratio of cvodes to symfric": table.rounded("ratio", 1)},
         )  # fmt: skip
         yield table.of(
-            "Derivatives by p parameters: time of the run with them over that of the run alone",
+            "Derivatives; ratios compare the run with derivatives to the run alone",
             self.sensitivities,
-            {"case": "case", "integrator": "integrator", "p": "parameters",
-             "run [ms]": table.rounded("plain_s", 3, 1e3), "forward": table.rounded("forward", 1),
-             "adjoint": lambda r: "failed" if r.adjoint is None else f"{r.adjoint:.1f}"},
+            {"case": "case", "integrator": "integrator", "parameters": "parameters",
+             "time per run [ms]": table.rounded("plain_s", 3, 1e3),
+             "ratio, forward": table.rounded("forward", 1),
+             "ratio, adjoint": lambda r: "failed" if r.adjoint is None else f"{r.adjoint:.1f}"},
         )  # fmt: skip
         yield from table.not_run(self.skipped)
 

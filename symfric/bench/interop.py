@@ -102,18 +102,19 @@ class InteropBenchmark(table.Report):
     def shown(self) -> Iterator[table.Table | str]:
         """Moves by tool, route and law; CasADi's integrators; what is absent."""
         yield table.of(
-            "0.1 m in 1 s against friction: cost, miss by `simulate` with the law itself",
+            "Move of 0.1 m in 1 s with friction; the miss is that of `simulate` with the law",
             self.moves,
-            {"tool": "tool", "route": lambda m: m.route[:7], "law": "law",
-             "J": lambda m: f"{m.cost:.3f}", "miss": table.shortened("miss"), "it.": "iterations",
-             "s": lambda m: f"{m.time_s:.1f}", "": lambda m: _word(m.answer)},
+            {"tool": "tool", "route": "route", "law": "law",
+             "cost J [N^2 s]": lambda m: f"{m.cost:.3f}", "miss [m]": table.shortened("miss"),
+             "iterations": "iterations", "processor time [s]": lambda m: f"{m.time_s:.1f}",
+             "status": lambda m: _word(m.answer)},
         )  # fmt: skip
         yield table.of(
-            "20 s of stick-slip in CasADi's integrators; time over that of symfric without "
-            "compiler",
+            "20 s of stick-slip with CasADi's integrators and with symfric without a compiler",
             self.runs,
-            {"integrator": "integrator", "law": "law", "error [m]": table.shortened("error"),
-             "time ratio": table.shortened("ratio"), "": "answer"},
+            {"integrator": "integrator", "law": "law",
+             "largest error [m]": table.shortened("error"),
+             "ratio of time to symfric": table.shortened("ratio"), "status": "answer"},
         )  # fmt: skip
         yield from (f"{tool} is not installed: no rows" for tool in self.absent)
 

@@ -64,13 +64,14 @@ class IvpBenchmark(table.Report):
         run: dict[str, table.Column] = {"problem": "problem", "method": "method", "rtol": "rtol"}
         yield table.of(
             "Correct digits of the worst signal at the end", self.rows,
-            {**run, "digits": table.rounded("scd", 1), "wanted": lambda r: r.wanted or "",
-             "steps": "steps", "time [ms]": table.shortened("time_s", 1e3)},
+            {**run, "correct digits": table.rounded("scd", 1),
+             "required digits": lambda r: r.wanted or "",
+             "steps": "steps", "time per run [ms]": table.shortened("time_s", 1e3)},
         )  # fmt: skip
         yield table.of(
-            "Largest value of a constraint that is kept as an acceleration only",
+            "Drift of constraints that are imposed on the accelerations only",
             [r for r in self.rows if r.drift],
-            {**run, "drift": table.shortened("drift")},
+            {**run, "largest constraint violation": table.shortened("drift")},
         )
         yield from table.not_run(
             {f"{r.problem}, {r.method}": r.message for r in self.rows if r.message}

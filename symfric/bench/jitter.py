@@ -105,7 +105,7 @@ class JitterBenchmark(table.Report):
             for c in self.data.curves
             for k in range(c[next(iter(units))].size)
         ]
-        head = ["law", "steps", *(f"{name} [{unit}]" for name, unit in units.items())]
+        head = ["law", "step control", *(f"{name} [{unit}]" for name, unit in units.items())]
         yield table.Table(self.data.title, head, rows)
 
     def drawn(self) -> tuple[Any, ...]:

@@ -10,26 +10,9 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from symfric.bench import exudyn_peer, table
+from symfric.bench import exudyn_peer, mechanisms, table
 from symfric.bench.contenders import MECHANISMS, Array, Contender
-from symfric.bench.mechanisms import (
-    DRIFT_S,
-    SIZES,
-    ChainRow,
-    CompileRow,
-    CountRow,
-    DriftRow,
-    Fact,
-    NormRow,
-    chain,
-    compile_rows,
-    counts,
-    drifts,
-    exponent,
-    facts,
-    norms,
-    scaling,
-)
+from symfric.bench.mechanisms import SIZES, chain
 from symfric.bench.table import best_time, unwarned
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.simulate import simulate
@@ -128,12 +111,12 @@ class MultibodyBenchmark(table.Report):
     """
 
     runs: tuple[RunRow, ...]
-    compiled: tuple[CompileRow, ...] = ()
-    counts: tuple[CountRow, ...] = ()
-    chains: tuple[ChainRow, ...] = ()
-    facts: tuple[Fact, ...] = ()
-    norms: tuple[NormRow, ...] = ()
-    drifts: tuple[DriftRow, ...] = ()
+    compiled: tuple[mechanisms.CompileRow, ...] = ()
+    counts: tuple[mechanisms.CountRow, ...] = ()
+    chains: tuple[mechanisms.ChainRow, ...] = ()
+    facts: tuple[mechanisms.Fact, ...] = ()
+    norms: tuple[mechanisms.NormRow, ...] = ()
+    drifts: tuple[mechanisms.DriftRow, ...] = ()
     skipped: dict[str, str] = field(default_factory=dict[str, str])
 
     def loosest(self, case: str, integrator: str, bound: float) -> RunRow | None:
@@ -167,59 +150,61 @@ class MultibodyBenchmark(table.Report):
     def shown(self) -> Iterator[table.Table | str]:
         """Runs, ratios, compilation, counts, chains, reference numbers, constraints, energy."""
         common: dict[str, table.Column] = {
-            "integrator": "integrator", "rtol": "setting", "error": table.shortened("error"),
+            "integrator": "integrator", "rtol (Exudyn: number of steps)": "setting",
+            "relative error": table.shortened("error"), "steps": "steps",
+            "time per run [ms]": table.shortened("time_s", 1e3),
         }  # fmt: skip
         yield table.of(
-            "Time of a run against its error; rtol: for Exudyn the number of steps", self.runs,
-            {"case": "case", **common, "time [ms]": table.shortened("time_s", 1e3),
-             "steps": "steps", "gcc [s]": table.rounded("compile_s", 2)},
+            "Time of a run against its error", self.runs,
+            {"case": "case", **common, "compile time [s]": table.rounded("compile_s", 2)},
         )  # fmt: skip
         for case in dict.fromkeys(r.case for r in self.runs):
             yield table.of(
-                f"{case}: the loosest tolerance that keeps an error; ratio: over the time of "
-                "`simulate` in joint coordinates, to loop: over that of its compiled loop alone",
+                f"{case}: the loosest tolerance that keeps an error; times relative to "
+                "`simulate` in joint coordinates and to its compiled loop alone",
                 [r for r in self.ratios() if r.case == case],
-                {"bound": "bound", **common, "steps": "steps",
-                 "time [ms]": table.shortened("time_s", 1e3), "ratio": table.rounded("ratio", 1),
-                 "to loop": table.rounded("loop_ratio", 1)},
+                {"error bound": "bound", **common, "ratio to simulate": table.rounded("ratio", 1),
+                 "ratio to the loop": table.rounded("loop_ratio", 1)},
             )  # fmt: skip
         yield table.of(
-            "Our step as machine code, once for all tolerances and parameters", self.compiled,
+            "Step of symfric as machine code, compiled once for all tolerances and parameters",
+            self.compiled,
             {"mechanism": "mechanism", "coordinates": "formulation",
-             "build [s]": table.shortened("build_s"), "lines of C": "lines",
-             "gcc [s]": table.rounded("compile_s", 2)},
+             "build time [s]": table.shortened("build_s"), "lines of C": "lines",
+             "compile time [s]": table.rounded("compile_s", 2)},
         )  # fmt: skip
         yield table.of(
-            "What a mechanism needs: states, algebraic variables, CasADi instructions, nonzeros",
-            self.counts,
-            {"mechanism": "mechanism", "variant": "variant", "in": "formulation", "x": "states",
-             "z": "algebraic", "ode": "ode", "step": "step", "nonzeros": "nonzeros"},
+            "Size of the equations of mechanisms; CasADi instructions", self.counts,
+            {"mechanism": "mechanism", "variant": "variant", "coordinates": "formulation",
+             "states": "states", "algebraic variables": "algebraic",
+             "instructions, accelerations": "ode", "instructions, step": "step",
+             "nonzeros of the Jacobian": "nonzeros"},
         )  # fmt: skip
         growth = ", ".join(f"{name} {value:.2f}" for name, value in self.exponents().items())
         yield table.of(
-            "A step of a chain in the virtual machine; exponents: "
-            f"{growth or 'of two lengths only'}",
+            "Step of a chain in the virtual machine; growth exponents: "
+            f"{growth or 'from two lengths on'}",
             self.chains,
-            {"links": "links", "build [s]": table.shortened("build_s"),
-             "instructions": "instructions", "step [us]": table.shortened("step_s", 1e6)},
+            {"links": "links", "build time [s]": table.shortened("build_s"),
+             "instructions": "instructions", "time per step [us]": table.shortened("step_s", 1e6)},
         )  # fmt: skip
         yield table.of(
-            "Reference numbers and what ours differ by; digits: what they are good for",
-            self.facts,
-            {"case": "case", "t": "t", "signal": "signal",
+            "Reference values and differences from them", self.facts,
+            {"case": "case", "time [s]": "t", "signal": "signal",
              "reference": lambda r: f"{r.reference:.9g}",
-             "off by": lambda r: table.short(r.value - r.reference), "digits": "digits"},
+             "difference": lambda r: table.short(r.value - r.reference),
+             "accuracy of the reference": "digits"},
         )  # fmt: skip
         yield table.of(
             "Largest norms of the constraints", self.norms,
-            {"case": "case", "coordinates": "formulation", "phi [m]": table.shortened("phi"),
-             "phi_dot, relative": table.shortened("phi_dot"),
-             "phi_ddot, relative": table.shortened("phi_ddot")},
+            {"case": "case", "coordinates": "formulation", "positions [m]": table.shortened("phi"),
+             "velocities, relative": table.shortened("phi_dot"),
+             "accelerations, relative": table.shortened("phi_ddot")},
         )  # fmt: skip
         yield table.of(
             "Energy of frictionless mechanisms", self.drifts,
-            {"case": "case", "rtol": "rtol", "t_end [s]": "t_end", "steps": "steps",
-             "relative change": table.shortened("relative")},
+            {"case": "case", "rtol": "rtol", "end time [s]": "t_end", "steps": "steps",
+             "relative change of energy": table.shortened("relative")},
         )  # fmt: skip
         yield from table.not_run(self.skipped)
 
@@ -227,7 +212,10 @@ class MultibodyBenchmark(table.Report):
         """Growth of instructions and time of a step with the links, where chains were measured."""
         if len(self.chains) < 2:
             return {}
-        return {column: exponent(self.chains, column) for column in ("instructions", "step_s")}
+        return {
+            column: mechanisms.exponent(self.chains, column)
+            for column in ("instructions", "step_s")
+        }
 
     def drawn(self) -> tuple[Any, ...]:
         """Work-precision diagram: time against error, a panel per case."""
@@ -251,12 +239,12 @@ def bench_multibody(
     runs, skipped = _runs(quick, progress)
     return MultibodyBenchmark(
         runs=tuple(runs),
-        compiled=tuple(compile_rows(formulations)),
-        counts=tuple(counts(formulations)),
-        chains=tuple(scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
-        facts=tuple(facts()),
-        norms=tuple(norms(formulations)),
-        drifts=tuple(drifts(1.0 if quick else DRIFT_S)),
+        compiled=tuple(mechanisms.compile_rows(formulations)),
+        counts=tuple(mechanisms.counts(formulations)),
+        chains=tuple(mechanisms.scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
+        facts=tuple(mechanisms.facts()),
+        norms=tuple(mechanisms.norms(formulations)),
+        drifts=tuple(mechanisms.drifts(1.0 if quick else mechanisms.DRIFT_S)),
         skipped=skipped,
     )
 

@@ -191,14 +191,16 @@ class RegularisationBenchmark(table.Report):
             ]
             cyclic = any(line[-1].cycle_error == line[-1].cycle_error for line in lines)
             yield table.Table(
-                f"{case}: error at each rtol against {first.reference}, good for "
-                f"{first.uncertain:.1g}; order and cycle at the smallest rtol, cost at the largest",
-                [f"{first.parameter} [{first.unit}]", *(f"{rtol:g}" for rtol in rtols), "order",
-                 *(["cycle"] if cyclic else []), "steps", "[ms]"],
+                f"{case}: error against {first.reference} (accurate to {first.uncertain:.1g}); "
+                "order and error of the last cycle at the smallest rtol, steps and time at the "
+                "largest",
+                [f"{first.parameter} [{first.unit}]", *(f"error at rtol {r:g}" for r in rtols),
+                 "order", *(["error of the last cycle"] if cyclic else []), "steps",
+                 "time per run [ms]"],
                 [
                     [table.short(line[0].value), *(table.short(r.error) for r in line),
-                     table.known(line[-1].order, 2),
-                     *([table.known(line[-1].cycle_error)] if cyclic else []), line[0].steps,
+                     table.short(line[-1].order, 2),
+                     *([table.short(line[-1].cycle_error)] if cyclic else []), line[0].steps,
                      table.short(1e3 * line[0].time_s)]
                     for line in lines
                 ],

@@ -1,4 +1,4 @@
-"""Rows of measurements: they print as tables, turn into JSON, and have goals; honest timing."""
+"""Tables of measurements, their conversion to JSON, goals, and timing."""
 
 import os
 import warnings
@@ -19,25 +19,79 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Cell = str | float
-"""Of a table; text, or a number (NaN: not measured)."""
+"""Cell of a table: a text, or a number (NaN if not measured)."""
 Column = str | Callable[[Any], Cell]
-"""The field of a row that a column shows, or what computes its cell from a row."""
+"""Name of the field that a column shows, or a function that computes its cell from a row."""
 Progress = Callable[[str, float], None] | None
-"""Called with what is measured and the fraction done."""
+"""Function called with the name of the current item and the fraction done."""
+
+
+@final
+@dataclass(frozen=True)
+class Goal:
+    """Measured number and its goal.
+
+    Attributes:
+        what: measured quantity, with its unit.
+        value: measured number.
+        goal: number to be reached.
+        better: side of the goal on which it is met: at most ("<=") or at least (">=").
+        seconds: processor time of the measurement [s].
+        note: remark for the reader, for example that data are absent.
+        case: name of the problem.
+    """
+
+    what: str
+    value: float
+    goal: float
+    better: Literal["<=", ">="] = "<="
+    seconds: float = 0.0
+    note: str = ""
+    case: str = ""
+
+    @property
+    def met(self) -> bool:
+        """True if the goal is met; NaN never meets a goal."""
+        return self.value <= self.goal if self.better == "<=" else self.value >= self.goal
+
+    @property
+    def decades(self) -> float:
+        """Decades by which the number misses its goal; NaN if either is not positive."""
+        if not (self.value > 0 and self.goal > 0):
+            return float("nan")
+        return (1.0 if self.better == "<=" else -1.0) * log10(self.value / self.goal)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as it is printed."""
+    """Table to print, with goals and notes.
+
+    Attributes:
+        title: measured quantities, method and units.
+        head: column titles.
+        rows: cells, one row per measurement.
+        keys: names of the columns in JSON; the titles by default.
+        goals: numbers of the table that have a goal.
+        notes: sentences below the table, for example about a missing tool.
+    """
 
     title: str
     head: Sequence[str]
     rows: Sequence[Sequence[Cell]]
+    keys: Sequence[str] = ()
+    goals: Sequence[Goal] = ()
+    notes: Sequence[str] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return rows, goals and notes by name; numbers that are not finite are None."""
+        rows = [dict(zip(self.keys or self.head, row, strict=True)) for row in self.rows]
+        found = {"title": self.title, "rows": rows, "goals": self.goals, "notes": self.notes}
+        return plain(found)
 
 
 def of(title: str, rows: Iterable[Any], columns: Mapping[str, Column]) -> Table:
-    """The table of `rows` with these `columns` by their heads."""
+    """Return the table of `rows` with the given columns, title -> column."""
     cells = [
         [getattr(row, c) if isinstance(c, str) else c(row) for c in columns.values()]
         for row in rows
@@ -46,88 +100,58 @@ def of(title: str, rows: Iterable[Any], columns: Mapping[str, Column]) -> Table:
 
 
 def short(value: float, digits: int = 3) -> float:
-    """A number of so many digits."""
+    """Round a number to significant digits; NaN stays."""
     return float(f"{value:.{digits}g}")
 
 
-def known(value: float, digits: int = 3) -> Cell:
-    """A number of so many digits; empty where there is none."""
-    return "" if value != value else short(value, digits)
-
-
-def shortened(field: str, factor: float = 1.0) -> Column:
-    """A column: a field times a factor, of three digits."""
-    return lambda row: short(factor * getattr(row, field))
-
-
-def known_only(field: str, digits: int = 3, factor: float = 1.0) -> Column:
-    """A column: a field times a factor, of so many digits; empty where there is no number."""
-    return lambda row: known(factor * getattr(row, field), digits)
+def shortened(field: str, factor: float = 1.0, digits: int = 3) -> Column:
+    """Return a column that shows a field times a factor, rounded to significant digits."""
+    return lambda row: short(factor * getattr(row, field), digits)
 
 
 def rounded(field: str, places: int | None = None, factor: float = 1.0) -> Column:
-    """A column: a field times a factor, with so many decimal places."""
+    """Return a column that shows a field times a factor, rounded to decimal places."""
     return lambda row: round(factor * getattr(row, field), places)
 
 
 def not_run(reasons: Mapping[str, str]) -> Iterator[str]:
-    """A sentence on each contender that was not measured."""
+    """Yield a sentence for each contender that was not measured."""
     yield from (f"{name}: not run, {why}" for name, why in reasons.items())
 
 
-class Judged:
-    """Base of rows with a `value`, a `goal`, and the `better` side of it: at most or at least."""
-
-    value: float
-    goal: float
-    better: Literal["<=", ">="]
-
-    @property
-    def met(self) -> bool:
-        """True if the goal is met; NaN meets none."""
-        return self.value <= self.goal if self.better == "<=" else self.value >= self.goal
-
-    @property
-    def decades(self) -> float:
-        """Decades by which the number is worse than its goal; NaN where either is not positive."""
-        if not (self.value > 0 and self.goal > 0):
-            return float("nan")
-        return (1.0 if self.better == "<=" else -1.0) * log10(self.value / self.goal)
-
-
 class Report:
-    """Base of what `symfric bench` measures: a frozen dataclass, a field for each kind of rows."""
+    """Base class of benchmark results: frozen dataclasses with one field per type of rows."""
 
     def shown(self) -> Iterator[Table | str]:
-        """Tables and sentences, as they are printed."""
+        """Yield the tables and sentences to print."""
         raise NotImplementedError
 
     def drawn(self) -> tuple[Any, ...]:
-        """A picture: the end of its function's name in `symfric.bench.pictures`, and arguments."""
+        """Return X of the function `symfric.bench.pictures.plot_X`, and its arguments."""
         raise NotImplementedError
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Draw it; save it to `path` if given."""
+        """Draw the result; save the picture if `path` is given."""
         from symfric.bench import pictures  # noqa: PLC0415  (matplotlib is slow to import)
 
         name, *given = self.drawn()
         return getattr(pictures, f"plot_{name}")(*given, path=path)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything by name; numbers that are not finite are None."""
+        """Return all fields by name; numbers that are not finite are None."""
         return plain(self)
 
     def write_csv(self, path: str | Path) -> None:
-        """Write the rows of the first field, a line each."""
+        """Write the rows of the first field, one per line."""
         rows = getattr(self, fields(self)[0].name)  # pyright: ignore[reportArgumentType]
         write_table(path, rows[0]._fields if rows else (), rows)
 
 
 def plain(value: Any) -> Any:
-    """Rows, numbers and texts as JSON holds them."""
+    """Return rows, numbers and texts as JSON data."""
     if is_dataclass(value):
         found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-        return found | {"met": value.met} if isinstance(value, Judged) else found
+        return found | {"met": value.met} if isinstance(value, Goal) else found
     if isinstance(value, tuple) and hasattr(value, "_fields"):
         return plain(dict(zip(value._fields, value, strict=True)))  # pyright: ignore
     if isinstance(value, Mapping):
@@ -140,7 +164,7 @@ def plain(value: Any) -> Any:
 
 
 def each(items: Sequence[T], progress: Progress, name: Callable[[T], str]) -> Iterator[T]:
-    """The items one after the other; `progress` is called with the name of each."""
+    """Yield the items; call `progress` with the name of each."""
     for k, item in enumerate(items):
         if progress is not None:
             progress(name(item), k / len(items))
@@ -148,10 +172,10 @@ def each(items: Sequence[T], progress: Progress, name: Callable[[T], str]) -> It
 
 
 def until_stopped(rows: Iterable[T]) -> tuple[T, ...]:
-    """The rows that are measured up to Ctrl-C.
+    """Collect rows until Ctrl-C.
 
     Raises:
-        KeyboardInterrupt: before the first of them.
+        KeyboardInterrupt: Ctrl-C before the first row.
     """
     found: list[T] = []
     try:
@@ -163,56 +187,13 @@ def until_stopped(rows: Iterable[T]) -> tuple[T, ...]:
     return tuple(found)
 
 
-@final
-@dataclass(frozen=True)
-class Goal(Judged):
-    """A measured number and its goal.
-
-    Attributes:
-        what: what was measured, with its unit.
-        value, goal: the number, and what it should be.
-        better: whether it should be at most ("<=") or at least (">=") the goal.
-    """
-
-    what: str
-    value: float
-    goal: float
-    better: Literal["<=", ">="] = "<="
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Section:
-    """A table with goals.
-
-    Attributes:
-        title: what is measured, how and in which units.
-        head: names of the columns.
-        rows: cells, as many a row as there are columns.
-        goals: the numbers among them that have one.
-        notes: sentences below the table, such as which tool is absent.
-    """
-
-    title: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
-    goals: Sequence[Goal] = ()
-    notes: Sequence[str] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything by name; what was not measured is None."""
-        rows = [dict(zip(self.head, row, strict=True)) for row in self.rows]
-        found = {"title": self.title, "rows": rows, "goals": self.goals, "notes": self.notes}
-        return plain(found)
-
-
 FASTEST = (*(f for f in FLAGS if f != "-ffp-contract=off"), "-freciprocal-math")
-"""Flags for others, which need not round as CasADi's virtual machine does."""
+"""Compiler flags for other tools, which may round differently from CasADi's virtual machine."""
 
 
 @contextmanager
 def unwarned() -> Generator[None]:
-    """No warnings: loose tolerances are measured on purpose."""
+    """Suppress warnings: loose tolerances are measured on purpose."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -224,10 +205,10 @@ def best_time(
     most: int = 30,
     clock: Callable[[], float] = perf_counter,
 ) -> tuple[float, T]:
-    """Shortest time [s] of `call` over repeats within `budget` seconds, and its result.
+    """Return the shortest time [s] of `call` over repeats within `budget` seconds, and its result.
 
-    The shortest one is what the code costs; the rest is what else the machine does. Of a
-    call that has no threads the processor time (`time.process_time`) is the better clock.
+    The shortest time is the cost of the code; longer ones include other load of the machine. For
+    calls without threads, processor time (`time.process_time`) is the better clock.
     """
     best, spent, result = float("inf"), 0.0, None
     for _ in range(most):
@@ -243,14 +224,14 @@ def best_time(
 def interleaved(
     calls: Mapping[str, Callable[[], object]], rounds: int = 7, budget: float = 0.0
 ) -> dict[str, float]:
-    """Shortest processor time [s] of each of the `calls`, which take turns.
+    """Return the shortest processor time [s] of each of the `calls`, which take turns.
 
-    What disturbs the machine for a while disturbs all of them alike, so that ratios hold.
+    A temporary load of the machine affects all of them equally, so that ratios hold.
 
     Args:
-        calls: by name; the first call of each is not measured.
-        rounds: how often each is measured at least.
-        budget: time [s] in all up to which further rounds are made.
+        calls: functions by name; the first call of each is not measured.
+        rounds: least number of measurements of each.
+        budget: total time [s] up to which further rounds are made.
     """
     best = dict.fromkeys(calls, float("inf"))
     for call in calls.values():
@@ -266,7 +247,7 @@ def interleaved(
 
 
 def compile_time(source: str, target: str | os.PathLike[str] = os.devnull) -> float:
-    """Processor time [s] of the C compiler on `source`, with the fastest flags.
+    """Return the processor time [s] of the C compiler on `source`, with the fastest flags.
 
     Raises:
         CompileError: no compiler.

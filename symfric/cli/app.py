@@ -1,8 +1,8 @@
-"""The commands put together, and how errors become exit statuses.
+"""Command line application: its commands, and conversion of errors to exit statuses.
 
-Typer's sentences about a line that cannot be read name neither the value nor the way out ("Input
-should be a valid number, unable to parse string as a number"). Which mistake it is they tell by
-their classes, which are not exported.
+Typer's messages about invalid command lines name neither the value nor a remedy ("Input should be a
+valid number, unable to parse string as a number"). The classes of its errors tell them apart, but
+are not exported.
 """
 
 import os
@@ -27,20 +27,20 @@ COMMANDS = {
     "laws": "List the friction laws, or show one in full.",
     "scenes": "List the scenes, or show one in full.",
     "run": "Simulate SCENE with a friction law.",
-    "report": "Simulate SCENE and write one page: signals, friction, error, laws.",
-    "identify": "Fit friction laws to measured data, and say what they are worth.",
+    "report": "Simulate SCENE and write a report of signals, friction, errors and laws.",
+    "identify": "Fit friction laws to measured data and assess the result.",
     "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
     "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
     "ocp": "Solve an optimal control problem and check it.",
-    "select": "Rank friction laws on a machine, and say which to take.",
+    "select": "Rank friction laws on a machine and recommend one.",
     "demo": "Simulate, identify, optimise and generate C.",
-    "gallery": "Compute the figures of the papers again.",
-    "bench": "Measure symfric beside other integrators.",
-    "stress": "Judge runs of random laws in random scenes.",
+    "gallery": "Reproduce the figures of the source papers.",
+    "bench": "Compare symfric with other tools in run time and error.",
+    "stress": "Verify runs of random laws in random scenes.",
 }
-"""What there is, and the first line of each."""
+"""Commands with the first line of their help."""
 MODULES = dict.fromkeys(("bench", "gallery", "stress"), "campaigns") | {"report": "run"}
-"""Commands that do not stand in a module of their own name."""
+"""Commands that are defined in a module of another name."""
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -51,15 +51,15 @@ SETTINGS: dict[str, Any] = {
 
 EXAMPLE = "Example: "
 WIDTH = 78
-"""Columns of an example."""
+"""Largest width of an example [columns]."""
 
 
 TEXTS = (str, str | None, list[str], list[str] | None)
-"""Types of parameters that are texts as they stand."""
+"""Types of parameters that need no conversion from text."""
 
 
 def convert_as_needed(parameter: Any, is_text: bool) -> Any:
-    """The parameter, which now takes texts, defaults and nothing as they are.
+    """Let a parameter accept texts, its default and an absent value without conversion.
 
     The conversion of Typer loads pydantic, which takes longer than a simulation.
     """
@@ -82,7 +82,7 @@ def convert_as_needed(parameter: Any, is_text: bool) -> Any:
 
 
 class Commands(TyperGroup):
-    """Loads the command that is called, and none for a list of them."""
+    """Command group that loads only the command that is called."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -90,15 +90,15 @@ class Commands(TyperGroup):
         self.commands = known
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """The options before a command."""
+        """Return the options before a command."""
         return [convert_as_needed(p, False) for p in super().get_params(ctx)]
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Their names, in the order of the help."""
+        """Return the names of the commands in the order of the help."""
         return [*COMMANDS]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command of that name, None where there is no such one."""
+        """Return the command of that name, or None if there is none."""
         if cmd_name not in COMMANDS:
             return None
         one = typer.Typer(**SETTINGS)
@@ -108,7 +108,7 @@ class Commands(TyperGroup):
         return typer.main.get_command(one)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command of the first word; an unknown word is refused as everywhere."""
+        """Return the command of the first word; refuse an unknown word with a suggestion."""
         if not (args[0] in COMMANDS or ctx.resilient_parsing or args[0].startswith("-")):
             from symfric.foundation.checks import check_names  # noqa: PLC0415  (CasADi is slow)
 
@@ -116,32 +116,32 @@ class Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the table of commands into a help text."""
+        """Write the table of commands."""
         with formatter.section("Commands"):
             formatter.write_dl([*COMMANDS.items()])
 
 
 class Command(TyperCommand):
-    """A command whose help names arguments as the texts do, and ends in lines to copy."""
+    """Command whose help ends with examples to copy."""
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """Arguments and options."""
+        """Return arguments and options."""
         hints = get_type_hints(self.callback) if self.callback else {}
         found = super().get_params(ctx)
         return [convert_as_needed(p, hints.get(str(p.name)) in TEXTS) for p in found]
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """The line of usage behind the name."""
+        """Return the words of the usage line after the name."""
         return ["[OPTIONS]", *(argument_shown(p) for p in arguments(self))]
 
     def format_help_text(self, ctx: Any, formatter: Any) -> None:
-        """Write what the command does."""
+        """Write the description of the command."""
         formatter.write_paragraph()
         with formatter.indentation():
             formatter.write_text(prose_and_examples(self.help or "")[0])
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write arguments and options, one below the other."""
+        """Write the lists of arguments and options."""
         positional = [(argument_shown(p), p.help or "") for p in arguments(self)]
         if positional:
             with formatter.section("Arguments"):
@@ -158,30 +158,30 @@ class Command(TyperCommand):
 
 
 def is_option(parameter: Any) -> bool:
-    """True if a parameter of a command has a name on the line."""
+    """Return True if a parameter of a command is an option, not an argument."""
     return parameter.opts[0].startswith("-")
 
 
 def arguments(command: Any) -> list[Any]:
-    """The parameters of a command that have a place on the line."""
+    """Return the positional arguments of a command."""
     return [p for p in command.params if not is_option(p)]
 
 
 def argument_shown(parameter: Any) -> str:
-    """An argument as a line of usage has it: SCENE, or [NAME] where it may be left out."""
+    """Return an argument as the usage line shows it: SCENE, or [NAME] if it is optional."""
     name = (parameter.metavar or parameter.name.upper()) + "..." * (parameter.nargs == -1)
     return name if parameter.required else f"[{name}]"
 
 
 def prose_and_examples(text: str) -> tuple[str, list[str]]:
-    """The prose of a command's docstring, and the lines of its examples."""
+    """Split the docstring of a command into its prose and its example lines."""
     paragraphs = cleandoc(text).split("\n\n")
     examples = [" ".join(p.split())[len(EXAMPLE) :] for p in paragraphs if p.startswith(EXAMPLE)]
     return "\n\n".join(p for p in paragraphs if not p.startswith(EXAMPLE)), examples
 
 
 def continued(line: str, indent: int) -> str:
-    """A line for a shell; a long one goes on with an option, behind a backslash."""
+    """Wrap a shell command before options, with backslashes at the line ends."""
     start, *rest = line.split(" --")
     rows = [" " * indent + start]
     for option in rest:
@@ -198,8 +198,8 @@ COMPLETED: dict[str, Any] = {"add_completion": True}
 app = typer.Typer(
     cls=Commands,
     help="Friction laws from formula to simulation, identification, optimal control and C.",
-    epilog="Exit status: 0 done; 1 a solve or a proof failed, what there is is written; 2 what is "
-    "asked for cannot be done as it stands, nothing is written; 130 interrupted, otherwise as 1.",
+    epilog="Exit status: 0: success; 1: a solve or a verification failed, partial results are "
+    "written; 2: invalid request, nothing is written; 130: interrupted, otherwise as 1.",
     **SETTINGS | COMPLETED,
 )
 
@@ -209,7 +209,7 @@ def symfric(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
 ) -> None:
-    """Show the version, or what there is when no command is given."""
+    """Show the version, or the help if no command is given."""
     if version:
         typer.echo(f"symfric {__version__}")
         raise typer.Exit
@@ -220,8 +220,8 @@ def symfric(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
-    0: done; 1: a solve failed (what there is so far is written); 2: bad input; 130: Ctrl-C. Every
-    error is one sentence on standard error. With SYMFRIC_DEBUG set, errors are raised instead.
+    0: success; 1: a solve failed (partial results are written); 2: bad input; 130: Ctrl-C. Every
+    error is one sentence on standard error. If SYMFRIC_DEBUG is set, errors are raised instead.
     """
     if arguments is None:
         _prepare_process()
@@ -230,7 +230,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.showwarning = _show_warning
             command = typer.main.get_command(app)
             status = command.main(arguments, prog_name="symfric", standalone_mode=False)
-        if status == INTERRUPTED:  # what Typer makes of Ctrl-C, without a word
+        if status == INTERRUPTED:  # Typer's silent status after Ctrl-C
             return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
         return status if isinstance(status, int) else 0
     except SolveError as error:
@@ -243,7 +243,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(error: BaseException, status: int) -> int:
-    """Say `error` in one sentence and return `status`."""
+    """Print `error` as one sentence and return `status`."""
     if os.environ.get("SYMFRIC_DEBUG"):
         raise error
     typer.echo(f"symfric: {sentence(error)}", err=True)
@@ -251,22 +251,20 @@ def _refuse(error: BaseException, status: int) -> int:
 
 
 def sentence(error: BaseException) -> str:
-    """The message of `error` on one line."""
+    """Return the message of `error` on one line."""
     if isinstance(error, OSError) and error.errno == ENOSPC:
         place = f" for '{error.filename}'" if error.filename is not None else ""
-        return (
-            f"expected room on the disk, got none left{place}; free some, or set TMPDIR elsewhere"
-        )
+        return f"expected free disk space, got none{place}; free some, or set TMPDIR elsewhere"
     if isinstance(error, OSError) and error.filename is not None:
         return f"'{error.filename}': {error.strerror}"
     if isinstance(error, MemoryError):
-        return "expected a task that fits into memory, got a larger one; ask for fewer --samples"
+        return "expected a task that fits into memory, got a larger one; request fewer --samples"
     text = usage_sentence(error) if isinstance(error, UsageError) else str(error)
     return " ".join(text.split()).removesuffix(".")
 
 
 def _prepare_process() -> None:
-    """Settings of a process that is nothing but this command line."""
+    """Configure a process that runs only this command line."""
     os.environ.setdefault("MPLBACKEND", "Agg")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -291,13 +289,13 @@ def _report_defect(
 
 
 UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
-"""What all errors of usage derive from."""
+"""Base class of all usage errors."""
 
 
 def usage_sentence(error: Any) -> str:
-    """`<command>: expected <what>, got <value>; <hint>`."""
+    """Return `<command>: expected <what>, got <value>; <hint>` for a usage error."""
     kind, option = type(error).__name__, getattr(error, "option_name", "")
-    if kind == "BadOptionUsage":  # of which Typer does not tell the command
+    if kind == "BadOptionUsage":  # Typer does not report the command here
         least = "requires" in error.message
         return (
             f"{option}: expected {'a' if least else 'no'} value, got {'none' if least else 'one'}"
@@ -328,6 +326,6 @@ def _parameter_shown(parameter: Any) -> str:
 
 
 def _value_given(error: Any) -> str:
-    """The given value, from the sentence or from the error behind it."""
-    told = search(r"^'(.*)' is not", error.message)
-    return told[1] if told else str(error.__cause__.errors()[0]["input"])
+    """Return the invalid value, from the message or from the underlying error."""
+    found = search(r"^'(.*)' is not", error.message)
+    return found[1] if found else str(error.__cause__.errors()[0]["input"])

@@ -1,4 +1,4 @@
-"""`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
+"""`symfric codegen`: generate C99 for a friction law or a plant and verify it on this machine."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -7,29 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
+from symfric.cli import codegen_subject as subjects
 from symfric.cli import completions, output
-from symfric.cli.codegen_subject import (
-    PLANT,
-    SETTINGS,
-    check_applicable,
-    chosen_law,
-    compensator_block,
-    machine_of,
-    robot_block,
-    subject_of,
-)
+from symfric.cli import options as opt
 from symfric.cli.machines import LawOfOption, PresetOption, kind_of
-from symfric.cli.options import (
-    JsonOption,
-    SetOption,
-    argument,
-    assignments,
-    check_folder,
-    check_outputs,
-    numbers,
-    option,
-    with_settings,
-)
+from symfric.cli.options import argument, option
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.codegen.generated import with_cores
 from symfric.codegen.verification import Check
@@ -48,21 +30,21 @@ def codegen(
         Path | None,
         argument(
             "FIT.json|ROBOT.urdf",
-            "What `symfric identify --json` wrote; a robot with --inverse-dynamics.",
+            "Output of `symfric identify --json`; or a robot, with --inverse-dynamics.",
         ),
     ] = None,
     law: Annotated[
         str | None,
         option("--law NAME", "Friction law, such as lugre; or FIT.json.", completions.laws),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     scene: Annotated[
         str | None,
         option(
             "--scene NAME",
-            "The plant of this scene, or FILE.urdf, with the law.",
+            "Plant: this scene, or FILE.urdf, with the law.",
             completions.scenes,
         ),
     ] = None,
@@ -70,78 +52,81 @@ def codegen(
         str | None,
         option(
             "--method NAME",
-            "Formula of a plant; default rodas3, of mechanisms with friction backward_euler.",
+            "Method of a plant; default rodas3, for mechanisms with friction backward_euler.",
         ),
     ] = None,
     real: Annotated[
         str | None,
         option(
-            "--real", "Type of numbers; default both, double for a plant.", metavar="|".join(REALS)
+            "--real",
+            "Floating point type; default both, for a plant double.",
+            metavar="|".join(REALS),
         ),
     ] = None,
     step_size: Annotated[
         float | None,
-        option("--step-size SECONDS", "Step as a constant, for laws with states, plants."),
+        option("--step-size SECONDS", "Constant step, for plants and laws with states."),
     ] = None,
     name: Annotated[
-        str | None, option("--name NAME", "C identifier; default from the law.")
+        str | None, option("--name NAME", "C identifier; default: that of the law.")
     ] = None,
     fold: Annotated[
-        bool, option("--fold", "Bake all parameters in; without it all can be changed.")
+        bool, option("--fold", "Make all parameters constants; default: all are variable.")
     ] = False,
     free: Annotated[
-        list[str] | None, option("--free NAME", "Keep this one variable, bake the others in.")
+        list[str] | None,
+        option("--free NAME", "Keep this parameter variable; others are constants."),
     ] = None,
     guards: Annotated[
-        bool, option("--guards/--no-guards", "Clamp, repair and report what cannot be.")
+        bool, option("--guards/--no-guards", "Clamp, repair and report invalid inputs.")
     ] = True,
     kit: Annotated[
         bool,
-        option("--kit/--no-kit", "Unit test, CMake, Python and Simulink files beside the sources."),
+        option("--kit/--no-kit", "Add unit test, CMake, Python and Simulink files."),
     ] = True,
     core: Annotated[
         list[str] | None,
-        option("--core NAME", f"Measure it on this core, too: {', '.join(CORES)}."),
+        option("--core NAME", f"Measure on this core: {', '.join(CORES)}."),
     ] = None,
     turning: Annotated[
-        bool, option("--turning", "A law in rad/s and N m: units in the header.")
+        bool, option("--turning", "Rotation: units rad/s and N m in the header.")
     ] = False,
     inverse_dynamics: Annotated[
         bool,
         option(
             "--inverse-dynamics",
-            "Forces of the joints that a motion needs, of ROBOT.urdf or --scene, with the "
-            "friction of --law or of the file.",
+            "Joint forces for a motion of ROBOT.urdf or --scene, with the friction of --law or of "
+            "the file.",
         ),
     ] = False,
     payload: Annotated[
-        str | None, option("--payload FRAME", "Link or frame that carries a load, set at run time.")
+        str | None, option("--payload FRAME", "Link or frame with a load that is set at run time.")
     ] = None,
     tunable_gravity: Annotated[
-        bool, option("--tunable-gravity", "Gravity is set at run time.")
+        bool, option("--tunable-gravity", "Set gravity at run time.")
     ] = False,
     compensator: Annotated[
-        bool, option("--compensator", "A friction compensator of the law, or of a fit.")
+        bool, option("--compensator", "Friction compensator of the law or of a fit.")
     ] = False,
     compensation: Annotated[
         list[str] | None,
         option(
             "--compensation NAME=VALUE",
-            "What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
-            f"{', '.join(SETTINGS)}.",
+            "Setting, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
+            f"{', '.join(subjects.SETTINGS)}.",
         ),
     ] = None,
     compiler: Annotated[
         str | None, option("--compiler COMMAND", "Default: $CC, gcc or clang.")
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
-    The C is compiled and compared with CasADi over more than 20 000 steps, bad inputs and other
-    parameters among them. The exit status is 1 where it could not be verified, as without a
-    compiler, or differs; the files are written all the same.
-    The law of a fit has the fitted numbers, and so has its drive with `--scene drive`.
+    The C is compiled and compared with CasADi over more than 20 000 steps, including bad inputs and
+    other parameters. The exit status is 1 if it differs or could not be verified, for example
+    without a compiler; the files are written anyway.
+    The law of a fit has the fitted parameters, and so has its drive with `--scene drive`.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
 
@@ -150,15 +135,15 @@ def codegen(
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
     """
     check_names("--core", core or (), CORES)
-    check_folder(out)
-    check_outputs(json)
+    opt.check_folder(out)
+    opt.check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
-    chosen = None if inverse_dynamics else chosen_law(fit, law)
-    subject = subject_of(chosen, scene, compensator)
+    chosen = None if inverse_dynamics else subjects.chosen_law(fit, law)
+    subject = subjects.subject_of(chosen, scene, compensator)
     kind = real
     if kind is None:
-        kind = "double" if subject == PLANT else "both"
+        kind = "double" if subject == subjects.PLANT else "both"
     check_names("--real", [kind], REALS)
     given = {
         "--step-size": step_size is not None, "--method": method is not None, "--free": bool(free),
@@ -166,33 +151,35 @@ def codegen(
         "--tunable-gravity": tunable_gravity, "--compensation": bool(compensation),
         "--preset": preset is not None, "--law-of": bool(law_of),
     }  # fmt: skip
-    check_applicable(subject, [option for option, there in given.items() if there])
+    subjects.check_applicable(subject, [option for option, there in given.items() if there])
     own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     adjustable, forces = None, ()
     if chosen is None:
-        values = numbers("--set", settings)
-        made: Block | AnyLaw = robot_block(
+        values = opt.numbers("--set", settings)
+        made: Block | AnyLaw = subjects.robot_block(
             fit, scene, law, values,
             name=name, h=step_size, fold=fold, payload=payload, tunable_gravity=tunable_gravity,
         )  # fmt: skip
         text, own = law or made.name, {}
     elif scene is not None:
         kind_of_scene = kind_of(scene, "--scene", preset, law_of)
-        machine = machine_of(scene, kind_of_scene, chosen, assignments("--set", settings))
+        machine = subjects.machine_of(
+            scene, kind_of_scene, chosen, opt.assignments("--set", settings)
+        )
         own["method"] = "auto" if method is None else method
         made = plant_block(machine, **own)
         adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
         text, own = chosen.text, {}
     elif compensator:
-        compensated = with_settings(chosen.law, chosen.text, settings)
-        made = compensator_block(
+        compensated = opt.with_settings(chosen.law, chosen.text, settings)
+        made = subjects.compensator_block(
             compensated, chosen.drive, compensation or (),
             name=name, h=step_size, turning=turning, fold=fold,
         )  # fmt: skip
         text, own = chosen.text, {}
     else:
-        made = with_settings(chosen.law, chosen.text, settings)
+        made = opt.with_settings(chosen.law, chosen.text, settings)
         if turning or chosen.turning:
             own["turning"] = True
         text, forces = chosen.text, chosen.forces
@@ -200,20 +187,20 @@ def codegen(
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
     if forces:
         names = ", ".join(forces)
-        output.note(f"{names}: forces, fitted under a load of 1 N; call the C with N = 1")
+        output.note(f"{names}: fitted as forces under a load of 1 N; call the C with N = 1")
     measured = on_cores(generated, core or ())
     generated = with_cores(generated, [m.to_dict() for m in measured])
-    _proved(text, generated, verification, measured, json)
+    _report(text, generated, verification, measured, json)
 
 
-def _proved(
+def _report(
     text: str,
     generated: Generated,
     verification: Verification,
     measured: list[Measured],
     json: str | None,
 ) -> None:
-    """Say what was written and whether it was verified; the exit status says it, too."""
+    """Print files and verification; the exit status is 1 if it failed."""
     output.emit_json(to_dict(text, generated, verification, measured), json)
     if json != "-":
         show_verification(verification)
@@ -225,7 +212,7 @@ def _proved(
 
 
 def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
-    """The block on Cortex-M cores, in every type that was generated."""
+    """Measure the block on Cortex-M cores in every generated type."""
     return [
         measure(generated.block, real, core, guards=generated.guards)
         for core in cores
@@ -236,7 +223,7 @@ def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
 def to_dict(
     law: str, generated: Generated, verification: Verification, measured: Sequence[Measured]
 ) -> dict[str, Any]:
-    """Content of `--json`."""
+    """Return the content of `--json`."""
     return {
         "law": law,
         "files": [str(path) for path in generated.files],
@@ -247,12 +234,12 @@ def to_dict(
 
 
 def show_verification(verification: Verification) -> None:
-    """Print how the C compares with CasADi, one row a floating point type."""
+    """Print the comparison of the C with CasADi, one row per floating point type."""
     compiler = f" ({verification.compiler})" if verification.compiler else ""
     output.show(f"{verification.name}: {verification.status}{compiler}")
     if verification.checks:
         output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "of", "foreign symbols"],
+            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign symbols"],
             [
                 (
                     check.real,
@@ -269,25 +256,25 @@ def show_verification(verification: Verification) -> None:
     for check in verification.checks:
         if check.ties:
             output.show(
-                f"{check.real}: in {check.ties} of {check.steps} steps a mode ties and rounding "
-                "decides it, in CasADi as in C"
+                f"{check.real}: in {check.ties} of {check.steps} steps rounding decides a mode, "
+                "in CasADi as in C"
             )
 
 
 def compared(check: Check) -> str:
-    """The comparison of the C with CasADi, in words."""
+    """Describe the comparison of the C with CasADi."""
     return "differs" if check.ulp is None and not check.near else bits(check.ulp)
 
 
 def bits(ulp: int | None) -> str:
-    """The distance of the C in double from CasADi, in words."""
+    """Describe the distance of the C in double from CasADi."""
     if ulp is None:
         return "within rounding"
     return "bit for bit equal" if ulp == 0 else f"{ulp} ulp apart"
 
 
 def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print what the C needs here, by size and -fstack-usage, and on other cores, by QEMU."""
+    """Print memory on this machine, by size and -fstack-usage, and cost on other cores, by QEMU."""
     rows: list[tuple[str | float, ...]] = []
     for real in generated.reals:
         found = generated.manifest["real"][real].get("measured")
@@ -299,7 +286,8 @@ def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
         numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
         rows.append((m.real, m.core, *numbers))
     if rows:
-        head = ["type", "built by, for", "code [B]", "stack [B]", "instructions", "at most"]
+        head = ["type", "compiler or core", "code [B]", "stack [B]", "average instructions",
+                "most instructions"]  # fmt: skip
         output.show_table(head, rows)
     for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
         output.show(f"{core}: {status}")

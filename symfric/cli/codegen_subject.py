@@ -1,4 +1,4 @@
-"""Subjects of `symfric codegen`: laws, plants, robots, compensators, and the options of each."""
+"""Subjects of `symfric codegen`: laws, plants, robots, compensators, and their options."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -33,25 +33,25 @@ APPLIES = {
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
 }
-"""Options that do not fit all that C is made of, and what they fit."""
+"""Options that apply to some subjects only -> these subjects."""
 
 WHY = {
     "--step-size": "which has no step",
-    "--method": "whose step is exact, or the best that is known",
-    "--turning": "which knows what turns",
+    "--method": "whose step is fixed by the law",
+    "--turning": "which defines the units",
 }
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """A law: as a name or out of a fit.
+    """Law given by name or by a fit.
 
     Attributes:
-        text: what it is called.
-        law: with its numbers.
-        drive: that it was fitted in.
-        forces: coefficients that are forces, as the load was not known.
+        text: name of the law.
+        law: law with its parameters.
+        drive: drive of the fit.
+        forces: coefficients that are forces because the load is unknown.
     """
 
     text: str
@@ -61,15 +61,15 @@ class Chosen:
 
     @property
     def turning(self) -> bool:
-        """True if it was fitted to an axis that turns."""
+        """True if the law was fitted to a rotating axis."""
         return self.drive is not None and self.drive.turning
 
 
 def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
-    """The kind of subject that C is made of.
+    """Return the type of subject.
 
     Raises:
-        ValueError: a compensator of a scene or of inverse dynamics.
+        ValueError: a compensator together with a scene or inverse dynamics.
     """
     if compensator and (chosen is None or scene is not None):
         other = INVERSE if chosen is None else PLANT
@@ -86,7 +86,7 @@ def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> s
 
 
 def check_applicable(subject: str, given: list[str]) -> None:
-    """Refuse options that do not apply to the subject, all at once."""
+    """Refuse all options that do not apply to the subject in one error."""
     problems: list[str] = []
     for option in given:
         fits = [s for s in APPLIES[option] if s != FUNCTION]
@@ -100,10 +100,10 @@ def check_applicable(subject: str, given: list[str]) -> None:
 
 
 def chosen_law(fit: Path | None, law: str | None) -> Chosen:
-    """The law of a fit, or the one that a name means.
+    """Return the law of a fit or of a name.
 
     Raises:
-        ValueError: both or none, a robot, no fit in the file, a fit without a law.
+        ValueError: both or neither, a robot, no fit in the file, or a fit without a law.
     """
     if (fit is None) == (law is None):
         got = "neither" if fit is None else "both"
@@ -121,12 +121,12 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
     found = Fitted.from_json(fit)
     if found.law is None:
         raise ValueError(
-            f"fit '{fit}': expected a law, got {found.name}, a model without one or with several, "
-            "or a law of your own; generate it in Python: symfric.codegen.generate(fit.law, out)"
+            f"fit '{fit}': expected a law of the catalogue, got {found.name}; generate other laws "
+            "in Python: symfric.codegen.generate(fit.law, out)"
         )
     if found.status is not Status.SOLVED:
         first = found.message.partition(". ")[0].rstrip(".")
-        output.note(f"{fit}: the fit ended {found.status.name}: {first}.")
+        output.note(f"{fit}: status of the fit {found.status.name}: {first}.")
     units = {n: p.unit for n, p in parameters(found.law).items()}
     forces = [n for n, e in found.parameters.items() if units.get(n) == "1" and e.unit != "1"]
     return Chosen(found.name, found.law, found.drive, tuple(forces))
@@ -135,15 +135,14 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
 def machine_of(
     scene: str, kind: Callable[[Law], Scene], chosen: Chosen, texts: dict[str, str]
 ) -> Scene:
-    """The scene with the law and the texts of --set; of a fitted drive with mass and offset, too.
+    """Return the scene with the law and --set; a fitted drive includes its mass and offset.
 
     Raises:
-        ValueError: coefficients that are forces in a scene that has a load of its own; unknown
-            names.
+        ValueError: coefficients that are forces in a scene with a load, or unknown names.
     """
     if kind is Drive and chosen.drive is not None:
         machine: Scene = chosen.drive
-    else:  # a population is refused by its name
+    else:  # `law_from_text` refuses a population
         machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
     own = machine is chosen.drive
     machine = formed(machine, texts)
@@ -161,7 +160,7 @@ def machine_of(
 
 
 SETTINGS = tuple(item.name for item in fields(Compensation))
-"""What can be said about a compensator, for the help."""
+"""Settings of a compensator, for the help."""
 
 
 def compensator_block(
@@ -174,15 +173,15 @@ def compensator_block(
     turning: bool,
     fold: bool,
 ) -> Block:
-    """The compensator of a law, with the load and the offset of the drive that it was fitted in.
+    """Return the compensator of a law, with load and offset of the drive of its fit.
 
     Args:
-        law: with its numbers.
-        drive: that of a fit.
-        texts: settings, NAME=VALUE each, see `settings_from_text`.
+        law: law with its parameters.
+        drive: drive of a fit.
+        texts: settings NAME=VALUE, see `settings_from_text`.
 
     Raises:
-        ValueError: a population; as `compensator`.
+        ValueError: a population; see also `compensator`.
     """
     if not isinstance(law, Law):
         raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
@@ -203,17 +202,17 @@ def robot_block(
     payload: str | None,
     tunable_gravity: bool,
 ) -> Block:
-    """The inverse dynamics of a robot's file or of a scene.
+    """Return the inverse dynamics of a robot's file or of a scene.
 
     Args:
-        file, scene: one of them; a scene may be a robot's file, too.
-        law: in all joints; of a file without one, what its tags say.
+        file, scene: one of them; a scene may also be a robot's file.
+        law: law of all joints; None for the friction tags of a file.
         values: parameters of the scene or of the law, which become its defaults.
-        fold: the numbers of friction become constants.
-        payload: frame that carries a load; its inertia is a parameter, too.
+        fold: make the friction parameters constants.
+        payload: frame with a load, whose inertia is a parameter, too.
 
     Raises:
-        ValueError: both or none of them; no mechanism; as `inverse_dynamics_block`.
+        ValueError: both or neither of them, or no mechanism; see also `inverse_dynamics_block`.
     """
     where = file if scene is None else scene
     if where is None or (file is not None and scene is not None):

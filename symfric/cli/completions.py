@@ -1,6 +1,6 @@
-"""Completions of the shell: names of laws, scenes, figures, problems, parameters of `--set`.
+"""Shell completions: names of laws, scenes, figures, problems, and parameters of `--set`.
 
-Nothing is said and nothing raised here: a completion that cannot be found is none.
+These functions never print or raise; without a match they return an empty list.
 """
 
 from collections.abc import Iterable
@@ -17,44 +17,44 @@ def _of(names: Iterable[str], incomplete: str) -> list[str]:
 
 
 def laws(incomplete: str) -> list[str]:
-    """Laws that go into a scene; the last part of a sum or inside a wrapper, too."""
+    """Complete laws of a scene, also in sums and wrappers."""
     cut = max(incomplete.rfind(c) for c in "+(") + 1
     return [incomplete[:cut] + name for name in _of(ALL_LAWS, incomplete[cut:])]
 
 
 def each_law(incomplete: str) -> list[str]:
-    """Laws in a list with commas."""
+    """Complete laws in a list with commas."""
     start, comma, last = incomplete.rpartition(",")
     return [f"{start}{comma}{name}" for name in laws(last)]
 
 
 def needs(incomplete: str) -> list[str]:
-    """Words of `--need`, in a list with commas."""
-    from symfric.choice import NEEDS  # noqa: PLC0415  (of one command only)
+    """Complete words of `--need` in a list with commas."""
+    from symfric.choice import NEEDS  # noqa: PLC0415  (for one command only)
 
     start, comma, last = incomplete.rpartition(",")
     return [f"{start}{comma}{word}" for word in _of(NEEDS, last)]
 
 
 def all_laws(incomplete: str) -> list[str]:
-    """Laws, and populations of random contacts."""
+    """Complete laws and populations of random contacts."""
     return [*laws(incomplete), *_of(POPULATIONS, incomplete)]
 
 
 def scenes(incomplete: str) -> list[str]:
-    """Machines, and files of robots by the shell's own means."""
+    """Complete scenes; the shell completes files of robots."""
     from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
 
     return _of(ALL_SCENES, incomplete)
 
 
 def presets(context: typer.Context, incomplete: str) -> list[str]:
-    """Papers whose numbers the scene on the line has."""
+    """Complete presets of the scene on the command line."""
     return _of((name for kind in _machines(context) for name in kind.presets), incomplete)
 
 
 def places(context: typer.Context, incomplete: str) -> list[str]:
-    """`PLACE=` and a law, of the scene on the line."""
+    """Complete `PLACE=LAW` for the scene on the command line."""
     place, equals, law = incomplete.partition("=")
     if equals:
         return [f"{place}={name}" for name in laws(law)]
@@ -69,15 +69,15 @@ def _machines(context: typer.Context) -> list[Any]:
 
 
 def figures(incomplete: str) -> list[str]:
-    """Behaviours of laws, and machines that show one."""
-    from symfric.figures import FIGURES  # noqa: PLC0415  (of this command only)
+    """Complete figures of laws, and scenes."""
+    from symfric.figures import FIGURES  # noqa: PLC0415  (for this command only)
 
     return [*_of(FIGURES, incomplete), *scenes(incomplete)]
 
 
 def plates(incomplete: str) -> list[str]:
-    """Papers of the gallery, and behind the slash their figures."""
-    from symfric.gallery.plate import scripts, short  # noqa: PLC0415  (of this command only)
+    """Complete papers of the gallery and, after the slash, their figures."""
+    from symfric.gallery.plate import scripts, short  # noqa: PLC0415  (for this command only)
 
     names = [short(name) for name in scripts()]
     papers = dict.fromkeys(f"{name.partition('/')[0]}/" for name in names)
@@ -85,17 +85,17 @@ def plates(incomplete: str) -> list[str]:
 
 
 def problems(incomplete: str) -> list[str]:
-    """Ready problems of optimal control."""
-    from ocp.problems import READY  # noqa: PLC0415  (of this command only)
+    """Complete ready optimal control problems."""
+    from ocp.problems import READY  # noqa: PLC0415  (for this command only)
 
     return _of(READY, incomplete)
 
 
 def settings(context: typer.Context, incomplete: str) -> list[str]:
-    """`NAME=` of the parameters and options of the laws, or of the scene with them."""
+    """Complete `NAME=` of parameters and options of the laws, or of the scene with them."""
     from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
 
-    words = [str(word) for word in context.args]  # arguments before an option without its value
+    words = [str(word) for word in context.args]  # arguments before the option that is completed
     named = context.params.get("law") or context.params.get("name") or []
     machines = [w for w in (str(context.params.get("scene")), *words) if w in ALL_SCENES]
     texts = [named] if isinstance(named, str) else [*named]

@@ -1,4 +1,4 @@
-"""`symfric demo`: one friction law from formula through data, simulation and control to C."""
+"""`symfric demo`: simulation, identification, optimal control and generated C in one run."""
 
 import json
 from dataclasses import dataclass, replace
@@ -24,13 +24,13 @@ from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
 STAGE = Path("..", "shared", "data", "EMPS")
-"""Where the measured stage is looked for: the EMPS benchmark next to the working folder."""
+"""Default folder of the measured stage: the EMPS benchmark next to the working folder."""
 
 RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
-"""Record to identify from and record to validate on."""
+"""Record for identification and record for validation."""
 
 DISTANCE, LIMIT = 0.05, 200.0
-"""Optimal move [m] and largest force [N]."""
+"""Distance of the optimal move [m] and largest force [N]."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Chapter:
     """Files and numbers of one part of the demo."""
 
     title: str
-    says: str
+    text: str
     files: tuple[Path, ...]
     numbers: dict[str, Any]
 
@@ -49,14 +49,13 @@ def demo(
         Path | None,
         option(
             "--data DIR",
-            "Folder of the EMPS benchmark; without it, and without ../shared/data/EMPS, "
-            "a simulated record is identified.",
+            "Folder of the EMPS benchmark; default ../shared/data/EMPS, else a simulated record.",
         ),
     ] = None,
 ) -> None:
     """Simulate, identify, optimise and generate C.
 
-    Everything is left in DIR, with a README.md that lists it.
+    Results are written to DIR, with a README.md that lists them.
 
     Example: symfric demo --out out
     """
@@ -74,25 +73,25 @@ def demo(
     write_text(out / "README.md", index(out, chapters))
     summary = {c.title: c.numbers for c in chapters}
     write_text(out / "summary.json", json.dumps(output.plain(summary), indent=2) + "\n")
-    output.note(f"wrote {out / 'README.md'}, which lists what is there")
+    output.note(f"wrote {out / 'README.md'}, which lists the results")
     if chapters[-1].numbers["failed"]:
         raise typer.Exit(1)
 
 
 def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str, ...], str]:
-    """Two records, the laws to identify from them, and where they come from."""
+    """Return two records, the laws to identify from them, and their origin."""
     folder = data or (STAGE if STAGE.is_dir() else None)
     if folder is not None:
         one, other = (Dataset.read(folder / name) for name in RECORDS)
         laws = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
         return (one, other), laws, f"the measured EMPS stage in {folder}"
     other = synthetic_drive_data(seed=1, speeds=(0.003, 0.02, 0.09))
-    origin = "a simulated record (no measured one found; --data DIR takes the EMPS benchmark)"
+    origin = "a simulated record (no measured one found; --data DIR for the EMPS benchmark)"
     return (synthetic_drive_data(), other), ("stribeck",), origin
 
 
 def stick_slip(folder: Path) -> Chapter:
-    """Block on a belt with a smooth law and a bristle law."""
+    """Simulate a block on a belt with a smooth law and a bristle law."""
     from symfric.figures.pictures import plot_laws  # noqa: PLC0415  (matplotlib is slow)
     from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
@@ -117,7 +116,7 @@ def stick_slip(folder: Path) -> Chapter:
 
 
 def identified(records: tuple[Dataset, Dataset], law: str) -> Fitted:
-    """The drive identified from the first record, with errors on both."""
+    """Identify the drive from the first record, and validate it on the second."""
     with output.progress(f"identify {law}") as tell:
         fit = Fit(InverseDynamics(), law, records[0]).solve(
             progress=lambda _, fraction: tell(fraction)
@@ -128,7 +127,7 @@ def identified(records: tuple[Dataset, Dataset], law: str) -> Fitted:
 
 
 def law_of(found: Fitted) -> Law:
-    """The identified law."""
+    """Return the identified law."""
     if found.law is None:
         raise ValueError(f"demo: expected a law, got none from {found.name}")
     return found.law
@@ -137,7 +136,7 @@ def law_of(found: Fitted) -> Law:
 def identification(
     folder: Path, found: list[Fitted], origin: str, records: tuple[Dataset, Dataset]
 ) -> Chapter:
-    """Pages, numbers and pictures; the records too where they were simulated."""
+    """Write pages, numbers and pictures, and simulated records."""
     files: list[Path] = []
     for fit in found:
         stem = fit.name.replace("+", "_").replace("(", "_").replace(")", "")
@@ -158,7 +157,7 @@ def identification(
 
 
 def numbers_of(fit: Fitted) -> dict[str, Any]:
-    """The key numbers of a fit."""
+    """Return the key numbers of a fit."""
     data = fit.to_dict()
     return {
         name: data[name] for name in ("status", "message", "parameters", "errors", "validation")
@@ -166,9 +165,9 @@ def numbers_of(fit: Fitted) -> dict[str, Any]:
 
 
 def optimal_moves(folder: Path, found: Fitted) -> Chapter:
-    """The fastest move of the drive, and the one of least effort in half as much time again.
+    """Compute the fastest move of the drive, and the move of least effort in 1.5 times that time.
 
-    The speed is bounded by the largest one in the record: beyond it friction is a guess.
+    The speed is bounded by the largest one in the record, since friction is unknown beyond it.
     """
     from ocp.solving.solution import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
 
@@ -193,26 +192,21 @@ def optimal_moves(folder: Path, found: Fitted) -> Chapter:
     return Chapter(
         "Optimal moves of the identified drive",
         f"{DISTANCE:g} m from rest to rest with at most {LIMIT:g} N and {speed:.3g} m/s, the "
-        "largest speed in the record: the fastest one, and the one of least effort (integral of "
-        "force^2) in 1.5 times that time; each control re-simulated.",
+        "largest speed in the record: the fastest move, and the move of least effort (integral of "
+        "force^2) in 1.5 times that time; each control is verified by simulation.",
         tuple(files),
         {
-            name: {
-                "status": solution.status.name,
-                "T": solution.T,
-                "cost": solution.cost,
-                "miss": solution.miss,
-                "iterations": solution.iterations,
-            }
+            name: {n: getattr(solution, n) for n in ("T", "cost", "miss", "iterations")}
+            | {"status": solution.status.name}
             for name, solution in moves.items()
         },
     )
 
 
 def show_moves(moves: dict[str, Solution]) -> None:
-    """Print duration, effort and by how much the simulated move misses, relatively."""
+    """Print duration, peak force and the relative miss of the simulated moves."""
     output.show_table(
-        ["move", "status", "iterations", "T [s]", "peak [N]", "simulated miss"],
+        ["move", "status", "iterations", "duration T [s]", "peak force [N]", "relative miss"],
         [
             (
                 name,
@@ -230,7 +224,7 @@ def show_moves(moves: dict[str, Solution]) -> None:
 
 
 def generated_c(folder: Path, stage: Law) -> Chapter:
-    """LuGre with its exact step, and the identified law as friction compensation."""
+    """Generate C of LuGre, and of the identified law for friction compensation."""
     files: list[Path] = []
     numbers: dict[str, Any] = {"failed": False}
     for name, law in {"lugre": LuGre(), "stage_friction": stage}.items():
@@ -246,20 +240,20 @@ def generated_c(folder: Path, stage: Law) -> Chapter:
     return Chapter(
         "C for embedded controllers",
         "LuGre with its exact exponential update, and the identified friction for feed-forward "
-        "compensation; both compared with CasADi where there is a C compiler.",
+        "compensation; both compared with CasADi if there is a C compiler.",
         tuple(files),
         numbers,
     )
 
 
 def index(out: Path, chapters: list[Chapter]) -> str:
-    """The contents of the folder as Markdown."""
-    lines = ["# What `symfric demo` left here", ""]
+    """Return a list of the results in Markdown."""
+    lines = ["# Results of `symfric demo`", ""]
     for chapter in chapters:
-        lines += [f"## {chapter.title}", "", chapter.says, ""]
+        lines += [f"## {chapter.title}", "", chapter.text, ""]
         for path in sorted(chapter.files, key=lambda path: path.suffix != ".png"):
             place = path.relative_to(out).as_posix()
             picture = path.suffix == ".png"
             lines.append(f"![{path.stem}]({place})\n" if picture else f"- [{place}]({place})")
         lines.append("")
-    return "\n".join([*lines, "`summary.json` holds the key numbers of all of them.", ""])
+    return "\n".join([*lines, "`summary.json` contains the key numbers of all parts.", ""])

@@ -1,6 +1,6 @@
-"""`symfric identify`: friction laws fitted to measured data, with what they are worth."""
+"""`symfric identify`: fit friction laws to measured data and assess the result."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -22,32 +22,21 @@ from identification.starts.start import findings_of
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status
+from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import LawsOption
-from symfric.cli.options import (
-    HtmlOption,
-    JsonOption,
-    MissingOption,
-    PlotOption,
-    ResampleOption,
-    argument,
-    assignments,
-    check_outputs,
-    law_names,
-    numbers,
-    option,
-)
+from symfric.cli.options import argument, option
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
 KINDS = {
-    "points": "forces F at velocities v, over a time where --column t=NAME or --step says so",
-    "inverse": "the force that the measured motion needs",
+    "points": "forces F at velocities v, time series with --column t=NAME or --step",
+    "inverse": "inverse dynamics",
     "shooting": "simulated motion",
     "loop": "simulated motion under the controller of the record",
 }
 OF_KIND = ("x0", "dead_time")
-"""Entries of --free that are no parameters."""
+"""Entries of --free that are not parameters."""
 
 RULES = {"log": log, "linear": linear}
 
@@ -55,7 +44,7 @@ RULES = {"log": log, "linear": linear}
 @final
 @dataclass(frozen=True)
 class Reading:
-    """Options of `Dataset.read`; `resample`: to equal intervals, cut at gaps."""
+    """Options of `Dataset.read`; `resample` resamples to equal intervals and splits at gaps."""
 
     columns: dict[str, str] | list[str] | None
     units: dict[str, str] | str | None
@@ -66,7 +55,7 @@ class Reading:
     resample: bool = False
 
     def read(self, paths: Sequence[str]) -> Dataset:
-        """The records of the files."""
+        """Read the records of the files."""
         missing: Any = self.missing
         found = Dataset.read(
             list(paths), columns=self.columns, units=self.units, step=self.step,
@@ -84,12 +73,12 @@ def reading(
     missing: str = "refuse",
     resample: bool = False,
 ) -> Reading:
-    """The texts of --column and --unit: SIGNAL=NAME, repeated, or all columns in their order.
+    """Convert --column and --unit: SIGNAL=NAME, repeated, or all columns in their order.
 
-    Points have a time where a column t or a step is given.
+    Points are a time series if a column t or a step is given.
 
     Raises:
-        ValueError: some of both, or a name without a value.
+        ValueError: both forms mixed, or a name without a value.
     """
     named = _named_or_all("--column", columns, "x=pos", "t,x,-,force")
     timed = step is not None or (named is not None and "t" in named)
@@ -102,7 +91,7 @@ def _named_or_all(
     if not texts:
         return None
     if all("=" in text for text in texts):
-        return assignments(option, texts)
+        return opt.assignments(option, texts)
     if len(texts) > 1:
         raise ValueError(f"{option}: expected {such}, repeated, or once {other}, got both")
     return [part.strip() for part in texts[0].split(",")]
@@ -114,9 +103,9 @@ def _units(texts: Sequence[str] | None) -> dict[str, str] | str | None:
 
 
 def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
-    """The kind of residuals; `windows` [s] or "choose" of simulated motions.
+    """Return the type of residuals; `windows` is a length [s] or "choose", for shooting only.
 
-    Of points an `offset` among `free` is taken out of it: a constant force besides friction.
+    For points, `offset` in `free` is removed from it and adds a constant force to friction.
     """
     check_names("--kind", [name], KINDS)
     if windows is not None and name != "shooting":
@@ -124,7 +113,7 @@ def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
     if name == "points":
         offset = "offset" in free
         if free.pop("offset", None) is not None:
-            raise ValueError("--free offset: expected no more than its name with --kind points")
+            raise ValueError("--free offset: expected no value with --kind points, got one")
         return Points(offset=offset)
     if name == "inverse":
         return InverseDynamics()
@@ -135,7 +124,7 @@ def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
 
 
 def free_in(texts: Iterable[str] | None) -> dict[str, Any]:
-    """Parameters that are fitted, and how: see `free_one`."""
+    """Return the fitted parameters with their specifications, see `free_one`."""
     found: dict[str, Any] = {}
     for text in texts or ():
         name, equals, how = (part.strip() for part in text.partition("="))
@@ -146,11 +135,11 @@ def free_in(texts: Iterable[str] | None) -> dict[str, Any]:
 
 
 def free_one(name: str, how: str) -> Any:
-    """One entry of `free` in Python.
+    """Convert one entry of --free to an entry of `free` in Python.
 
-    `1.5` is a start value, `0:2` are bounds, either of which may be left out; `log(1e3, 1e7)`,
-    `linear(0, 2, 1)`, `above(mu_d)`, `tied(mu_d, 1.2)` are the functions of `identification`. `x0`
-    and `dead_time` take what `Shooting` takes.
+    `1.5` is a start value; `0:2` are bounds, either of which may be omitted; `log(1e3, 1e7)`,
+    `linear(0, 2, 1)`, `above(mu_d)` and `tied(mu_d, 1.2)` are the functions of `identification`.
+    `x0` and `dead_time` accept the values of `Shooting`.
     """
     where = f"--free {name}"
     if not how:
@@ -185,34 +174,28 @@ MOST_WORKERS = 256
 
 
 def identify(
-    data: Annotated[list[str], argument("DATA", "CSV, .mat or .npy; each file a record.")],
+    data: Annotated[list[str], argument("DATA", "CSV, .mat or .npy; one record per file.")],
     law: LawsOption,
     validate: Annotated[
-        list[str] | None, option("--validate DATA", "Record for errors only; may be repeated.")
+        list[str] | None, option("--validate DATA", "Record for validation only; may be repeated.")
     ] = None,
     kind: Annotated[
         str, option("--kind NAME", "; ".join(f"{n}: {t}" for n, t in KINDS.items()) + ".")
     ] = "inverse",
     windows: Annotated[
-        str | None, option("--windows SECONDS|choose", "Length of simulated pieces.")
+        str | None, option("--windows SECONDS|choose", "Length of simulated windows.")
     ] = None,
-    columns: Annotated[
-        list[str] | None, option("--column SIGNAL=NAME", "Column of a signal; all: t,x,-,F.")
-    ] = None,
-    units: Annotated[
-        list[str] | None, option("--unit SIGNAL=UNIT", 'Unit of a column; or all: "rad, N m".')
-    ] = None,
+    columns: opt.ColumnOption = None,
+    units: opt.UnitOption = None,
     step: Annotated[
         float | None, option("--step SECONDS", "Sample time of files without one.")
     ] = None,
     variable: Annotated[
         str | None, option("--variable NAME", "Struct or matrix in a .mat file.")
     ] = None,
-    missing: MissingOption = "refuse",
-    resample: ResampleOption = False,
-    normal_force: Annotated[
-        float, option("--normal-force NUMBER", "Normal force [N]; with 1 coefficients are forces.")
-    ] = 1.0,
+    missing: opt.MissingOption = "refuse",
+    resample: opt.ResampleOption = False,
+    normal_force: opt.NormalForceOption = 1.0,
     fixed: Annotated[list[str] | None, option("--fix NAME=VALUE", "Hold a parameter.")] = None,
     free: Annotated[
         list[str] | None,
@@ -222,36 +205,36 @@ def identify(
         ),
     ] = None,
     noise: Annotated[
-        list[str] | None, option("--noise SIGNAL=VALUE", "Noise level; default estimated.")
+        list[str] | None, option("--noise SIGNAL=VALUE", "Noise level; default: estimated.")
     ] = None,
     loss: Annotated[
-        str, option("--loss NAME", "squares; against outliers huber, soft_l1, cauchy.")
+        str, option("--loss NAME", "squares, or against outliers huber, soft_l1, cauchy.")
     ] = "squares",
-    starts: Annotated[int, option("--starts N", "Most starts.")] = 6,
+    starts: Annotated[int, option("--starts N", "Largest number of starts.")] = 6,
     workers: Annotated[int, option("--workers N", "Processes for the starts.")] = 1,
     profiles: Annotated[
-        list[str] | None, option("--profile NAME", "Interval by profile likelihood.")
+        list[str] | None, option("--profile NAME", "Confidence interval by profile likelihood.")
     ] = None,
-    html: HtmlOption = None,
-    plot: PlotOption = None,
-    json: JsonOption = None,
+    html: opt.HtmlOption = None,
+    plot: opt.PlotOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
-    """Fit friction laws to measured data, and say what they are worth.
+    """Fit friction laws to measured data and assess the result.
 
-    Prints the verdict of the residuals, parameters with 95 % intervals and what the data do not
-    tell. The exit status is 1 where data or residuals say that the result is no physics.
+    Prints the assessment of the residuals, parameters with 95 % intervals, and parameters that the
+    data do not identify. The exit status is 1 if data or residuals make the result meaningless.
 
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
     """
-    check_outputs(html, json, picture=plot)
-    laws, wishes = law_names(law), free_in(free)
+    opt.check_outputs(html, json, picture=plot)
+    laws, wishes = opt.law_names(law), free_in(free)
     chosen = residuals_of(kind, windows, wishes)
     read = reading(columns, units, step, variable, kind == "points", missing, resample)
-    asked: dict[str, Any] = {
+    request: dict[str, Any] = {
         "free": wishes or None,
-        "fixed": numbers("--fix", fixed) or None,
+        "fixed": opt.numbers("--fix", fixed) or None,
         "normal_force": normal_force,
-        "noise": numbers("--noise", noise) or "estimate",
+        "noise": opt.numbers("--noise", noise) or "estimate",
         "loss": loss,
         "starts": starts,
     }
@@ -259,25 +242,22 @@ def identify(
     records = read.read(data)
     other = read.read(validate) if validate else None
     if profiles:
-        one = Fit(chosen, laws[0], records, **asked).prepared()
+        one = Fit(chosen, laws[0], records, **request).prepared()
         check_names("--profile", profiles, one.task.unknowns.fitted)
     with output.progress(f"identify {' and '.join(laws)}") as tell, _executor(workers) as executor:
-        how: dict[str, Any] = {"executor": executor, "progress": _told(tell)}
+        how: dict[str, Any] = {"executor": executor, "progress": output.unnamed(tell)}
         if len(laws) > 1:
-            ranking = select(laws, records, chosen, other, **how, **asked)
+            ranking = select(laws, records, chosen, other, **how, **request)
             fit = ranking.best
         else:
             ranking = None
-            fit = Fit(chosen, laws[0], records, **asked).solve(**how, throw=False)
+            fit = Fit(chosen, laws[0], records, **request).solve(**how, throw=False)
     found = judged(fit, other, profiles or (), ranking)
     if html:
         found.fit.to_html(html, found.ranking)
     if plot:
         found.fit.plot(plot)
-    output.emit_json(found.to_dict(), json)
-    if json != "-":
-        show(found)
-    output.say_written(html, plot, json)
+    output.finish(found.to_dict(), json, lambda: show(found), html, plot)
     refuse(found)
 
 
@@ -287,10 +267,10 @@ class Found:
     """Results to show.
 
     Attributes:
-        fit: with its errors on other data.
-        profiles: the requested ones.
-        ranking: of several laws, whose best one the fit is.
-        failed: why other data or profiles could not be had.
+        fit: fit, with its errors on validation data.
+        profiles: requested profiles.
+        ranking: ranking of several laws, if any; `fit` is the best one.
+        failed: reasons why validation or profiles failed.
     """
 
     fit: Fitted
@@ -299,7 +279,7 @@ class Found:
     failed: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of `--json`: the fit, which `Fitted.from_json` reads, and more."""
+        """Return the content of `--json`: the fit, which `Fitted.from_json` reads, and more."""
         more: dict[str, Any] = {}
         if self.profiles:
             more["profiles"] = [p.to_dict() for p in self.profiles]
@@ -311,7 +291,7 @@ class Found:
 def judged(
     fit: Fitted, other: Dataset | None, names: Sequence[str], ranking: Ranking | None
 ) -> Found:
-    """The fit on other data, and profiles; what fails is told, and the rest is kept."""
+    """Validate the fit and compute profiles; collect the failures."""
     failed: list[str] = []
     profiles: list[Profile] = []
     if other is not None:
@@ -342,29 +322,23 @@ def show(found: Found) -> None:
 
 
 def refuse(found: Found) -> None:
-    """Raise where the result is no physics, or where something could not be done.
+    """Raise an error if the result is meaningless or incomplete.
 
     Raises:
-        SolveError: the fit did not end well, or it did, but other data or profiles were of no use.
+        SolveError: the fit failed, the ranking was interrupted, or validation or profiles failed.
     """
     fit = found.fit
     if not fit.status.ok:
-        said = next((f.sentence for f in fit.findings if f.severity == "error"), "")
-        why = said or next(iter(fit.verdict.nonsense), "") or fit.status.value
+        finding = next((f.sentence for f in fit.findings if f.severity == "error"), "")
+        why = finding or next(iter(fit.verdict.nonsense), "") or fit.status.value
         raise SolveError(f"identify {fit.name}: {fit.status.name.lower()}: {why}", fit.status, fit)
     ranked = () if found.ranking is None else found.ranking.rows
     if any(INTERRUPTED in row.sentence for row in ranked):
-        raise SolveError(f"identify: {INTERRUPTED}; the laws before are ranked", Status.INTERRUPTED)
+        raise SolveError(
+            f"identify: {INTERRUPTED}; the laws before it are ranked", Status.INTERRUPTED
+        )
     if found.failed:
         raise SolveError("; ".join(found.failed), fit.status, fit)
-
-
-def _told(tell: Callable[[float], None]) -> Callable[[str, float], None]:
-    def advance(text: str, done: float) -> None:
-        del text
-        tell(done)
-
-    return advance
 
 
 def _executor(workers: int) -> AbstractContextManager[Executor | None]:

@@ -1,22 +1,15 @@
-"""`symfric laws`: what laws there are, and what one of them says."""
+"""`symfric laws`: list the friction laws, or show one in full."""
 
 from dataclasses import asdict
+from functools import partial
 from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any
 
 from symfric import ALL_LAWS, parameters
 from symfric.cli import completions, output
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    SetOption,
-    all_with,
-    any_with,
-    argument,
-    check_outputs,
-    option,
-)
+from symfric.cli import options as opt
+from symfric.cli.options import argument, option
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.data import NORMAL_FORCE, parts, phenomena
 from symfric.foundation import checks
@@ -31,8 +24,8 @@ def laws(
     name: Annotated[
         str | None, argument("NAME", "One law, such as lugre.", completions.all_laws)
     ] = None,
-    settings: SetOption = None,
-    plot: PlotOption = None,
+    settings: opt.SetOption = None,
+    plot: opt.PlotOption = None,
     figure: Annotated[
         str | None,
         option("--figure FIGURE", f"Behaviour: {', '.join(FIGURES)}.", completions.figures),
@@ -45,25 +38,24 @@ def laws(
         float | None,
         option("--normal-force NUMBER", "Normal force [N]; default 1, and 7.848 for --figure."),
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """List the friction laws, or show one in full.
 
-    In full: equation, limits, source, parameters with units and bounds, and a picture. With
-    --figure or --compare its behaviour instead, computed as in the papers; --figure takes
-    scenes such as rabinowicz, too. --set then holds for every law that is compared, and
-    --set gms.C=10 for one of them.
+    In full: equation, limits, source, parameters with units and bounds, and a picture. --figure
+    and --compare show its behaviour instead, computed as in the papers; --figure also accepts
+    scenes such as rabinowicz. --set then applies to every law, and --set gms.C=10 to one of them.
 
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
-    check_outputs(json, picture=plot)
+    opt.check_outputs(json, picture=plot)
     if normal_force is not None:
         checks.number("--normal-force", normal_force, unit="N", above=0.0)
     if figure is not None or others:
         behaviour(name, settings, figure, others or [], normal_force, plot, json)
         return
     every = [name] if name else [*ALL_LAWS, *POPULATIONS]
-    chosen = {text: any_with(text, settings if name else None) for text in every}
+    chosen = {text: opt.any_with(text, settings if name else None) for text in every}
     if settings and not name:
         raise ValueError("--set: expected the name of a law before it, got none")
     if plot:
@@ -73,10 +65,8 @@ def laws(
         load = 1.0 if normal_force is None else normal_force
         draw(chosen, load, plot)
     described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
-    output.emit_json(described[0] if name else {"laws": described}, json)
-    if json != "-":
-        show_law(name, chosen[name]) if name else show_list(chosen)
-    output.say_written(plot, json)
+    show = partial(show_law, name, chosen[name]) if name else partial(show_list, chosen)
+    output.finish(described[0] if name else {"laws": described}, json, show, plot)
 
 
 def behaviour(
@@ -88,25 +78,22 @@ def behaviour(
     plot: Path | None,
     json: str | None,
 ) -> None:
-    """Compute a figure of one or several laws, and write, draw or summarise it."""
+    """Compute a figure of one or several laws; write, draw or summarise it."""
     if not name:
         raise ValueError("--figure, --compare: expected the name of a law before it, got none")
     scenario = "profile" if figure is None else figure
     check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
     load = NORMAL_FORCE if normal_force is None else normal_force
-    chosen = all_with([name, *others], settings)
+    chosen = opt.all_with([name, *others], settings)
     with output.progress(f"{scenario} of {', '.join([name, *others])}"):
         data = compare(chosen, scenario, load)
     if plot:
         data.plot(plot)
-    output.emit_json(data.to_dict(), json)
-    if json != "-":
-        show_figure(data)
-    output.say_written(plot, json)
+    output.finish(data.to_dict(), json, partial(show_figure, data), plot)
 
 
 def show_figure(data: FigureData) -> None:
-    """The range of every column that is drawn, for each curve."""
+    """Print the range of every column that is drawn, for each curve."""
     drawn = list(dict.fromkeys(column for panel in data.panels for column in panel))
     rows = [
         (curve.label, name, data.units[name], float(curve[name].min()), float(curve[name].max()))
@@ -119,7 +106,7 @@ def show_figure(data: FigureData) -> None:
 
 
 def to_dict(law: AnyLaw) -> dict[str, Any]:
-    """Content of `--json` for one law."""
+    """Return the content of `--json` for one law."""
     return {
         "title": title(law),
         "phenomena": {code: PHENOMENA[code] for code in phenomena(law)},
@@ -135,14 +122,7 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
         "inputs": {i.name: {"unit": i.unit, "doc": i.doc} for i in law.inputs},
         "options": {o.name: asdict(o) for o in options(law).values()},
         "parameters": {
-            p.name: {
-                "value": p.value,
-                "unit": p.unit,
-                "role": p.role,
-                "lower": p.lower,
-                "upper": p.upper,
-                "doc": p.doc,
-            }
+            p.name: {n: getattr(p, n) for n in ("value", "unit", "role", "lower", "upper", "doc")}
             for p in parameters(law).values()
         },
         "doc": "\n\n".join(getdoc(part) or "" for part in parts(law)),
@@ -150,17 +130,17 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
 
 
 def costs(law: AnyLaw) -> str:
-    """The quantities that the instructions of `law` compute."""
+    """Return the quantity whose cost in instructions is reported."""
     return "a step of one contact" if isinstance(law, Population) else "force and rate"
 
 
 def title(law: AnyLaw) -> str:
-    """The first line of the docstring."""
+    """Return the first line of the docstring."""
     return (getdoc(type(law)) or "").partition("\n")[0].removesuffix(".")
 
 
 def show_list(chosen: dict[str, AnyLaw]) -> None:
-    """All laws, one a line, and what the codes mean."""
+    """Print all laws, one per line, and the meaning of the codes."""
     output.show_table(
         ["law", "shows", "z", "value", "slope", "formula"],
         [
@@ -181,7 +161,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
         f"\nshows:\n{codes}\n"
         "z: number of states, then smoothness (set: set-valued)\n"
         "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
-        "formula: what it was compared with; unverified: written from memory\n"
+        "formula: verification of the formula; unverified: written from memory\n"
         "symfric laws NAME shows equation, parameters and more;\n"
         f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
         f"Other names: {others}.\n"
@@ -191,7 +171,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
 
 
 def show_law(name: str, law: AnyLaw) -> None:
-    """Docstring, facts and parameters of one law."""
+    """Print docstring, properties and parameters of one law."""
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
     shown = ", ".join(PHENOMENA[code] for code in phenomena(law))

@@ -1,4 +1,4 @@
-"""A scene as commands name it: its laws, a paper's preset, its parameters, and what drives it."""
+"""Scenes from command line options: laws, preset, parameters, inputs and start values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ LawsOption = Annotated[
     list[str],
     option(
         "--law NAME[,NAME]",
-        "Friction law; several, with commas or repeated, are compared.",
+        "Friction law; several, separated by commas or repeated, are compared.",
         completions.each_law,
     ),
 ]
@@ -37,7 +37,7 @@ PresetOption = Annotated[
     str | None,
     option(
         "--preset NAME",
-        "Numbers of a paper; `symfric scenes SCENE` lists them.",
+        "Parameters of a paper; `symfric scenes SCENE` lists the presets.",
         completions.presets,
     ),
 ]
@@ -45,7 +45,7 @@ LawOfOption = Annotated[
     list[str] | None,
     option(
         "--law-of PLACE=LAW",
-        "Law of another place of the scene or joint of a robot, as hinge=coulomb.",
+        "Law at another place of the scene or joint of a robot, as hinge=coulomb.",
         completions.places,
     ),
 ]
@@ -54,20 +54,20 @@ LawOfOption = Annotated[
 def kind_of(
     scene: str, where: str = "scene", preset: str | None = None, law_of: Sequence[str] | None = None
 ) -> Callable[[Law], Scene]:
-    """A function law -> scene: a scene by its name, or the robot of a URDF file.
+    """Return a function law -> scene, for a scene by name or the robot of a URDF file.
 
     Args:
-        scene: its name, or FILE.urdf.
-        where: the argument it stands in.
-        preset: of --preset.
+        scene: name, or FILE.urdf.
+        where: name of the argument, for messages.
+        preset: value of --preset.
         law_of: texts of --law-of.
 
     Raises:
-        ValueError: neither; no such preset, place or law.
+        ValueError: unknown scene, preset, place or law.
     """
     others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
-        from symfric.multibody.urdf import relative  # noqa: PLC0415  (of robots only)
+        from symfric.multibody.urdf import relative  # noqa: PLC0415  (for robots only)
         from symfric.scenes import Robot  # noqa: PLC0415
 
         check_names("--preset of a robot", [preset] if preset else [], ())
@@ -76,7 +76,7 @@ def kind_of(
     check_names(where, [scene], ALL_SCENES)
     kind = ALL_SCENES[scene]
     check_names(
-        f"--law-of of {scene}", others, kind.places(), "--law is the law of what rubs there"
+        f"--law-of of {scene}", others, kind.places(), "--law is the law of the main contact"
     )
     if preset is not None:
         check_names(f"--preset of {scene}", [preset], kind.presets)
@@ -91,17 +91,18 @@ def scenes_with(
     preset: str | None = None,
     law_of: Sequence[str] | None = None,
 ) -> dict[str, Scene]:
-    """The scene with each of the laws by name, parameters set wherever they occur.
+    """Return the scene with each of the laws, by name of the law.
 
     Args:
-        scene: its name, or FILE.urdf.
+        scene: name, or FILE.urdf.
         laws: texts of --law.
-        settings: of --set: numbers of scene and laws, forms of laws, what the scene is made of;
-            they come after those of a preset.
-        preset, law_of: of these options.
+        settings: values of --set: parameters of scene and laws, forms of laws, structure of the
+            scene; they override a preset.
+        preset: value of --preset.
+        law_of: texts of --law-of.
 
     Raises:
-        ValueError: unknown law, a parameter that none of the scenes has; those of `kind_of`.
+        ValueError: unknown law, a parameter that none of the scenes has; see also `kind_of`.
     """
     kind = kind_of(scene, preset=preset, law_of=law_of)
     made = {text: law_from_text(text) for text in laws}
@@ -122,10 +123,10 @@ def scenes_with(
 
 
 def formed(machine: Scene, settings: Mapping[str, str | float]) -> Scene:
-    """The scene with the forms and the structure among texts of --set.
+    """Return the scene with the forms and the structure in `settings`.
 
     Raises:
-        ValueError: a text that is none of the choices, no count, neither true nor false.
+        ValueError: a text that is not one of the choices, a count, or true or false.
     """
     law = {n: str(text) for n, text in settings.items() if n in options(machine.law)}
     if law:
@@ -136,7 +137,7 @@ def formed(machine: Scene, settings: Mapping[str, str | float]) -> Scene:
 
 
 def forms(machine: Scene) -> list[str]:
-    """Names that --set takes of a scene besides numbers."""
+    """Return the names of a scene that --set accepts besides parameters."""
     return [*options(machine.law), *options(machine), *machine.structures()]
 
 
@@ -145,7 +146,7 @@ def _number(name: str, given: str | float) -> float:
 
 
 def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool | int:
-    """The value that a text means for a field that holds a value like `like`."""
+    """Convert a text to the type of `like`."""
     if isinstance(like, str):
         return str(text)
     if isinstance(like, bool):
@@ -157,17 +158,17 @@ def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool 
 @final
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Inputs, start values and end of a scene's run.
+    """Inputs, start values and end time of a run.
 
     Attributes:
         signals: inputs by name.
-        told: how people write them.
+        texts: inputs as written on the command line.
         start: state -> value.
-        until: last time [s].
+        until: end time [s].
     """
 
     signals: dict[str, Input]
-    told: dict[str, str]
+    texts: dict[str, str]
     start: dict[str, float]
     until: float
 
@@ -179,44 +180,44 @@ def driven(
     x0: Sequence[str] | None,
     t_end: float | None,
 ) -> Driven:
-    """The meaning of texts of --input, --x0 and --t-end for a scene.
+    """Convert the texts of --input, --x0 and --t-end for a scene.
 
-    An input that is not given is that of the scene. The last time is that of the samples, or the
-    one that shows the scene. Samples of a state whose rate is an input (`Scene.integrals`) are that
-    input, and say where the state starts.
+    Inputs that are not given are those of the scene. The default end time is that of the samples,
+    or that of the scene. Samples of a state whose rate is an input (`Scene.integrals`) determine
+    that input and the start value of the state.
 
     Raises:
-        ValueError: unknown names, an input and its integral, or what `input_from_text` refuses.
+        ValueError: unknown names, an input together with its integral; see also `input_from_text`.
     """
     given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
-    ways = {state: rate for state, rate in scene.integrals.items() if rate in units}
-    units |= {v.name: v.unit for v in model.x if v.name in ways}
+    rates = {state: rate for state, rate in scene.integrals.items() if rate in units}
+    units |= {v.name: v.unit for v in model.x if v.name in rates}
     check_names(f"--input of {model.name}", given, units)
     signals: dict[str, Input] = {}
-    told, start = dict(given), dict[str, float]()
+    written, start = dict(given), dict[str, float]()
     for name, text in given.items():
         signal = input_from_text(name, text, units[name])
-        if name not in ways:
+        if name not in rates:
             signals[name] = signal
             continue
-        if ways[name] in given:
-            raise ValueError(f"--input: expected {name} or its rate {ways[name]}, got both")
-        signals[ways[name]] = rate_of(signal)
+        if rates[name] in given:
+            raise ValueError(f"--input: expected {name} or its rate {rates[name]}, got both")
+        signals[rates[name]] = rate_of(signal)
         start[name] = float(np.asarray(signal.values)[0] if isinstance(signal, Linear) else signal)  # type: ignore[arg-type]
     for name, own in scene.inputs.items():
         if name not in signals:
-            signals[name], told[name] = own.function, own.text
+            signals[name], written[name] = own.function, own.text
     ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
     until = max(ends, default=scene.t_end) if t_end is None else t_end
-    return Driven(signals, told, start | numbers("--x0", x0), until)
+    return Driven(signals, written, start | numbers("--x0", x0), until)
 
 
 def input_from_text(name: str, text: str, unit: str) -> Linear | float:
-    """The input that `text` means: `2.0`, or `FILE.csv:COLUMN` interpolated linearly over time.
+    """Return the input `2.0`, or `FILE.csv:COLUMN` interpolated linearly over time.
 
     Args:
-        name: of the input.
-        text: what stands behind the equals sign.
+        name: name of the input.
+        text: text after the equals sign.
         unit: SI unit of the input.
 
     Raises:
@@ -235,13 +236,14 @@ def input_from_text(name: str, text: str, unit: str) -> Linear | float:
 
 
 def read_column(path: Path, column: str, unit: str) -> Linear:
-    """Samples of `column` over the column t of a CSV file.
+    """Read the samples of `column` over the column t of a CSV file.
 
-    Units in the header become SI, as in `symfric identify`; without one the column is in SI.
+    Units in the header are converted to SI, as in `symfric identify`; columns without a unit are in
+    SI.
 
     Raises:
-        ValueError: no such column or two, no column t, a unit of something else, a row that holds
-            no numbers, times not increasing.
+        ValueError: missing or repeated column, no column t, incompatible unit, a row without
+            numbers, or times that do not increase.
         OSError: the file cannot be read.
     """
     names = (column, column.partition("[")[0].strip())

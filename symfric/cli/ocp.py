@@ -1,5 +1,6 @@
-"""`symfric ocp`: solve a ready optimal control problem, or one that a Python file holds."""
+"""`symfric ocp`: solve a ready optimal control problem, or one in a Python file."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
@@ -10,23 +11,14 @@ from ocp.strategies import Friction
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import completions, output
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    SetOption,
-    argument,
-    called_with,
-    check_outputs,
-    held_by_file,
-    numbers,
-    option,
-)
+from symfric.cli import options as opt
+from symfric.cli.options import argument, option
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
 SOLVERS = {"ipopt": Ipopt, "fatrop": Fatrop, "sqp": Sqp}
 DEFAULT_NAME = "problem"
-"""What a problem is called in a file that does not say otherwise."""
+"""Default name of the problem in a Python file."""
 
 
 def ocp(
@@ -34,59 +26,58 @@ def ocp(
         str | None,
         argument(
             "NAME|FILE.py[:NAME]",
-            "A ready problem, or a `Problem`, or a function that returns one, in a file.",
+            "A ready problem, or a `Problem` (or a function that returns one) in a file.",
             completions.problems,
         ),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     intervals: Annotated[
-        int | None, option("--intervals N", "Equal intervals to begin with.")
+        int | None, option("--intervals N", "Number of equal intervals of the first mesh.")
     ] = None,
     scheme: Annotated[
         str, option("--scheme NAME", "radau3, legendre4, shooting:rodas5p:2 (method, steps).")
     ] = "radau3",
     solver: Annotated[
-        str, option("--solver", "What solves the program.", metavar="|".join(SOLVERS))
+        str, option("--solver", "Solver of the nonlinear program.", metavar="|".join(SOLVERS))
     ] = "ipopt",
     friction: Annotated[
-        str, option("--friction NAME", f"How it is met: {', '.join(get_args(Friction))}.")
+        str, option("--friction NAME", f"Treatment of friction: {', '.join(get_args(Friction))}.")
     ] = "auto",
     tolerance: Annotated[
-        float, option("--tolerance NUMBER", "Largest relative miss of what is asked for.")
+        float, option("--tolerance NUMBER", "Largest relative violation of the end conditions.")
     ] = 1e-3,
     resting_margin: Annotated[
         float,
         option(
             "--resting-margin NUMBER",
-            "Share of its static level (dimensionless) that a contact at rest keeps from it.",
+            "Friction margin of a sticking contact, relative to its static level.",
         ),
     ] = 1e-4,
-    max_time: Annotated[
-        float | None, option("--max-time SECONDS", "Time after which to stop.")
-    ] = None,
+    max_time: Annotated[float | None, option("--max-time SECONDS", "Time limit.")] = None,
     guess: Annotated[Path | None, option("--guess FILE", "Start from a saved solution.")] = None,
-    save: Annotated[Path | None, option("--save FILE", "Save it for a warm start.")] = None,
+    save: Annotated[
+        Path | None, option("--save FILE", "Save the solution for a warm start.")
+    ] = None,
     csv: Annotated[Path | None, option("--csv FILE.csv", "Write all signals.")] = None,
-    plot: PlotOption = None,
-    json: JsonOption = None,
+    plot: opt.PlotOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Solve an optimal control problem and check it.
 
-    Without a name: the list of ready problems. --set takes their numbers, and those of the
-    function in a file.
+    Without a name, list the ready problems. --set accepts their parameters, and those of a function
+    in a file.
 
     Example: symfric ocp out_and_back --plot move.png
 
     Example: symfric ocp crane.py:swing --set length=2 --csv swing.csv
     """
     if problem is None:
-        _list()
-        return
-    check_outputs(csv, save, json, picture=plot)
+        return _list()
+    opt.check_outputs(csv, save, json, picture=plot)
     check_names("--solver", [solver], SOLVERS)
     check_names("--friction", [friction], get_args(Friction))
-    values = numbers("--set", settings)
-    ready, asked = problem_of(problem, values)
+    values = opt.numbers("--set", settings)
+    ready, request = problem_of(problem, values)
     margin = checks.number("--resting-margin", resting_margin, above=0.0, upper=0.1)
     how: dict[str, Any] = {} if intervals is None else {"intervals": intervals}
     if max_time is not None:
@@ -95,7 +86,7 @@ def ocp(
         how["guess"] = load(guess)
     with output.progress(f"ocp {problem}") as tell:
         found = solve(
-            asked,
+            request,
             scheme=scheme_of(scheme),
             solver=SOLVERS[solver](),
             friction=cast("Friction", friction),
@@ -111,32 +102,31 @@ def ocp(
         found.save(save)
     if plot:
         found.plot(path=plot)
-    output.emit_json(found.to_dict(), json)
-    if json != "-":
-        show_solution(problem, found, None if values else ready)
-    output.say_written(csv, save, plot, json)
+    show = partial(show_solution, problem, found, None if values else ready)
+    output.finish(found.to_dict(), json, show, csv, save, plot)
     if not found.ok:
         raise SolveError(found.message, found.status, found)
+    return None
 
 
 def problem_of(text: str, values: dict[str, float]) -> tuple[Ready | None, Problem]:
-    """The problem that `text` names, and what is known about it.
+    """Return the problem that `text` names, and its entry among the ready problems.
 
     Raises:
-        ValueError: no such problem or file, a file that fails, a name in it that is no problem.
+        ValueError: no such problem or file, an error in the file, or an object of another type.
     """
     _, _, name = text.partition(".py")
     if not (name == "" and text.endswith(".py")) and not name.startswith(":"):
         check_names("ocp", [text], READY)
-        return READY[text], called_with(text, READY[text].make, values)
-    return None, held_by_file("ocp", text, DEFAULT_NAME, values, "Problem", Problem)
+        return READY[text], opt.called_with(text, READY[text].make, values)
+    return None, opt.held_by_file("ocp", text, DEFAULT_NAME, values, "Problem", Problem)
 
 
 def scheme_of(text: str) -> Scheme:
-    """The scheme that `--scheme` names.
+    """Return the transcription scheme of `--scheme`.
 
     Raises:
-        ValueError: another form than radau3, legendre4 or shooting:METHOD:STEPS.
+        ValueError: not of the form radau3, legendre4 or shooting:METHOD:STEPS.
     """
     kinds = {"radau": Radau, "legendre": Legendre}
     for kind, scheme in kinds.items():
@@ -152,19 +142,19 @@ def scheme_of(text: str) -> Scheme:
 
 def _list() -> None:
     output.show_table(
-        ["problem", "J", "good to", "what"],
+        ["problem", "cost J", "uncertainty", "description"],
         [[r.name, r.optimum, r.uncertain, r.title] for r in READY.values()],
         "Ready problems and their best known costs",
     )
 
 
 def show_solution(name: str, found: Solution, ready: Ready | None) -> None:
-    """Print what was found, how it was checked, and the modes of contacts."""
+    """Print the solution, its verification and the modes of contacts."""
     spent = sum(getattr(found.statistics, f"{what}_time") for what in ("build", "solve", "verify"))
     known = [] if ready is None else [ready.optimum, (found.cost / ready.optimum - 1) * 100]
     output.show_table(
-        ["T [s]", "J", *(["known", "off [%]"] if known else []), "verified", "iterations",
-         "time [s]"],
+        ["duration T [s]", "cost J", *(["best known J", "difference [%]"] if known else []),
+         "verified", "iterations", "time [s]"],
         [[found.T, found.cost, *known, "yes" if found.verified else "no", found.iterations,
           round(spent, 2)]],
         name,
@@ -177,5 +167,5 @@ def show_solution(name: str, found: Solution, ready: Ready | None) -> None:
             "Modes",
         )  # fmt: skip
     if found.chosen:
-        output.show_table(["chosen", "value"], [[*pair] for pair in found.chosen.items()])
+        output.show_table(["chosen parameter", "value"], [[*pair] for pair in found.chosen.items()])
     output.show(f"\n{found.message}")

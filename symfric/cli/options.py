@@ -1,4 +1,4 @@
-"""Options that several commands share, and what their texts mean; files of the user among them."""
+"""Options shared by several commands, conversion of their texts, and Python files of the user."""
 
 import runpy
 import traceback
@@ -27,7 +27,7 @@ def option(
     completion: Callable[..., list[str]] | None = None,
     metavar: str | None = None,
 ) -> Any:
-    """An option: its names and, behind them, what stands for its value, as "--rtol NUMBER"."""
+    """Declare an option by its names and the placeholder of its value, such as "--rtol NUMBER"."""
     names = [word for word in words.split() if word.startswith("--")]
     value = " ".join(word for word in words.split() if not word.startswith("--"))
     return typer.Option(
@@ -36,7 +36,7 @@ def option(
 
 
 def argument(metavar: str, meaning: str, completion: Callable[..., list[str]] | None = None) -> Any:
-    """An argument without a name on the line."""
+    """Declare a positional argument."""
     return typer.Argument(metavar=metavar, help=meaning, autocompletion=completion)
 
 
@@ -47,31 +47,53 @@ MissingOption = Annotated[
     str,
     option(
         "--missing refuse|drop",
-        "Rows in which a channel has no number, or that repeat the one before: drop them.",
+        "Refuse or drop rows with a missing number, and repeated rows.",
     ),
 ]
 ResampleOption = Annotated[
-    bool, option("--resample", "Equal intervals; a long gap begins another record.")
+    bool, option("--resample", "Resample to equal intervals; a long gap starts a new record.")
 ]
 PlotOption = Annotated[Path | None, option("--plot FILE.png", "Write a picture.")]
-HtmlOption = Annotated[Path | None, option("--html FILE.html", "Write one page of it all.")]
+HtmlOption = Annotated[Path | None, option("--html FILE.html", "Write an HTML page.")]
 RtolOption = Annotated[float, option("--rtol NUMBER", "Relative tolerance of a step.")]
 StartOption = Annotated[list[str] | None, option("--x0 NAME=VALUE", "Start value of a state.")]
-WorkersOption = Annotated[int | None, option("--workers N", "Processes; default one a core.")]
+WorkersOption = Annotated[int | None, option("--workers N", "Processes; default: one per core.")]
 SetOption = Annotated[
     list[str] | None,
     option("--set NAME=VALUE", "Set a parameter; may be repeated.", completions.settings),
 ]
 
 
+ColumnOption = Annotated[
+    list[str] | None, option("--column SIGNAL=NAME", "Column of a signal; or all: t,x,-,F.")
+]
+UnitOption = Annotated[
+    list[str] | None, option("--unit SIGNAL=UNIT", 'Unit of a column; or all: "rad, N m".')
+]
+NormalForceOption = Annotated[
+    float, option("--normal-force NUMBER", "Normal force [N]; with 1, coefficients are forces.")
+]
+InputOption = Annotated[
+    list[str] | None,
+    option(
+        "--input NAME=VALUE",
+        "Input: a number, or FILE.csv:COLUMN over its column t, both in SI or with units in the "
+        "header, as t [ms]; default: the input of the scene, see `symfric scenes SCENE`.",
+    ),
+]
+EndOption = Annotated[
+    float | None,
+    option("--t-end SECONDS", "End time [s]; default: the last sample, or that of the scene."),
+]
+
 L = TypeVar("L", Law, AnyLaw)
 
 
 def assignments(option: str, texts: Iterable[str] | None) -> dict[str, str]:
-    """`NAME=VALUE` texts by name.
+    """Return the values of `NAME=VALUE` texts by name.
 
     Raises:
-        ValueError: a text without name or value, or a name given twice.
+        ValueError: a text without name or value, or a repeated name.
     """
     found: dict[str, str] = {}
     for text in texts or ():
@@ -85,22 +107,22 @@ def assignments(option: str, texts: Iterable[str] | None) -> dict[str, str]:
 
 
 def numbers(option: str, texts: Iterable[str] | None) -> dict[str, float]:
-    """`NAME=NUMBER` texts by name."""
+    """Return the numbers of `NAME=NUMBER` texts by name."""
     given = assignments(option, texts)
     return {name: checks.parsed(f"{option} {name}", value) for name, value in given.items()}
 
 
 def seconds(option: str, text: str | None) -> list[float]:
-    """Times [s] separated by commas."""
+    """Return times [s] separated by commas."""
     parts = [] if text is None else text.split(",")
     return [checks.parsed(option, part.strip()) for part in parts]
 
 
 def law_names(texts: Sequence[str]) -> list[str]:
-    """Laws of --law, which is repeated or holds several with commas, each once.
+    """Return the laws of --law, which may be repeated or hold several names with commas.
 
     Raises:
-        ValueError: none, one twice, or one that is not known.
+        ValueError: an empty, repeated or unknown name.
     """
     laws = [part.strip() for text in texts for part in text.split(",")]
     if not all(laws):
@@ -113,23 +135,23 @@ def law_names(texts: Sequence[str]) -> list[str]:
 
 
 def any_with(text: str, settings: Iterable[str] | None) -> AnyLaw:
-    """The law or population that `text` names, with the parameters and options of `--set`."""
+    """Return the law or population `text` with the parameters and options of `--set`."""
     return with_settings(any_from_text(text), text, settings)
 
 
 def all_with(texts: Sequence[str], settings: Iterable[str] | None) -> list[AnyLaw]:
-    """The laws that `texts` name, all with the parameters and options of `--set`.
+    """Return the laws `texts`, all with the parameters and options of `--set`.
 
-    `LAW.NAME=VALUE` sets the parameter of one of them only.
+    `LAW.NAME=VALUE` sets the parameter of one law only.
 
     Raises:
-        ValueError: a name that one of them does not have; it says which.
+        ValueError: a name that one of them does not have.
     """
     laws = [(text, any_from_text(text)) for text in texts]
     chosen: list[dict[str, str]] = [{} for _ in laws]
     lacking: list[str] = []
     given = assignments("--set", settings)
-    for name in sorted(given, key=lambda name: "." in name):  # what is for one law comes last
+    for name in sorted(given, key=lambda name: "." in name):  # settings of one law come last
         only, _, own = name.rpartition(".")
         check_names(f"--set {name}", [only] if only else [], texts)
         for (text, law), values in zip(laws, chosen, strict=True):
@@ -149,7 +171,7 @@ def all_with(texts: Sequence[str], settings: Iterable[str] | None) -> list[AnyLa
 
 
 def with_settings(law: L, text: str, settings: Iterable[str] | None) -> L:
-    """`law`, called `text`, with the parameters and options of `--set`."""
+    """Return `law`, named `text` in messages, with the parameters and options of `--set`."""
     given = assignments("--set", settings)
     check_names(f"--set of law {text}", given, [*parameters(law), *options(law)])
     forms = {name: given.pop(name) for name in options(law) if name in given}
@@ -161,11 +183,10 @@ PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
 def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> None:
-    """Refuse output places that cannot be written, before any work is spent on them.
+    """Check before the work starts that output files can be written.
 
     Raises:
-        ValueError: a folder in the place of a file, a place without permission, or a kind of
-            picture that is not drawn.
+        ValueError: a folder instead of a file, a missing permission, or an unknown picture format.
     """
     if picture and picture.suffix.lower() not in PICTURES:
         raise ValueError(
@@ -181,18 +202,19 @@ def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> Non
 def held_by_file(
     command: str, text: str, default: str, values: dict[str, float], wanted: str, kind: Any
 ) -> Any:
-    """The object in FILE.py[:NAME], or the result of that function with the numbers of --set.
+    """Return the object in FILE.py[:NAME], or the result of that function with --set as arguments.
 
     Args:
-        command: who asks.
+        command: name of the command for messages.
         text: FILE.py or FILE.py:NAME.
-        default: the name where none is given.
-        values: of --set.
-        wanted, kind: what it is to be, in words and as types.
+        default: name if none is given.
+        values: numbers of --set.
+        wanted: expected type in words.
+        kind: expected types.
 
     Raises:
-        ValueError: no such file or name, a file that fails, numbers that do not fit, something else
-            than what is wanted.
+        ValueError: no such file or name, an error in the file, unknown names in --set, or an object
+            of another type.
     """
     name, held = _named(command, text, default, lambda value: isinstance(value, kind))
     found = held[name]
@@ -207,10 +229,10 @@ def held_by_file(
 
 
 def function_of_file(command: str, text: str, default: str, values: dict[str, float]) -> Any:
-    """The callable in FILE.py[:NAME], with the numbers of --set as its keywords.
+    """Return the callable in FILE.py[:NAME], with the numbers of --set as keyword arguments.
 
     Raises:
-        ValueError: no such file or name, a file that fails, numbers that do not fit.
+        ValueError: no such file or name, an error in the file, or unknown names in --set.
     """
     name, held = _named(command, text, default, callable)
     found = held[name]
@@ -223,7 +245,7 @@ def function_of_file(command: str, text: str, default: str, values: dict[str, fl
 
 
 def _with_line(command: str, held: Mapping[str, Any], function: Callable[..., Any]) -> Any:
-    """The function of a user's file; an error in it names its line in that file."""
+    """Wrap a function of a user's file so that its errors name their line in that file."""
     if isclass(function):
         return function
 
@@ -242,10 +264,10 @@ def _with_line(command: str, held: Mapping[str, Any], function: Callable[..., An
 def _named(
     command: str, text: str, default: str, fits: Callable[[Any], bool]
 ) -> tuple[str, dict[str, Any]]:
-    """The name that FILE.py[:NAME] means, and all that the file holds.
+    """Return the name in FILE.py[:NAME], and all names of the file.
 
     Raises:
-        ValueError: no such file, a file that fails, no such name; it says which ones fit.
+        ValueError: no such file, an error in the file, or no such name; lists suitable names.
     """
     path, _, name = text.partition(".py")
     file, name = Path(f"{path}.py"), name.removeprefix(":") or default
@@ -260,14 +282,14 @@ def _named(
 
 
 def _meant(value: object, held: Mapping[str, Any], fits: Callable[[Any], bool]) -> bool:
-    """True if a name may be offered: objects that fit, and public functions of the file itself."""
+    """Return True for names to suggest: suitable objects, and public functions of the file."""
     if isfunction(value) or isclass(value):
         return value.__module__ == held["__name__"] and value.__name__[0] != "_"
     return fits(value)
 
 
 def _names_of(command: str, file: Path) -> dict[str, Any]:
-    """The names of a file that was run; an error in it says its line."""
+    """Run a file and return its names; an error names its line."""
     try:
         return runpy.run_path(str(file))
     except Exception as error:
@@ -275,9 +297,9 @@ def _names_of(command: str, file: Path) -> dict[str, Any]:
 
 
 def _failed(command: str, file: Path, error: Exception) -> ValueError:
-    """The error that names the line of a user's file."""
+    """Return an error that names the line of a user's file."""
     frames = reversed(traceback.extract_tb(error.__traceback__))
-    own = getattr(error, "lineno", None)  # of a syntax error
+    own = getattr(error, "lineno", None)  # for syntax errors
     line = next((f.lineno for f in frames if f.filename == str(file)), own)
     return ValueError(
         f"{command}: expected a file that runs, got {type(error).__name__} in line {line} of "
@@ -286,6 +308,6 @@ def _failed(command: str, file: Path, error: Exception) -> ValueError:
 
 
 def called_with(text: str, make: Any, values: dict[str, float]) -> Any:
-    """The result of a function with the numbers of --set."""
+    """Call a function with the numbers of --set."""
     check_names(f"--set of {text}", values, list(signature(make).parameters))
     return make(**values)

@@ -1,4 +1,4 @@
-"""Output of the commands: tables and notes for people, JSON for programs."""
+"""Output of the commands: tables and notes for readers, JSON for programs."""
 
 import json
 import math
@@ -19,19 +19,30 @@ from rich.text import Text
 from symfric.foundation.files import write_text
 
 EXACT = 12
-"""Digits of numbers that somebody may type again."""
+"""Significant digits of numbers that a user may enter again."""
+UNLIMITED = 100_000
+"""Width of tables in files and pipes [columns]: cells are never wrapped there."""
+GAP = 3
+"""Blanks between the columns of a table."""
 
 
 def number(value: float, digits: int = 6) -> str:
-    """So many significant digits; a dash for an absent bound."""
+    """Return a number rounded to significant digits; a dash if it is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def show_table(
     columns: Sequence[str], rows: Iterable[Sequence[str | float]], title: str = "", digits: int = 6
 ) -> None:
-    """Print a table on standard output; numbers, of so many digits, stand at the right."""
+    """Print a table on standard output, with numbers right-aligned and rounded to `digits`.
+
+    Cells and column titles wrap at the width of the terminal, or at COLUMNS if that is set. In
+    files and pipes, every row is one line.
+    """
     rows = [list(row) for row in rows]
+    console = Console(highlight=False)
+    if not (console.is_terminal or "COLUMNS" in os.environ):
+        console.width = UNLIMITED
     table = Table(
         title=Text(title) if title else None,
         title_justify="left",
@@ -39,17 +50,34 @@ def show_table(
         pad_edge=False,
         show_edge=False,
     )
-    for index, name in enumerate(columns):
+    texts = [[c if isinstance(c, str) else number(c, digits) for c in row] for row in rows]
+    widths = column_widths([columns, *texts], console.width)
+    for index, (name, width) in enumerate(zip(columns, widths, strict=True)):
         numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
         table.add_column(
-            Text(name),
-            justify="right" if numeric else "left",
-            no_wrap=numeric or index == 0,
-            overflow="fold",
+            Text(name), justify="right" if numeric else "left", width=width, overflow="fold"
         )
-    for row in rows:
-        table.add_row(*(Text(c if isinstance(c, str) else number(c, digits)) for c in row))
-    Console(highlight=False).print(table)
+    for row in texts:
+        table.add_row(*map(Text, row))
+    with console.capture() as drawn:
+        console.print(table)
+    typer.echo("\n".join(line.rstrip() for line in drawn.get().splitlines()))
+
+
+def column_widths(rows: Sequence[Sequence[str]], total: int) -> list[int]:
+    """Return the widths of the columns of `rows`, of the `total` width of a table if possible.
+
+    Every column is at least as wide as its longest word; columns share the remaining width.
+    """
+    cells = list(zip(*rows, strict=True))
+    widths = [max((len(w) for text in column for w in text.split()), default=0) for column in cells]
+    lacking = [max(map(len, column)) - w for column, w in zip(cells, widths, strict=True)]
+    rest = total - sum(widths) - GAP * (len(widths) - 1)
+    for k, index in enumerate(sorted(range(len(widths)), key=lambda i: lacking[i])):
+        share = min(lacking[index], max(rest, 0) // (len(widths) - k))
+        widths[index] += share
+        rest -= share
+    return widths
 
 
 def show(text: str = "") -> None:
@@ -58,7 +86,7 @@ def show(text: str = "") -> None:
 
 
 def show_doc(text: str) -> None:
-    """Print a docstring: equations as they stand, sentences wrapped anew."""
+    """Print a docstring: equations unchanged, paragraphs wrapped again."""
     paragraph: list[str] = []
     for line in [*text.splitlines(), ""]:
         kept = not line or line.startswith(" ")
@@ -73,11 +101,11 @@ def show_doc(text: str) -> None:
 
 @contextmanager
 def progress(text: str) -> Generator[Callable[[float], None]]:
-    """A bar on standard error where that is a terminal; takes the fraction done."""
+    """Show a progress bar on a terminal; yield a function that takes the fraction done."""
     if not sys.stderr.isatty():
         yield lambda fraction: None
         return
-    from rich.progress import Progress  # noqa: PLC0415  (of terminals only)
+    from rich.progress import Progress  # noqa: PLC0415  (for terminals only)
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=1.0)
@@ -89,7 +117,7 @@ def progress(text: str) -> Generator[Callable[[float], None]]:
 
 
 def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
-    """`tell` as what takes the name of the item, too."""
+    """Return `tell` as a function of an item name, which is ignored, and the fraction done."""
 
     def advance(name: str, fraction: float) -> None:
         del name
@@ -99,7 +127,7 @@ def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
 
 
 def note(text: str) -> None:
-    """Say `text` on standard error, where it disturbs no result."""
+    """Print `text` on standard error."""
     typer.echo(text, err=True)
 
 
@@ -114,15 +142,28 @@ def emit_json(content: Mapping[str, Any], destination: str | None) -> None:
         write_text(destination, text + "\n")
 
 
+def finish(
+    content: Mapping[str, Any],
+    json: str | None,
+    show: Callable[[], None],
+    *paths: str | Path | None,
+) -> None:
+    """Write JSON, call `show` unless it went to standard output, and name the files written."""
+    emit_json(content, json)
+    if json != "-":
+        show()
+    say_written(*paths, json)
+
+
 def say_written(*paths: str | Path | None) -> None:
-    """Name the files written, on standard error."""
+    """Print the names of the files written on standard error."""
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")
 
 
 def say_folder(folder: Path, paths: Sequence[Path]) -> None:
-    """Name the files written into one folder, on standard error, in lines of a terminal's width."""
+    """Print the names of the files written into a folder on standard error, in wrapped lines."""
     names = "  ".join(str(path.relative_to(folder)) for path in paths)
     note(f"wrote {len(paths)} files into {folder}:")
     note(
@@ -138,7 +179,7 @@ def say_folder(folder: Path, paths: Sequence[Path]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON can hold it: infinity and NaN become null."""
+    """Return `value` as JSON data; infinity and NaN become None."""
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -149,8 +190,8 @@ def plain(value: Any) -> Any:
 
 
 def printable(text: str) -> str:
-    """`text` from the command line as UTF-8 can hold it.
+    """Return `text` from the command line as valid UTF-8.
 
-    Where the locale is C, Python keeps bytes that it cannot read as lone surrogates.
+    In the C locale, Python keeps undecodable bytes as lone surrogates.
     """
     return os.fsencode(text).decode("utf-8", errors="replace")

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from symfric import Law, SolveError, Trajectory, parameters, simulate
+from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import (
     LawOfOption,
@@ -20,18 +21,7 @@ from symfric.cli.machines import (
     kind_of,
     scenes_with,
 )
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    RtolOption,
-    SetOption,
-    StartOption,
-    assignments,
-    check_outputs,
-    law_names,
-    option,
-    seconds,
-)
+from symfric.cli.options import option
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
@@ -42,61 +32,46 @@ from symfric.scenes import MECHANISMS, Scene
 def run(
     scene: SceneArgument,
     law: LawsOption,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    inputs: Annotated[
-        list[str] | None,
-        option(
-            "--input NAME=VALUE",
-            "Input: a number, or FILE.csv:COLUMN over its column t, both in SI "
-            "or with their units in the header, as t [ms]; others stay as `symfric scenes SCENE` "
-            "shows.",
-        ),
-    ] = None,
-    x0: StartOption = None,
-    t_end: Annotated[
-        float | None,
-        option(
-            "--t-end SECONDS", "Last time [s]; default the last sample, or what shows the scene."
-        ),
-    ] = None,
-    rtol: RtolOption = 1e-6,
+    inputs: opt.InputOption = None,
+    x0: opt.StartOption = None,
+    t_end: opt.EndOption = None,
+    rtol: opt.RtolOption = 1e-6,
     method: Annotated[
-        str, option("--method NAME", "Formula: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
+        str, option("--method NAME", "Method: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
     ] = "auto",
     backend: Annotated[
-        str, option("--backend auto|vm|compiled", "What computes: compiled C, or CasADi.")
+        str, option("--backend auto|vm|compiled", "Compiled C, or CasADi's virtual machine.")
     ] = "auto",
     peer: Annotated[
         str | None,
-        option(
-            "--peer sundials|rosenbrock|ggl", "One of CasADi's integrators instead, for comparison."
-        ),
+        option("--peer sundials|rosenbrock|ggl", "Use an integrator of CasADi, for comparison."),
     ] = None,
     max_step: Annotated[
-        float | None, option("--max-step SECONDS", "Longest step; any by default.")
+        float | None, option("--max-step SECONDS", "Longest step [s]; default: no limit.")
     ] = None,
     times: Annotated[
-        str | None, option("--times T1,T2,...", "Times [s] at which a step has to end.")
+        str | None, option("--times T1,T2,...", "Times [s] at which a step must end.")
     ] = None,
-    samples: Annotated[int, option("--samples N", "Equally spaced times of the result.")] = 2001,
+    samples: Annotated[int, option("--samples N", "Number of equally spaced output times.")] = 2001,
     csv: Annotated[Path | None, option("--csv --out FILE.csv", "Write the signals.")] = None,
-    plot: PlotOption = None,
+    plot: opt.PlotOption = None,
     panels: Annotated[
         str,
-        option("--panels main|all", "Of --plot; main are positions, friction, energy or power."),
+        option("--panels main|all", "Panels of --plot; main: positions, friction, energy, power."),
     ] = "main",
     movie: Annotated[
-        Path | None, option("--animate FILE.gif", "Film the machine: .gif, .html, .mp4.")
+        Path | None, option("--animate FILE.gif", "Write an animation: .gif, .html, .mp4.")
     ] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """Simulate SCENE with a friction law.
 
-    --set takes parameters of the scene and of the law. In a robot, the law breaks away at the
-    friction tag of each joint (--set level=0.5 for joints without one): its coefficients are
-    relative to the largest.
+    --set accepts parameters of the scene and of the law. For a robot, the coefficients of the law
+    are relative: its break-away friction is the friction tag of each joint (--set level=0.5 for
+    joints without a tag).
 
     Example: symfric run rabinowicz --law lugre --set mu_s=0.2 --plot stick_slip.png
 
@@ -105,20 +80,20 @@ def run(
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --csv arm.csv
     """
     kind_of(scene, preset=preset, law_of=law_of)
-    how: Any = {"max_step": max_step, "times": seconds("--times", times)}
+    how: Any = {"max_step": max_step, "times": opt.seconds("--times", times)}
     if peer is not None and (method, backend, max_step, times) != ("auto", "auto", None, None):
         raise ValueError(
-            "--peer: expected no --method, --backend, --max-step and --times, which are of symfric"
+            "--peer: expected no --method, --backend, --max-step or --times, got one of them"
         )
-    laws = law_names(law)
+    laws = opt.law_names(law)
     if len(laws) > 1 and (csv or json or movie):
         raise ValueError(
             f"--csv, --json and --animate: expected one --law, got {len(laws)}; compare several "
             "with --plot"
         )
-    check_outputs(csv, json, movie, picture=plot)
+    opt.check_outputs(csv, json, movie, picture=plot)
     checks.choice("--panels", panels, ("main", "all"))
-    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
+    machines = scenes_with(scene, laws, opt.assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     check_movie(movie, scene, models[laws[0]])
     machine = next(iter(machines.values()))
@@ -144,7 +119,7 @@ def run(
         with output.progress(f"{movie}") as tell:
             next(iter(found.values())).animate(movie, progress=tell)
     for name, trajectory in found.items():
-        output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": given.told}, json)
+        output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": given.texts}, json)
         if json != "-":
             show_trajectory(name, trajectory)
             show_warnings(name, machines[name])
@@ -153,10 +128,10 @@ def run(
 
 
 def refuse_failed(found: Mapping[str, Trajectory]) -> None:
-    """Raise for the first run that did not reach its end.
+    """Raise an error for the first run that did not reach its end.
 
     Raises:
-        SolveError: with its message and what there is of the run.
+        SolveError: message and partial result of that run.
     """
     for run in found.values():
         if not run.status.ok:
@@ -164,16 +139,16 @@ def refuse_failed(found: Mapping[str, Trajectory]) -> None:
 
 
 def check_movie(path: Path | None, scene: str, model: Model) -> None:
-    """Refuse a film that cannot be made, before any work is spent on it.
+    """Check before the work starts that an animation can be written.
 
     Raises:
-        ValueError: a scene that is not drawn, or a kind of file that is not written.
+        ValueError: a scene without geometry, or an unknown file format.
     """
     if path is None:
         return
     if model.sketch is None:
         raise ValueError(
-            f"--animate: expected a scene with places, such as {', '.join(MECHANISMS)}, got "
+            f"--animate: expected a scene with geometry, such as {', '.join(MECHANISMS)}, got "
             f"{scene}; --plot shows its signals"
         )
     from symfric.results.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
@@ -182,7 +157,7 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
 
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
-    """Content of `--json`."""
+    """Return the content of `--json`."""
     books: dict[str, Any] = {}
     if is_mechanism(trajectory.model):
         books["energy_balance"] = trajectory.energy_balance().to_dict()
@@ -201,12 +176,12 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
 
 
 def largest_norms(trajectory: Trajectory) -> dict[str, float]:
-    """The largest violation of the constraints on each level."""
+    """Return the largest violation of the constraints on each level."""
     return {name: float(trajectory[name].max()) for name in norms(trajectory.model)}
 
 
 def show_warnings(law: str, scene: Scene) -> None:
-    """Print what the numbers of the scene's laws give away; `laws` tells it of their defaults."""
+    """Print warnings about changed parameters of the laws; `symfric laws` warns of defaults."""
     held = (getattr(scene, item.name) for item in fields(scene))
     for value in held:
         chosen = isinstance(value, Law) and any(
@@ -217,13 +192,13 @@ def show_warnings(law: str, scene: Scene) -> None:
 
 
 TABLE = ("position", "rate", "normal force", "friction", "energy")
-"""Kinds of signals of a mechanism that the table shows; --csv and --json have all."""
+"""Types of signals that the table of a mechanism shows; --csv and --json contain all."""
 
 
 def show_trajectory(law: str, trajectory: Trajectory) -> None:
-    """Print the range of every signal, how the simulation ended and what it cost.
+    """Print the range of every signal, the status and the cost of a simulation.
 
-    Of mechanisms the table has what matters, and the books of constraints and energy follow.
+    For mechanisms the table is limited to the main signals, followed by constraints and energy.
     """
     s, names = trajectory.statistics, list(trajectory.units)
     mechanism = is_mechanism(trajectory.model)
@@ -242,7 +217,7 @@ def show_trajectory(law: str, trajectory: Trajectory) -> None:
         show_books(trajectory)
     ended = trajectory.message
     if not trajectory.status.ok:
-        ended = f"{trajectory.status.name}: the last line says why."
+        ended = f"{trajectory.status.name}: see the last line for the reason."
     output.show(
         f"{ended}\n{s.method} ({s.backend}): {s.steps} steps, "
         f"{s.rejections} rejected, built in {s.build_time + s.compile_time:.2f} s, "
@@ -251,65 +226,59 @@ def show_trajectory(law: str, trajectory: Trajectory) -> None:
 
 
 def show_books(trajectory: Trajectory) -> None:
-    """Print how well the constraints hold, and where the energy went."""
+    """Print the largest constraint violations and the energy balance."""
     levels = largest_norms(trajectory)
     if levels:
         text = ", ".join(
             f"{name.removeprefix('constraint_')} {x:.1e} {trajectory.units[name]}".rstrip()
             for name, x in levels.items()
         )
-        output.show(f"Constraints hold to: {text}")
+        output.show(f"Largest constraint violations: {text}")
     balance = trajectory.energy_balance()
     work = "".join(f", {name} {w[-1]:+.6g} J" for name, w in balance.work.items() if w.any())
     output.show(
         f"Energy: {balance.energy[0]:.6g} -> {balance.energy[-1]:.6g} J{work}; "
         f"unexplained at most {np.abs(balance.defect).max():.1e} J "
-        f"({balance.relative:.1e} of what moved)"
+        f"({balance.relative:.1e} of the energy exchanged)"
     )
 
 
 def report(
     scene: SceneArgument,
     law: LawsOption,
-    html: Annotated[Path, option("--html --out FILE.html", "Write one page of it all.")] = Path(
+    html: Annotated[Path, option("--html --out FILE.html", "HTML page to write.")] = Path(
         "report.html"
     ),
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    inputs: Annotated[list[str] | None, option("--input NAME=VALUE", "Input, as of `run`.")] = None,
-    x0: StartOption = None,
-    t_end: Annotated[
-        float | None, option("--t-end SECONDS", "Last time [s]; default as of `run`.")
-    ] = None,
-    rtol: RtolOption = 1e-6,
+    inputs: opt.InputOption = None,
+    x0: opt.StartOption = None,
+    t_end: opt.EndOption = None,
+    rtol: opt.RtolOption = 1e-6,
 ) -> None:
-    """Simulate SCENE and write one page: signals, friction, error, laws.
+    """Simulate SCENE and write a report of signals, friction, errors and laws.
 
-    The error of every run is measured by another formula at a hundredth of the tolerance. The page
-    needs nothing from elsewhere; it holds the laws with their limits and how to run it again.
+    The error of every run is measured with another method at a hundredth of the tolerance. The HTML
+    page is self-contained and includes the laws with their limits and the command.
 
     Example: symfric report rabinowicz --law lugre --law brown_mcphee --html report.html
     """
     from symfric.results.report import report as write_report  # noqa: PLC0415  (not for `run`)
 
-    check_outputs(html)
-    laws = law_names(law)
-    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
+    opt.check_outputs(html)
+    laws = opt.law_names(law)
+    machines = scenes_with(scene, laws, opt.assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
     given = driven(machine, models[laws[0]], inputs, x0, t_end)
-    how: Any = {
-        "x0": given.start,
-        "u": given.signals,
-        "rtol": rtol,
-        "samples": 2001,
-        "throw": False,
-    }
+    how: Any = {"x0": given.start, "u": given.signals, "rtol": rtol, "samples": 2001}
     found: dict[str, Trajectory] = {}
     for name, model in models.items():
         with output.progress(f"{scene} with {name}") as tell:
-            found[name] = simulate(model, given.until, **how, measure_error=True, progress=tell)
+            found[name] = simulate(
+                model, given.until, **how, throw=False, measure_error=True, progress=tell
+            )
     write_report(
         found,
         html,

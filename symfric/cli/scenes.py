@@ -1,29 +1,23 @@
-"""`symfric scenes`: what machines there are, and what one of them takes and tells."""
+"""`symfric scenes`: list the scenes, or show one in full."""
 
 from dataclasses import fields
+from functools import partial
 from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any
 
 from symfric import Law, SolveError, Trajectory, Viscous, parameters, simulate
 from symfric.cli import completions, output
+from symfric.cli import options as opt
 from symfric.cli.machines import LawOfOption, PresetOption, driven, scenes_with
-from symfric.cli.options import (
-    JsonOption,
-    PlotOption,
-    SetOption,
-    argument,
-    assignments,
-    check_outputs,
-    option,
-)
+from symfric.cli.options import argument, option
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Parameter, Variable, options
 from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Scene
 
 LAW = "brown_mcphee"
-"""The law where none is given: it runs in every scene."""
+"""Default law, which runs in every scene."""
 
 
 def scenes(
@@ -39,50 +33,42 @@ def scenes(
         str | None,
         option(
             "--law NAME",
-            f"Show the parameters and states of this law, too; pictures are of {LAW}.",
+            f"Include parameters and states of this law; default for pictures: {LAW}.",
             completions.laws,
         ),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    plot: PlotOption = None,
-    json: JsonOption = None,
+    plot: opt.PlotOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
     """List the scenes, or show one in full.
 
-    In full: equations, limits, source, inputs with what drives them when nobody says, parameters
-    with units and bounds, results, places that take a law of their own, presets of papers, and a
-    picture of a run.
+    In full: equations, limits, source, inputs with defaults, parameters with units and bounds,
+    results, places that accept a law of their own, presets of papers, and a picture of a run.
 
     Example: symfric scenes drive
 
     Example: symfric scenes pendulum_box --law lugre --preset jing_mi_table_7 --plot box.png
     """
-    check_outputs(json, picture=plot)
+    opt.check_outputs(json, picture=plot)
     if name is None:
         check_alone(law, settings, preset, law_of, plot)
         every = {scene: kind(Viscous()) for scene, kind in ALL_SCENES.items()}
         rows = [summary(scene, machine) for scene, machine in every.items()]
-        output.emit_json({"scenes": rows}, json)
-        if json != "-":
-            show_list(rows)
-        output.say_written(json)
-        return
+        return output.finish({"scenes": rows}, json, partial(show_list, rows))
     text = LAW if law is None else law
-    machine = scenes_with(name, [text], assignments("--set", settings), preset, law_of)[text]
+    machine = scenes_with(name, [text], opt.assignments("--set", settings), preset, law_of)[text]
     model = machine.model()
     found = to_dict(name, machine, model, text if law else None)
-    output.emit_json(found, json)
-    if json != "-":
-        show_scene(found)
     if plot:
         draw(name, text, machine, model, plot)
-    output.say_written(plot, json)
+    return output.finish(found, json, partial(show_scene, found), plot)
 
 
 def check_alone(*given: object) -> None:
-    """Refuse options that are about one scene where none is named."""
+    """Refuse options for a single scene if no scene is named."""
     if any(given):
         raise ValueError(
             "--law, --set, --preset, --law-of, --plot: expected the name of a scene before them, "
@@ -91,7 +77,7 @@ def check_alone(*given: object) -> None:
 
 
 def draw(name: str, law: str, machine: Scene, model: Model, path: Path) -> None:
-    """A picture of a run with the inputs and the time that show the scene."""
+    """Draw a run with the default inputs and end time of the scene."""
     from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
     given = driven(machine, model, None, None, None)
@@ -105,7 +91,7 @@ def draw(name: str, law: str, machine: Scene, model: Model, path: Path) -> None:
 
 
 def summary(name: str, machine: Scene) -> dict[str, Any]:
-    """One line about a scene."""
+    """Return the entry of a scene in the list."""
     model = machine.model()
     return {
         "name": name,
@@ -119,12 +105,12 @@ def summary(name: str, machine: Scene) -> dict[str, Any]:
 
 
 def title(machine: Scene) -> str:
-    """The first sentence of the docstring."""
+    """Return the first sentence of the docstring."""
     return " ".join((getdoc(type(machine)) or "").partition("\n\n")[0].split()).removesuffix(".")
 
 
 def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[str, Any]:
-    """Content of `--json` for one scene; parameters and states of laws only with a law."""
+    """Return the content of `--json`; parameters and states of laws only if `law` is given."""
     whole = type(machine)(Viscous(), **_without_laws(machine)).model() if law is None else model
     own = {item.name for item in fields(machine)}
     known = {n: p for n, p in parameters(machine).items() if law is not None or n in own}
@@ -153,7 +139,7 @@ def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[st
 
 
 def _without_laws(machine: Scene) -> dict[str, Any]:
-    """The fields of the scene besides its laws."""
+    """Return the fields of the scene except its laws."""
     return {
         item.name: value
         for item in fields(machine)
@@ -167,18 +153,12 @@ def _variable(v: Variable) -> dict[str, Any]:
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
-    return {
-        "name": p.name,
-        "value": float(p.value),
-        "unit": p.unit,
-        "lower": p.lower,
-        "upper": p.upper,
-        "doc": p.doc,
-    }
+    found = {n: getattr(p, n) for n in ("name", "unit", "lower", "upper", "doc")}
+    return found | {"value": float(p.value)}
 
 
 def _forms(machine: Scene) -> dict[str, dict[str, str]]:
-    """Names that `--set` takes besides numbers, of the scene itself."""
+    """Return the names of the scene that `--set` accepts besides parameters."""
     named = {
         o.name: {"value": o.value, "choices": ", ".join(o.choices), "doc": o.doc}
         for o in options(machine).values()
@@ -195,9 +175,9 @@ def _forms(machine: Scene) -> dict[str, dict[str, str]]:
 
 
 def show_list(rows: list[dict[str, Any]]) -> None:
-    """All scenes, one a line."""
+    """Print all scenes, one per line."""
     output.show_table(
-        ["scene", "x", "u", "F", "t_end", "what it is"],
+        ["scene", "x", "u", "F", "t_end", "description"],
         [
             (r["name"], r["states"], len(r["inputs"]), len(r["contacts"]), r["t_end"], r["title"])
             for r in rows
@@ -205,18 +185,18 @@ def show_list(rows: list[dict[str, Any]]) -> None:
     )
     papers = [f"  {r['name']}: {', '.join(r['presets'])}" for r in rows if r["presets"]]
     output.show(
-        "\nx: states without those of a law; u: inputs; F: contacts with friction; t_end: time [s] "
-        "that shows the scene.\n"
-        "--preset, numbers of papers:\n" + "\n".join(papers) + "\n"
+        "\nx: states without those of the law; u: inputs; F: contacts with friction; t_end: "
+        "default end time [s].\n"
+        "--preset, parameters of papers:\n" + "\n".join(papers) + "\n"
         "symfric scenes NAME shows equations, parameters, inputs and more;\n"
-        "symfric run NAME --law LAW simulates it. Further machines: a robot's FILE.urdf."
+        "symfric run NAME --law LAW simulates it. Other machines: FILE.urdf of a robot."
     )
 
 
 def show_scene(found: dict[str, Any]) -> None:
-    """Docstring and tables of one scene."""
+    """Print docstring and tables of one scene."""
     output.show_doc(found["doc"])
-    output.show(f"{found['name']} is shown over {found['t_end']:g} s.")
+    output.show(f"Default end time: {found['t_end']:g} s.")
     if found["python"]:
         output.show(f"In Python: from symfric.scenes import {found['python']}")
     output.show()
@@ -263,7 +243,7 @@ def _number(value: float | None) -> str:
 
 
 def _table(columns: list[str], rows: list[Any], digits: int = 6) -> None:
-    """A table and an empty line; nothing where there are no rows."""
+    """Print a table and an empty line; nothing if there are no rows."""
     if rows:
         output.show_table(columns, rows, digits=digits)
         output.show()

@@ -1,4 +1,4 @@
-"""`symfric select`: rank friction laws on a machine, and say which to take."""
+"""`symfric select`: rank friction laws on a machine and recommend one."""
 
 import signal
 import sys
@@ -19,24 +19,10 @@ from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
 from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
+from symfric.cli import options as opt
 from symfric.cli.identify import Reading, reading, residuals_of
 from symfric.cli.machines import LawOfOption, PresetOption, formed, kind_of
-from symfric.cli.options import (
-    HtmlOption,
-    JsonOption,
-    MissingOption,
-    PlotOption,
-    ResampleOption,
-    SetOption,
-    WorkersOption,
-    argument,
-    assignments,
-    check_outputs,
-    function_of_file,
-    law_names,
-    option,
-    with_settings,
-)
+from symfric.cli.options import argument, option
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
@@ -54,7 +40,7 @@ def select(
         ),
     ],
     need: Annotated[
-        str, option("--need WORD,...", f"Of {', '.join(NEEDS)}.", completions.needs)
+        str, option("--need WORD,...", f"Required: {', '.join(NEEDS)}.", completions.needs)
     ] = "stiction,stribeck",
     accuracy: Annotated[
         float, option("--accuracy NUMBER", "Largest error relative to the motion.")
@@ -67,72 +53,68 @@ def select(
             completions.each_law,
         ),
     ] = None,
-    settings: SetOption = None,
+    settings: opt.SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    t_end: Annotated[float | None, option("--t-end SECONDS", "Last time [s].")] = None,
+    t_end: opt.EndOption = None,
     of: Annotated[
-        str | None, option("--of SIGNAL,...", "What is compared; default positions.")
+        str | None, option("--of SIGNAL,...", "Signals to compare; default: positions.")
     ] = None,
     control: Annotated[float, option("--control NUMBER", "Largest error of fixed steps.")] = 0.05,
     fixed_steps: Annotated[
-        bool, option("--fixed-steps/--no-fixed-steps", "Measure them, too.")
+        bool, option("--fixed-steps/--no-fixed-steps", "Measure fixed steps, too.")
     ] = True,
     effort: Annotated[
-        float, option("--effort NUMBER", "What a law may cost, in times of the usual.")
+        float, option("--effort NUMBER", "Largest cost of a law, relative to the default.")
     ] = 1.0,
-    workers: WorkersOption = None,
+    workers: opt.WorkersOption = None,
     data: Annotated[
-        list[str] | None, option("--data FILE", "Fit the candidates to it first.")
+        list[str] | None, option("--data FILE", "Fit the candidates to these data first.")
     ] = None,
-    kind: Annotated[str, option("--kind NAME", "How, as of `symfric identify`.")] = "inverse",
-    columns: Annotated[
-        list[str] | None, option("--column SIGNAL=NAME", "Column of a signal in the data.")
-    ] = None,
-    units: Annotated[
-        list[str] | None, option("--unit SIGNAL=UNIT", "Unit of a column in the data.")
-    ] = None,
-    missing: MissingOption = "refuse",
-    resample: ResampleOption = False,
-    normal_force: Annotated[
-        float, option("--normal-force NUMBER", "Normal force [N] of the data.")
-    ] = 1.0,
+    kind: Annotated[
+        str, option("--kind NAME", "Residuals of --data, see `symfric identify`.")
+    ] = "inverse",
+    columns: opt.ColumnOption = None,
+    units: opt.UnitOption = None,
+    missing: opt.MissingOption = "refuse",
+    resample: opt.ResampleOption = False,
+    normal_force: opt.NormalForceOption = 1.0,
     paper: Annotated[
-        bool, option("--paper", "Jing and Mi's tables beside ours; two scenes have them.")
+        bool, option("--paper", "Compare with the tables of Jing and Mi; two scenes only.")
     ] = False,
-    plot: PlotOption = None,
-    html: HtmlOption = None,
+    plot: opt.PlotOption = None,
+    html: opt.HtmlOption = None,
     csv: Annotated[Path | None, option("--csv FILE.csv", "Write the table.")] = None,
-    json: JsonOption = None,
+    json: opt.JsonOption = None,
 ) -> None:
-    """Rank friction laws on a machine, and say which to take.
+    """Rank friction laws on a machine and recommend one.
 
-    With --data, candidates that show what is needed are fitted first, and those are ranked that fit
-    as well as the best. Without, every law describes the same friction (--set mu_s=0.2
-    --set mu_d=0.15, and v_s where the fall is known) and is made as soft as --accuracy allows.
-    --set takes what the scene has, too, and --set lugre.sigma_1=2 is for one law. A law that has an
-    exact form with events is tried in that first, unless --set gms.form=smooth (or form=smooth, of
-    all) says in which. Ctrl-C keeps what is there.
+    With --data, candidates with the required phenomena are fitted first, and those are ranked that
+    fit as well as the best. Without data, every law describes the same friction (--set mu_s=0.2
+    --set mu_d=0.15, and v_s if known) and is smoothed as far as --accuracy allows. --set also
+    accepts parameters of the scene, and --set lugre.sigma_1=2 sets a parameter of one law. If a law
+    has an exact form with events, this form is tried first unless --set gms.form=smooth (or
+    form=smooth, for all laws) chooses one. Ctrl-C returns the results so far.
 
     Example: symfric select rabinowicz --need stiction,stribeck --accuracy 1e-4 --html choice.html
 
     Example: symfric select my_machine.py:press --t-end 2 --need presliding
     """
-    check_outputs(html, csv, json, picture=plot)
+    opt.check_outputs(html, csv, json, picture=plot)
     if paper:
         _paper(scene, json, any((law, settings, preset, law_of, plot, html, csv)))
         return
     words = needed("--need", [word for word in need.split(",") if word])
-    machine, friction, candidates, formed_by_hand = _asked(scene, settings, preset, law_of, law)
+    machine, friction, candidates, formed_by_user = _resolved(scene, settings, preset, law_of, law)
     misfits = None
     if data:
         read = reading(columns, units, None, None, kind == "points", missing, resample)
         able = {n: c for n, c in candidates.items() if not lacking(words, phenomena(c))}
         candidates, misfits = fitted(able, read, data, kind, normal_force)
-    with told(f"select {scene}") as tell, stoppable():
+    with reported(f"select {scene}") as tell, stoppable():
         found = select_law(
             machine,
-            {n: (c,) if n in formed_by_hand else forms(c) for n, c in candidates.items()},
+            {n: (c,) if n in formed_by_user else forms(c) for n, c in candidates.items()},
             needs=words,
             accuracy=accuracy,
             friction=friction,
@@ -145,16 +127,10 @@ def select(
             workers=cpu_count() or 1 if workers is None else workers,
             progress=tell,
         )
-    output.emit_json(found.to_dict(), json)
-    if json != "-":
-        show_choice(found)
-    if csv:
-        found.to_csv(csv)
-    if plot:
-        found.plot(plot)
-    if html:
-        found.to_html(html)
-    output.say_written(plot, html, csv, json)
+    for path, write in ((csv, found.to_csv), (plot, found.plot), (html, found.to_html)):
+        if path:
+            write(path)
+    output.finish(found.to_dict(), json, lambda: show_choice(found), plot, html, csv)
     if found.interrupted:
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)
     if found.best is None:
@@ -163,7 +139,7 @@ def select(
 
 @contextmanager
 def stoppable() -> Generator[None]:
-    """Take what ends a batch job (SIGTERM, as of `timeout`) as Ctrl-C: what is there is kept."""
+    """Treat SIGTERM, as sent by `timeout`, as Ctrl-C, which returns the results so far."""
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
@@ -176,12 +152,12 @@ def stoppable() -> Generator[None]:
 
 
 OFTEN = 10.0
-"""Seconds between two lines about progress where there is no terminal."""
+"""Seconds between progress lines if standard error is not a terminal."""
 
 
 @contextmanager
-def told(text: str) -> Generator[Callable[[str, float], None]]:
-    """Progress: a bar on a terminal, else a line on standard error now and then."""
+def reported(text: str) -> Generator[Callable[[str, float], None]]:
+    """Report progress by a bar on a terminal, else by lines on standard error."""
     last = began = perf_counter()
     with output.progress(text) as tell:
 
@@ -198,47 +174,47 @@ def told(text: str) -> Generator[Callable[[str, float], None]]:
 OF_FRICTION = ("mu_s", "mu_d", "v_s")
 
 
-def _asked(
+def _resolved(
     scene: str,
     settings: list[str] | None,
     preset: str | None,
     law_of: list[str] | None,
     names: list[str] | None,
 ) -> tuple[Any, Friction | None, dict[str, Law], set[str]]:
-    """The machine, the friction, the candidates with what --set says, and whose form it says.
+    """Return machine, friction, candidates with --set applied, and names with a form in --set.
 
     Raises:
-        ValueError: unknown names; numbers and forms that nothing here has.
+        ValueError: unknown names, parameters or forms.
     """
-    given = assignments("--set", settings)
+    given = opt.assignments("--set", settings)
     friction = _numbers({n: given.pop(n) for n in OF_FRICTION if n in given})
-    texts = law_names(names) if names else list(ALL_LAWS)
+    texts = opt.law_names(names) if names else list(ALL_LAWS)
     laws = {text: law_from_text(text) for text in texts}
-    said = _formed(laws, given)
+    chosen = _formed(laws, given)
     for key in [key for key in given if "." in key]:
         of, _, own = key.rpartition(".")
         check_names(f"--set {key}", [of], laws)
         if own in options(laws[of]):
-            said.add(of)
-        laws[of] = with_settings(laws[of], of, [f"{own}={given.pop(key)}"])
+            chosen.add(of)
+        laws[of] = opt.with_settings(laws[of], of, [f"{own}={given.pop(key)}"])
     if ".py" in scene:
-        machine: Any = function_of_file("select", scene, "machine", _numbers(given))
+        machine: Any = opt.function_of_file("select", scene, "machine", _numbers(given))
     else:
         machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     levels = Friction(**friction) if friction else None
-    return machine, levels, laws, said
+    return machine, levels, laws, chosen
 
 
 def _formed(laws: dict[str, Law], given: dict[str, str]) -> set[str]:
-    """Take what is called as an option of laws out of `given`; give it to all that have it.
+    """Remove options of laws from `given` and set them in all laws that have them.
 
     Returns:
-        The names of these laws.
+        Names of these laws.
 
     Raises:
-        ValueError: a text that no law has for a form; it says which there are.
+        ValueError: an option value that no law has.
     """
-    said: set[str] = set()
+    chosen: set[str] = set()
     every = [(n, o) for n, law in laws.items() for o in options(law).values()]
     for name in [name for name in given if any(o.name == name for _, o in every)]:
         own = [(law, o) for law, o in every if o.name == name]
@@ -249,12 +225,12 @@ def _formed(laws: dict[str, Law], given: dict[str, str]) -> set[str]:
         for law, o in own:
             if text in o.choices:
                 laws[law] = replace(laws[law], **{name: text})
-                said.add(law)
-    return said
+                chosen.add(law)
+    return chosen
 
 
 def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> Any:
-    """The scene with the texts of --set that are its own: numbers, forms, what it is made of."""
+    """Return the scene with its own settings of --set: parameters, forms, structure."""
     if not texts:
         return kind
     one = kind(law_from_text("coulomb"))
@@ -279,12 +255,12 @@ def _numbers(texts: dict[str, str]) -> dict[str, float]:
 def fitted(
     laws: dict[str, Law], read: Reading, files: list[str], kind: str, normal_force: float
 ) -> tuple[dict[str, Law], dict[str, float]]:
-    """The laws with the numbers that fit the data, and their errors from these.
+    """Return the fitted laws and their relative errors.
 
-    Laws that cannot be fitted are named on standard error.
+    Laws that cannot be fitted are reported on standard error.
 
     Raises:
-        ValueError: none can be fitted.
+        ValueError: no law can be fitted.
     """
     from identification.select import select as rank_fits  # noqa: PLC0415  (only with data)
 
@@ -300,29 +276,25 @@ def fitted(
         if row.law not in found:
             output.note(f"{row.law}: {row.sentence}")
     if not found:
-        raise ValueError("--data: expected data that a law can be fitted to, got none; see above")
+        raise ValueError("--data: expected data that some law fits, got none; see above")
     held = {name: row.fit.law for name, row in found.items() if row.fit and row.fit.law}
     return held, {name: row.fitted / 100 for name, row in found.items()}
 
 
 def _paper(scene: str, json: str | None, others: bool) -> None:
-    """Print the paper's tables and ours.
+    """Print the tables of the paper and those of symfric.
 
     Raises:
-        ValueError: a scene that is not in the paper, options that change it.
+        ValueError: a scene that is not in the paper, or other options.
     """
-    from symfric.gallery.selection.tables import TABLES, compare_with_paper  # noqa: PLC0415  (only here)
+    from symfric.gallery.selection.tables import TABLES, compare_with_paper  # noqa: PLC0415  (for --paper only)
 
     check_names("--paper of", [scene], TABLES)
     if others:
-        raise ValueError("--paper: expected no option but --json beside it, got others")
+        raise ValueError("--paper: expected no option but --json, got others")
     with output.progress(f"select {scene} --paper") as tell:
         found = compare_with_paper(scene, progress=lambda _, share: tell(share))
-    output.emit_json(found.to_dict(), json)
-    if json != "-":
-        for line in found.lines():
-            typer.echo(line)
-    output.say_written(json)
+    output.finish(found.to_dict(), json, lambda: typer.echo("\n".join(found.lines())))
 
 
 def show_choice(found: Choice) -> None:

@@ -1,1 +1,1 @@
-"""What everything stands on: numbers, parameters, files, how a solve ended, empty panels."""
+"""Base package: numbers, parameters, units, files, solver status, empty figures."""

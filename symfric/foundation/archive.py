@@ -1,4 +1,6 @@
-"""Archives of arrays (NPZ) from anywhere: sizes are checked before memory is taken."""
+"""Read archives of arrays (NPZ) from untrusted files: sizes are checked before memory is
+allocated.
+"""
 
 from io import BytesIO
 from math import prod
@@ -10,20 +12,21 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 KINDS = "biufU"
-"""Kinds of numbers and texts that an array may hold; objects, which are pickles, are refused."""
+"""NumPy kinds of numbers and texts that an array may hold; objects, which are pickles, are
+refused."""
 
 
 def read(file: IO[bytes]) -> dict[str, NDArray[Any]]:
     """Read the arrays of an archive that `numpy.savez` wrote, by their names.
 
-    The arrays together take no more memory than the file: compressed members, members that overlap
-    and headers that announce more than follows are refused.
+    The arrays together take no more memory than the file: compressed members, overlapping members
+    and headers that announce more data than follow are refused.
 
     Args:
         file: open for reading.
 
     Raises:
-        ValueError: such a member, one that is not an array of numbers or texts, or no archive.
+        ValueError: such a member, one that is not an array of numbers or texts, or not an archive.
     """
     try:
         size = file.seek(0, 2)
@@ -34,12 +37,12 @@ def read(file: IO[bytes]) -> dict[str, NDArray[Any]]:
             if any(member.compress_type != ZIP_STORED for member in members):
                 raise ValueError("expected members that are not compressed")
             return {m.filename.removesuffix(".npy"): _array(archive.read(m), size) for m in members}
-    except Exception as error:  # zipfile and NumPy raise almost anything on damaged bytes
+    except Exception as error:  # zipfile and NumPy raise various errors on damaged bytes
         raise ValueError(f"expected an archive of arrays, got another file: {error}") from error
 
 
 def _array(content: bytes, most: int) -> NDArray[Any]:
-    """Return the array in a member; `most` bounds its dimensions where it is empty."""
+    """Return the array in a member; `most` bounds its dimensions if it is empty."""
     stream = BytesIO(content)
     if npy.read_magic(stream) != (1, 0):
         raise ValueError("expected format 1.0 of NumPy's arrays")

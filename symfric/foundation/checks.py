@@ -1,13 +1,13 @@
-"""What the public doors ask of their arguments, each question in one place.
+"""Argument validation for the public API.
 
-Every check takes `where` first ("simulate: rtol"), returns the value in the type the door works
-with, and refuses with one sentence:
+Every check takes `where` first ("simulate: rtol"), returns the value in the required type, and
+raises an error with one sentence:
 
     <where>: expected <what>, got <value>; <hint>
 
-Numbers are what NumPy and CasADi users hold in their hands: int, float, NumPy scalars of any real
-type, arrays without dimension, constant CasADi scalars. Truth values, texts and complex numbers
-are none.
+Numbers are the types that NumPy and CasADi users work with: int, float, NumPy scalars of any real
+type, arrays without dimension, constant CasADi scalars. Truth values, texts and complex numbers are
+not accepted.
 """
 
 import operator
@@ -33,20 +33,20 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 LONGEST = 60
-"""Characters of a value that are shown in an error."""
+"""Longest text of a value shown in an error [characters]."""
 LONGEST_LINE = 200
-"""Characters of a name."""
+"""Longest name [characters]."""
 LISTED = 16
-"""Names that are listed in an error; of more only the closest are offered."""
+"""Number of names listed in an error; if there are more, only the closest are offered."""
 
 
 def refused(where: str, what: str, value: object, hint: str = "") -> ValueError:
-    """The error that says what was expected and what came instead."""
+    """Return the error with what was expected and what was given."""
     return ValueError(f"{where}: expected {what}, got {shown(value)}" + (f"; {hint}" * bool(hint)))
 
 
 def shown(value: object) -> str:
-    """`value` in a few words, whatever it is."""
+    """Return a short description of `value`, of any type."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     if isinstance(value, np.ndarray) and value.ndim:
@@ -71,7 +71,9 @@ def shown(value: object) -> str:
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:
-    """`names` with commas; of many only the first ones, and how many more there are."""
+    """Join `names` by commas; if there are many, only the first ones and the number of the
+    others.
+    """
     every = list(names)
     if len(every) <= most:
         return ", ".join(every)
@@ -83,8 +85,8 @@ def _cut(text: str) -> str:
 
 
 def as_number(value: object) -> float | None:
-    """`value` as a float where it is a number as told above, finite or not; else None."""
-    if type(value) is float:  # by far the most: every call of a door asks a dozen times
+    """Return `value` as a float if it is a number (see above), finite or not; else None."""
+    if type(value) is float:  # the usual case: a public function makes a dozen of these checks
         return value
     if isinstance(value, bool | np.bool_):
         return None
@@ -92,7 +94,7 @@ def as_number(value: object) -> float | None:
         try:
             return float(value)
         except OverflowError:
-            return inf  # a whole number of more than 308 digits
+            return inf  # an integer of more than 308 digits
     if isinstance(value, np.ndarray):
         return float(value) if value.ndim == 0 and value.dtype.kind in "iuf" else None
     if isinstance(value, ca.DM) or (isinstance(value, ca.SX) and value.is_constant()):
@@ -110,17 +112,17 @@ def number(
     above: float | None = None,
     hint: str = "",
 ) -> float:
-    """`value` as a finite float.
+    """Return `value` as a finite float.
 
     Args:
         where: for the message.
         unit: likewise.
         lower, upper: closed bounds.
         above: open lower bound.
-        hint: what to do instead.
+        hint: advice for the message.
 
     Raises:
-        ValueError: no number, NaN, infinite, or out of bounds.
+        ValueError: not a number, NaN, infinite, or out of bounds.
     """
     found = as_number(value)
     good = found is not None and isfinite(found) and lower <= found <= upper
@@ -131,7 +133,7 @@ def number(
 
 
 def _bounded(lower: float, upper: float, above: float | None) -> str:
-    """A number within bounds, in words."""
+    """Describe a number within bounds."""
     if above is not None:
         return f"a number > {above:g}" + (f" and <= {upper:g}" if upper < inf else "")
     if lower > -inf and upper < inf:
@@ -142,7 +144,7 @@ def _bounded(lower: float, upper: float, above: float | None) -> str:
 
 
 def parsed(where: str, text: str) -> float:
-    """The finite number that a text from a command line or a file means."""
+    """Return the finite number given by a text from a command line or a file."""
     try:
         found = None if "_" in text else float(text)
     except ValueError:
@@ -155,10 +157,10 @@ def parsed(where: str, text: str) -> float:
 def count(
     where: str, value: object, *, least: int = 1, most: int | None = None, hint: str = ""
 ) -> int:
-    """`value` as an int; 1e6 is one.
+    """Return `value` as an int; 1e6 is accepted.
 
     Raises:
-        ValueError: no whole number, or out of bounds.
+        ValueError: not a whole number, or out of bounds.
     """
     found: int | None = value if type(value) is int and abs(value) < 2**63 else None
     real = as_number(value) if found is None else None
@@ -172,7 +174,7 @@ def count(
 
 
 def expression(where: str, value: object) -> Any:
-    """`value`, SX, DM, a finite number or an array of them, as it is; of a variable its symbol."""
+    """Return `value`, SX, DM, a finite number or an array of them; of a variable its symbol."""
     value = plain(value)
     if isinstance(value, ca.SX | ca.DM):
         return value
@@ -188,21 +190,21 @@ def expression(where: str, value: object) -> Any:
 
 
 def flag(where: str, value: object) -> bool:
-    """`value` as a bool: True or False, nothing that merely counts as one."""
+    """Return `value` as a bool; only True and False are accepted."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise refused(where, "True or False", value)
 
 
 def text(where: str, value: object, what: str = "a text", hint: str = "") -> str:
-    """`value` as a text that is not empty."""
+    """Return `value` as a text that is not empty."""
     if isinstance(value, str) and value.strip():
         return str(value)
     raise refused(where, what, value, hint)
 
 
 def identifier(where: str, value: object) -> str:
-    """`value` as a C identifier in ASCII letters, digits and underscores."""
+    """Return `value` as a C identifier in ASCII letters, digits and underscores."""
     name = text(where, value, "a C identifier")
     if not (name.isascii() and name.isidentifier()):
         raise refused(where, "a C identifier", value, f"write {as_identifier(name)}")
@@ -210,7 +212,7 @@ def identifier(where: str, value: object) -> str:
 
 
 def as_identifier(name: str) -> str:
-    """A C identifier like a name: my_x for "my x", phi for its Greek letter."""
+    """Return a C identifier similar to a name: my_x for "my x", phi for its Greek letter."""
     letters = (unicodedata.name(c, "").partition(" LETTER ")[2].lower() for c in name)
     plain_ones = (
         f"{'_' * (i > 0)}{letter.split()[0]}" if letter and not c.isascii() else c
@@ -221,7 +223,7 @@ def as_identifier(name: str) -> str:
 
 
 def line(where: str, value: object, what: str = "a text") -> str:
-    """`value` as one line of printable text: names and units reach headers, XML and file names."""
+    """Return `value` as one line of printable text, safe in headers, XML and file names."""
     found = text(where, value, what)
     if not found.isprintable() or len(found) > LONGEST_LINE:
         raise refused(where, f"{what} of one printable line", value)
@@ -229,7 +231,7 @@ def line(where: str, value: object, what: str = "a text") -> str:
 
 
 def choice(where: str, value: object, choices: Collection[str]) -> str:
-    """`value` as one of the texts in `choices`; the nearest one is offered."""
+    """Return `value` as one of the texts in `choices`; errors offer the nearest one."""
     if not isinstance(value, str):
         raise refused(where, _one_of(choices), value)
     if value not in choices:
@@ -238,7 +240,7 @@ def choice(where: str, value: object, choices: Collection[str]) -> str:
 
 
 def kind(where: str, value: object, wanted: type[T], such_as: str) -> T:
-    """`value`, which must be an instance of `wanted`.
+    """Return `value`, which must be an instance of `wanted`.
 
     `such_as` is an article, a noun and an example: "a model, such as rabinowicz(LuGre())".
     """
@@ -251,9 +253,9 @@ def kind(where: str, value: object, wanted: type[T], such_as: str) -> T:
 
 
 def named(where: str, value: object, known: Collection[str] | None = None) -> dict[str, Any]:
-    """`value`, a mapping from names to anything or None, as a dict; unknown names are refused.
+    """Return a mapping of names to values, or None, as a dict; unknown names raise an error.
 
-    A variable is taken for its name.
+    A variable stands for its name.
     """
     if value is None:
         return {}
@@ -272,7 +274,7 @@ def named(where: str, value: object, known: Collection[str] | None = None) -> di
 
 
 def many(where: str, value: object, what: str) -> tuple[Any, ...]:
-    """`value`, a sequence of `what`, as a tuple; a single text is not taken for its letters."""
+    """Return a sequence of `what` as a tuple; a single text is not split into letters."""
     if isinstance(value, str | bytes | ca.SX | ca.MX) or not isinstance(value, Iterable):
         name = getattr(value, "name", "")
         hint = f"write ({name},)" if isinstance(name, str) and name.isidentifier() else ""
@@ -283,7 +285,7 @@ def many(where: str, value: object, what: str) -> tuple[Any, ...]:
 def names(
     where: str, value: object, known: Collection[str] | None = None, hint: str = ""
 ) -> tuple[str, ...]:
-    """`value`, a sequence of texts, as a tuple, each known and there once."""
+    """Return a sequence of texts as a tuple, each known and given once."""
     if isinstance(value, str):
         raise refused(where, "a sequence of names", value, f"write [{value!r}]")
     given = many(where, value, "names")
@@ -301,12 +303,12 @@ def names(
 def array(
     where: str, value: object, *, ndim: int | None = 1, what: str = "", nan: bool = False
 ) -> Array:
-    """`value` as an array of finite floats; `ndim` None takes any number of dimensions.
+    """Return `value` as an array of finite floats; `ndim` None allows any number of dimensions.
 
-    `what` says in words what the numbers are; with `nan` they need not be finite.
+    `what` describes the numbers; with `nan` they need not be finite.
 
     Raises:
-        ValueError: no numbers, NaN, infinite, another number of dimensions.
+        ValueError: not numbers, NaN, infinite, another number of dimensions.
     """
     kinds = {0: "a number", 1: "a sequence of numbers", 2: "a matrix of numbers"}
     what = what or kinds.get(-1 if ndim is None else ndim, "numbers")
@@ -329,7 +331,7 @@ def array(
 
 
 def times(where: str, value: object, first: float = -inf, last: float = inf) -> Array:
-    """`value` as an array of increasing times [s] in [first, last], at least one."""
+    """Return `value` as an array of increasing times [s] in [first, last], at least one."""
     bounded = isfinite(first) or isfinite(last)
     what = "increasing times in [{:g}, {:g}] s" if bounded else "increasing times [s]"
     found = array(where, value, what=what.format(first, last))
@@ -344,7 +346,7 @@ def times(where: str, value: object, first: float = -inf, last: float = inf) -> 
 
 
 def path(where: str, value: object) -> Path:
-    """`value` as the path of a file or folder; "~" is the user's own."""
+    """Return `value` as the path of a file or folder; "~" is the user's home."""
     name = fspath(value) if isinstance(value, str | PathLike) else None
     if not isinstance(name, str) or not name or "\0" in name:
         raise refused(where, "a path, such as 'run.csv'", value)
@@ -353,16 +355,16 @@ def path(where: str, value: object) -> Path:
 
 
 def function(where: str, value: object, what: str) -> Any:
-    """`value`, which can be called."""
+    """Return `value`, which must be callable."""
     if callable(value) and not isinstance(value, type):
         return value
     raise refused(where, what, value)
 
 
 def check_names(where: str, given: Iterable[str], known: Collection[str], hint: str = "") -> None:
-    """Refuse names that are not in `known`, all in one error that offers the closest ones.
+    """Raise one error for all names that are not in `known`, offering the closest ones.
 
-    `hint` is what to do where none is close.
+    `hint` is the advice if none is close.
     """
     listed = list(given)
     if not listed:

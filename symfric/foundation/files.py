@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Atomic writing of files, and checks of output paths."""
 
 import csv
 import json
@@ -14,21 +14,21 @@ from typing import Any, cast
 from symfric.foundation import checks
 
 FULL = (ENOSPC, EDQUOT, EFBIG, EIO)
-"""Errors of a disk that takes no more."""
+"""Errors of a full disk."""
 _ASKING = Lock()
-"""To ask for the mask of the process is to change it for a moment: one thread at a time."""
+"""Lock for reading the process's file mask, which has to be changed for a moment to be read."""
 
 
 @contextmanager
 def written(path: str | Path) -> Generator[Path, None, None]:
-    """A temporary path beside `path` that takes its name when the block ends without error.
+    """Yield a temporary path in the folder of `path` that is renamed to it if the block succeeds.
 
-    The folder is made where it is missing (see `check_folder`). After an error or an interrupt the
-    old file, if any, is as it was and nothing is left behind.
+    A missing folder is created (see `check_folder`). After an error or an interrupt the old file,
+    if any, is unchanged and the temporary file is removed.
 
     Raises:
-        ValueError: the path is a folder or a device, its folder cannot be made or written, or the
-            disk is full.
+        ValueError: the path is a folder or a device, its folder cannot be created or written, or
+            the disk is full.
     """
     target = check_file(path)
     try:
@@ -60,10 +60,10 @@ def written(path: str | Path) -> Generator[Path, None, None]:
 
 
 def check_file(path: str | Path) -> Path:
-    """The file that `path` means, links followed; refuses what cannot be written.
+    """Return the output file of `path`, with links followed.
 
     Raises:
-        ValueError: no path, a folder, a device, a circle of links, or see `check_folder`.
+        ValueError: not a path, a folder, a device, circular links, or see `check_folder`.
     """
     place = checks.path("output", path)
     try:
@@ -78,17 +78,17 @@ def check_file(path: str | Path) -> Path:
 
 
 def _resolved(place: Path) -> Path:
-    """`place` with links followed; OSError for a circle of them, on which Python 3.13 is silent."""
+    """Follow links in `place`; OSError if they are circular, which Python 3.13 does not report."""
     with suppress(FileNotFoundError, NotADirectoryError):
         place.stat()
     return place.resolve()
 
 
 def check_folder(folder: str | Path) -> Path:
-    """An output folder, which may be missing.
+    """Return an output folder, which may be missing.
 
-    Missing folders are made below one that exists, but not directly below the root of the file
-    system, where a wrong first name would grow a tree of its own.
+    Missing folders are allowed below an existing one, but not directly below the root of the file
+    system, where a wrong first name would create a new tree.
 
     Raises:
         ValueError: it, or the nearest folder above it, is a file, the root or without permission.
@@ -113,10 +113,10 @@ def check_folder(folder: str | Path) -> Path:
 
 
 def make_folder(folder: str | Path) -> Path:
-    """Make an output folder where it is missing; see `check_folder`.
+    """Create an output folder if it is missing; see `check_folder`.
 
     Raises:
-        ValueError: it cannot be made.
+        ValueError: it cannot be created.
     """
     place = check_folder(folder)
     try:
@@ -131,11 +131,11 @@ def make_folder(folder: str | Path) -> Path:
 def _reason(error: OSError | RuntimeError) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
-    return "a circle of links"
+    return "circular links"
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write `text` to `path` as UTF-8, whole or not at all."""
+    """Write `text` to `path` as UTF-8, atomically."""
     with written(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -144,7 +144,7 @@ def read_json(where: str, path: str | Path, what: str) -> dict[str, Any]:
     """Read the JSON object in a file.
 
     Raises:
-        ValueError: no such file, no JSON, or no object; `what` says what was expected.
+        ValueError: no such file, not JSON, or not an object; `what` describes the expected content.
     """
     place = checks.path(where, path)
     try:
@@ -160,7 +160,7 @@ def read_json(where: str, path: str | Path, what: str) -> dict[str, Any]:
 
 
 def write_table(path: str | Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write a CSV file as UTF-8, whole or not at all; numbers keep all their digits."""
+    """Write a CSV file as UTF-8, atomically; numbers keep all their digits."""
     with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)

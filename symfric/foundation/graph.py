@@ -1,4 +1,4 @@
-"""Operations of a CasADi function as a graph in which equal parts are one node; coupled groups."""
+"""CasADi functions as graphs of operations without duplicates, and groups of coupled rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 from symfric.foundation.variable import stacked
 
 SELECT = -1
-"""Operation of a node that stands for `if_else`, which CasADi writes as a sum of two halves."""
+"""Operation code of an `if_else` node, which CasADi writes as a sum of two halves."""
 
 LEAVES = frozenset({ca.OP_INPUT, ca.OP_CONST})
 
 
 @dataclass(frozen=True)
 class Node:
-    """One operation.
+    """Operation of a graph.
 
     Attributes:
         op: CasADi's operation number, or `SELECT`.
-        args: numbers of the nodes it takes, all smaller than its own.
+        args: numbers of its argument nodes, all smaller than its own.
         entry: of an input: (argument, row).
         value: of a constant.
     """
@@ -41,11 +41,11 @@ class Graph:
 
     @property
     def operations(self) -> int:
-        """Number of operations, leaves not counted."""
+        """Number of operations, without leaves."""
         return sum(node.op not in LEAVES for node in self.nodes)
 
     def depends(self, arguments: Sequence[int]) -> list[bool]:
-        """Whether each node depends on one of the function's `arguments`."""
+        """Return for each node True if it depends on one of the function's `arguments`."""
         found: list[bool] = []
         for node in self.nodes:
             own = node.op == ca.OP_INPUT and node.entry[0] in arguments
@@ -67,7 +67,9 @@ class _Builder:
         return number
 
     def _if_else(self, a: int, b: int) -> Node | None:
-        """(c ? x : 0) + (!c ? y : 0) is c ? x : y (but for the sign of a zero)."""
+        """Return the node c ? x : y of (c ? x : 0) + (!c ? y : 0), equal but for the sign of a
+        zero.
+        """
         yes, no = self.nodes[a], self.nodes[b]
         if not yes.op == no.op == ca.OP_IF_ELSE_ZERO:
             return None
@@ -77,7 +79,7 @@ class _Builder:
 
 
 def graph(function: ca.Function) -> Graph:
-    """The graph of an SX function with dense arguments and results; nothing in it is unused.
+    """Return the graph of an SX function with dense arguments and results, without unused nodes.
 
     Raises:
         ValueError: not an SX function, free symbols, or sparse arguments or results.
@@ -118,7 +120,7 @@ def _check(function: ca.Function) -> None:
 
 
 def pruned(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
-    """The graph of these results without the nodes that nobody takes."""
+    """Return the graph of these results without unused nodes."""
     used = {i for row in results for i in row}
     for i in reversed(range(len(nodes))):
         if i in used:
@@ -132,7 +134,7 @@ def pruned(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
 
 
 def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
-    """The graph in which every user of a node takes the earlier node `instead` of it."""
+    """Return the graph with the users of each node in `instead` moved to an earlier node."""
     builder = _Builder()
     number: list[int] = []
     for i, node in enumerate(source.nodes):
@@ -147,9 +149,9 @@ def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
 def rebuild(
     source: Graph, arguments: Sequence[ca.SX], replacing: Mapping[int, ca.SX]
 ) -> list[ca.SX]:
-    """The results as columns of new expressions in `arguments`, with some nodes replaced.
+    """Return the results as columns of new expressions in `arguments`, with some nodes replaced.
 
-    This is how a part of an expression is substituted that is not a symbol.
+    This substitutes a part of an expression that is not a symbol.
     """
     found: list[ca.SX] = []
     for i, node in enumerate(source.nodes):
@@ -171,10 +173,10 @@ def rebuild(
 
 
 def coupled(pattern: NDArray[np.bool_]) -> list[tuple[list[int], list[int]]]:
-    """(columns, rows) of each group of rows that share columns.
+    """Return (columns, rows) of each group of rows that share columns.
 
     Args:
-        pattern: which column each row depends on, shape (rows, columns).
+        pattern: mask of the columns that each row depends on, shape (rows, columns).
     """
     left, found = set(range(pattern.shape[0])), list[tuple[list[int], list[int]]]()
     while left:

@@ -1,15 +1,15 @@
-"""Symbols that stay themselves: in copies, in pickles and in files.
+"""Persistent identity of symbols in copies, pickles and files.
 
-A symbol of CasADi is an atom, as a class or a name is: two of one name are two, and what is written
-with one knows only that one. CasADi itself refuses to pickle it, since another process has no such
-atom. Here a symbol that leaves the process is given a name that nobody else has, and whoever reads
-the name gets the same symbol each time: the one it came from in the process where it was made, one
-and the same in any other, whatever it came in. So a law and a model that were pickled apart still
-share their parameter, and `copy.deepcopy` leaves symbols alone.
+A CasADi symbol is an atom: two symbols of one name are different, and expressions depend on one of
+them only. CasADi refuses to pickle symbols, since another process does not have them. Here a symbol
+that leaves the process gets a unique name, and each reader of that name gets the same symbol: the
+original one in the process where it was made, a single one in any other process, whatever object it
+came in. A law and a model that were pickled separately therefore still share their parameter, and
+`copy.deepcopy` does not copy symbols.
 
-Names last as long as an object that travelled or a copy of it lives; nothing is kept for ever.
+A name lasts as long as an object with it, or a copy, exists; nothing is kept for ever.
 
-Importing this makes `pickle` take SX and MX, alone or inside of anything.
+Importing this module makes `pickle` accept SX and MX, alone or inside other objects.
 """
 
 import copyreg
@@ -24,13 +24,13 @@ import casadi as ca
 
 Expression = TypeVar("Expression", ca.SX, ca.MX)
 KEPT = "_symfric_atoms"
-"""Attribute of an expression of CasADi that keeps the names of its symbols alive."""
+"""Attribute of a CasADi expression that keeps the names of its symbols alive."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """A symbol and the name that nobody else has."""
+    """Symbol and its unique name."""
 
     symbol: Any
     name: str
@@ -42,13 +42,13 @@ _by_name: WeakValueDictionary[tuple[type, str], Atom] = WeakValueDictionary()
 
 
 def _node(symbol: Any) -> tuple[type, int]:
-    """Where the symbol lies; nothing else does as long as an `Atom` holds it."""
+    """Return the address of the symbol, unique as long as an `Atom` holds it."""
     node = symbol.element_hash() if isinstance(symbol, ca.SX) else hash(symbol)
     return type(symbol), node
 
 
 def _known(symbol: Any, name: str) -> Atom:
-    """The atom of a name: the one that is known, else `symbol`."""
+    """Return the atom of a name: the known one, else a new one of `symbol`."""
     found = _by_name.get((type(symbol), name))
     if found is None or found.symbol.name() != symbol.name():
         found = Atom(type(symbol)(symbol), name)
@@ -57,7 +57,7 @@ def _known(symbol: Any, name: str) -> Atom:
 
 
 def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
-    """The atoms in some expressions, which from now on keep their names."""
+    """Return the atoms in some expressions, which keep their names from now on."""
     atoms = list[Atom]()
     with _lock:
         for symbol in _symbols(expressions):
@@ -68,7 +68,7 @@ def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
 
 
 def atoms_of(labels: Sequence[str], names: Sequence[str]) -> list[Atom]:
-    """The SX symbols of these unique names in this process, made where there are none."""
+    """Return the SX symbols of these unique names in this process, created if missing."""
     with _lock:
         return [_known(ca.SX.sym(label), name) for label, name in zip(labels, names, strict=True)]
 
@@ -76,11 +76,11 @@ def atoms_of(labels: Sequence[str], names: Sequence[str]) -> list[Atom]:
 def again(
     expressions: Sequence[Expression], symbols: Sequence[Expression], names: Sequence[str]
 ) -> list[Expression]:
-    """Expressions that were read, in the symbols that have these names here.
+    """Return expressions that were read, in the symbols of this process with these names.
 
     Args:
-        expressions: in the `symbols` that came with them.
-        symbols: theirs.
+        expressions: in the `symbols` that were read with them.
+        symbols: of the file or pickle.
         names: of the symbols.
     """
     if not expressions:
@@ -99,20 +99,20 @@ def again(
 
 
 def _symbols(expressions: Sequence[Any]) -> Iterable[Any]:
-    """All symbols, each once, in a fixed order."""
+    """Return all symbols, each once, in a fixed order."""
     flat = [ca.vec(e) for e in expressions if not e.is_constant()]
     return ca.symvar(ca.vertcat(*flat)) if flat else ()
 
 
 def keep(expressions: Iterable[Any], atoms: Sequence[Atom]) -> None:
-    """Keep the names of `atoms` as long as one of the expressions lives."""
+    """Keep the names of `atoms` as long as one of the expressions exists."""
     kept = tuple(atoms)
     for expression in expressions:
         vars(expression)[KEPT] = kept
 
 
 def deserialized(text: str, names: Sequence[str] | None) -> Any:
-    """The expression or Function that `serialized` wrote; CasADi may run what it finds there."""
+    """Return the expression or Function that `serialized` wrote; CasADi may execute its content."""
     if names is None:
         return ca.Function.deserialize(text)
     reader: Any = ca.StringDeserializer(text)
@@ -121,7 +121,7 @@ def deserialized(text: str, names: Sequence[str] | None) -> Any:
 
 
 def serialized(value: Any) -> tuple[str, tuple[str, ...] | None]:
-    """An expression or Function in CasADi's own format, and the names of its symbols."""
+    """Return an expression or Function in CasADi's own format, and the names of its symbols."""
     if isinstance(value, ca.Function):
         return str(value.serialize()), None
     atoms = named([value])
@@ -132,7 +132,7 @@ def serialized(value: Any) -> tuple[str, tuple[str, ...] | None]:
 
 
 def _written(expression: Any) -> Any:
-    """How `pickle` writes an expression; in CasADi's own context as CasADi does."""
+    """Reduce an expression for `pickle`; inside CasADi's own pickling as CasADi does."""
     if getattr(ca.casadi, "_current_pickle_context", lambda: None)():
         return object.__reduce_ex__(expression, 2)
     return deserialized, serialized(expression)

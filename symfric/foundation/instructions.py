@@ -1,9 +1,9 @@
-"""CasADi expressions as plain lists of instructions: for files, which must not run code.
+"""CasADi expressions as plain lists of instructions, for files that must not run code.
 
 CasADi's own format holds any `Function`, and with it shell commands (`jit`), libraries (`external`)
 and callbacks. A list holds symbols, constants and the scalar operations of `OPERATIONS` only; it is
-checked as a whole before an expression is built. CasADi simplifies while it builds: an expression
-that was built with simplification on comes back operation by operation.
+checked completely before an expression is built. CasADi simplifies expressions while building them:
+one that was built with simplification on is restored operation by operation.
 """
 
 from collections.abc import Sequence
@@ -26,19 +26,19 @@ BINARY = (
     "copysign", "if_else_zero", "fmin", "fmax", "atan2", "hypot", "remainder",
 )  # fmt: skip
 OPERATIONS = (*UNARY, *BINARY)
-"""The operations of a list by their names in CasADi, without "OP_"."""
+"""Operations of a list by their names in CasADi, without "OP_"."""
 CODES: dict[str, int] = {name: getattr(ca, f"OP_{name.upper()}") for name in OPERATIONS}
 NAMES = {code: name for name, code in CODES.items()}
 MOST_ENTRIES = 10**7
 """Largest number of entries of one expression, zeros included."""
 DEEPEST = 8000
-"""Operations on the longest path; printing deeper expressions, CasADi may overflow the stack."""
+"""Longest path of operations; CasADi may overflow the stack when printing deeper expressions."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Instructions:
-    """Expressions whose scalar operations are numbered: symbols, constants, then operations.
+    """Expressions with numbered scalars: symbols, constants, then operations.
 
     Attributes:
         labels: name of each symbol.
@@ -62,7 +62,7 @@ class Instructions:
 
     @classmethod
     def of(cls, expressions: Sequence[ca.SX]) -> "Instructions":
-        """The instructions of some expressions, shared parts once.
+        """Return the instructions of some expressions, common parts once.
 
         Raises:
             ValueError: an operation that is not one of `OPERATIONS`, such as a function call.
@@ -111,7 +111,7 @@ class Instructions:
         )
 
     def expressions(self, trusted: bool = False) -> list[ca.SX]:
-        """The expressions, in the symbols that have these unique names in this process.
+        """Return the expressions, in the symbols of this process with these unique names.
 
         Raises:
             ValueError: instructions that `of` does not write, unless they are `trusted`.
@@ -138,10 +138,10 @@ class Instructions:
         return found
 
     def check(self) -> None:
-        """Refuse unknown operations, operands that are not earlier numbers, and wrong entries.
+        """Check operations, operands, which must be earlier numbers, and entries.
 
         Raises:
-            ValueError: any of these, or a path of more than `DEEPEST` operations.
+            ValueError: an invalid one, or a path of more than `DEEPEST` operations.
         """
         symbols, count = len(self.labels), len(self.labels) + len(self.constants)
         places, shapes = self.entries[:, [0, 2, 1]], self.shapes
@@ -176,12 +176,12 @@ def _within(numbers: NDArray[np.int64], end: NDArray[np.int64] | int) -> bool:
 
 
 def _places(expression: ca.SX) -> list[tuple[int, int]]:
-    """Row and column of each structural nonzero, column by column."""
+    """Return row and column of each structural nonzero, column by column."""
     return list(zip(*expression.sparsity().get_triplet(), strict=True))
 
 
 def _matrix(rows: int, columns: int, entries: NDArray[np.int64], nodes: Sequence[ca.SX]) -> ca.SX:
-    """The matrix with these (row, column, number), column by column."""
+    """Return the matrix with these (row, column, number), column by column."""
     nonzeros = ca.vertcat(ca.SX(0, 1), *(nodes[i] for i in entries[:, 2].tolist()))
     pattern = ca.Sparsity.triplet(rows, columns, entries[:, 0].tolist(), entries[:, 1].tolist())
     return ca.SX(pattern, nonzeros)

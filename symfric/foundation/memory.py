@@ -1,4 +1,4 @@
-"""What was made before, kept for the next call that needs it, and not more than a number of it."""
+"""Bounded, thread-safe cache."""
 
 from collections.abc import Hashable
 from threading import Lock
@@ -9,9 +9,9 @@ _LOCK = Lock()
 
 
 def remember(known: dict[Hashable, T], key: Hashable, made: T, most: int) -> T:
-    """Keep `made` in `known`, unless another thread was first; what is kept.
+    """Store `made` in `known`, unless another thread was first; return the stored object.
 
-    Of `most` things the oldest goes when there is another one.
+    With more than `most` entries the oldest is dropped.
     """
     with _LOCK:
         if key not in known and len(known) >= most:

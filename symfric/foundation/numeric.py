@@ -1,7 +1,7 @@
-"""Elementary functions that accept floats, NumPy arrays and CasADi SX, MX, DM alike.
+"""Elementary functions that accept floats, NumPy arrays and CasADi SX, MX and DM.
 
-CasADi's own functions turn an array into a DM column and NumPy's turn a DM into an array;
-a law written with these keeps the type it was given.
+CasADi's own functions turn an array into a DM column, and NumPy's turn a DM into an array; a law
+written with these keeps the type of its arguments.
 """
 
 import ctypes
@@ -19,27 +19,27 @@ from symfric.foundation.symbolic import Symbolic
 from symfric.foundation.vector import Rows, Vector
 
 Scalar = Any
-"""A real number: float, NumPy array (element-wise), SX, MX or DM; a `Vector` where laws take it."""
+"""Real number: float, NumPy array (element-wise), SX, MX or DM; a `Vector` where laws accept it."""
 
 _CASADI = (ca.SX, ca.MX, ca.DM, Symbolic)
 
 
 def is_symbolic(value: Scalar) -> bool:
-    """Whether `value` holds a CasADi symbol, so that numerical checks do not apply."""
+    """Return True if `value` contains a CasADi symbol, so that numerical checks do not apply."""
     if isinstance(value, ca.SX):
         return not value.is_constant()
     return isinstance(value, ca.MX | Symbolic)
 
 
 def is_casadi(*values: Scalar) -> bool:
-    """Whether any of `values` is a CasADi matrix, or stands for one."""
+    """Return True if any of `values` is a CasADi matrix, or stands for one."""
     return any(isinstance(value, _CASADI) for value in values)
 
 
 def is_number(value: Scalar) -> bool:
     """Return True for a plain number: int, float, NumPy's scalars and 0-d arrays of them.
 
-    An int that no float can hold is none.
+    An int too large for a float does not count.
     """
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and value.dtype.kind in "iuf"
@@ -49,15 +49,15 @@ def is_number(value: Scalar) -> bool:
 
 
 def equals(value: Scalar, number: float) -> bool:
-    """Whether `value` is the plain number `number`, so that a special case may be built in.
+    """Return True if `value` is the plain number `number`, so that a special case may be built in.
 
-    False for a symbol: what it will be is not known when the expression is made.
+    False for a symbol, whose value is unknown when the expression is built.
     """
     return is_number(value) and float(value) == number
 
 
 def reciprocal(value: Scalar) -> Scalar:
-    """1 / value, to the bit, for a value that divides several others.
+    """Return 1 / value, bit for bit, for a value that divides several others.
 
     CasADi turns a product with 1 / x into a quotient by x, and so one division into many.
     """
@@ -96,7 +96,7 @@ _erf_of_numbers = np.vectorize(erf_of_float, otypes=[float])
 
 
 def erf(x: Scalar) -> Scalar:
-    """The error function of floats, arrays, SX, MX or DM."""
+    """Return the error function of floats, arrays, SX, MX or DM."""
     if isinstance(x, Vector):
         return x.apply(erf, "erf")
     return ca.erf(x) if is_casadi(x) else _erf_of_numbers(x)[()]
@@ -112,9 +112,9 @@ def column(*rows: Scalar) -> Scalar:
 
 
 def empty(like: Scalar) -> Scalar:
-    """The column without rows that a stateless law returns: DM (0, 1), or an array (0, ...).
+    """Return the empty column of a stateless law: DM (0, 1), or an array (0, ...).
 
-    A DM joins SX and MX columns without a trace, so absent states cost nothing.
+    Concatenation of a DM with SX and MX columns leaves no trace, so absent states cost nothing.
     """
     if isinstance(like, Vector):
         return Rows()
@@ -122,7 +122,7 @@ def empty(like: Scalar) -> Scalar:
 
 
 def smallest(*values: Scalar) -> Scalar:
-    """The smallest of `values`."""
+    """Return the smallest of `values`."""
     least = values[0]
     for value in values[1:]:
         least = ca.fmin(least, value) if is_casadi(least, value) else np.minimum(least, value)
@@ -130,7 +130,7 @@ def smallest(*values: Scalar) -> Scalar:
 
 
 def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The first output of `function`, flat, at contiguous arrays: a call without conversions.
+    """Return the first output of `function`, flat, at contiguous arrays, without conversions.
 
     Five times faster than calling the Function with arrays, which copies each into a matrix.
     """
@@ -140,7 +140,7 @@ def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[
 def evaluate_all(
     function: ca.Function, *arguments: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """All outputs of `function`, which must be dense, as matrices; see `evaluate`."""
+    """Return all outputs of `function`, which must be dense, as matrices; see `evaluate`."""
     results = [np.zeros(function.size_out(i)[::-1]) for i in range(function.n_out())]
     bound(function, arguments, results)()
     return [result.T for result in results]
@@ -151,7 +151,7 @@ def bound(
     arguments: Sequence[NDArray[np.float64]],
     results: Sequence[NDArray[np.float64]],
 ) -> Callable[[], None]:
-    """A call of `function` without copies: CasADi reads and writes the contiguous arrays."""
+    """Bind `function` to contiguous arrays that CasADi reads and writes without copies."""
     buffer, call = cast(tuple[Any, Any], function.buffer())
     for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
         for i, array in enumerate(arrays):
@@ -165,12 +165,14 @@ def bound(
 
 
 def address(array: NDArray[np.float64]) -> int:
-    """Where the numbers of a contiguous array begin, for compiled code."""
-    if array.flags.writeable and array.size:  # a third of the time below
+    """Return the address of the numbers of a contiguous array, for compiled code."""
+    if array.flags.writeable and array.size:  # three times faster than below
         return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
     return array.ctypes.data
 
 
 def flat_view(array: NDArray[np.float64]) -> Any:
-    """The memory of a contiguous array, flat, as CasADi's buffers take it; keep the array alive."""
+    """Return a flat memory view of a contiguous array for CasADi's buffers; keep the array
+    alive.
+    """
     return memoryview(array.reshape(-1))  # pyright: ignore[reportArgumentType, reportCallIssue]

@@ -1,12 +1,12 @@
-"""Frozen data with expressions in it as plain arrays: for files, and for pickles.
+"""Frozen data with expressions as plain arrays, for files and pickles.
 
-A pack is an archive of arrays (NPZ): one holds JSON, in which objects are named by class and
-fields and expressions by number; the others are arrays as they are. Numbers come back to the bit.
+A pack is an archive of arrays (NPZ): one holds JSON, in which objects are given by class and fields
+and expressions by number; the others are the arrays themselves. Numbers are restored bit for bit.
 
 A file cannot run code. Expressions are lists of instructions (`symfric.foundation.instructions`),
 arrays are never pickles (`symfric.foundation.archive`), and objects are of a fixed list of classes
-(`symfric.foundation.storable`) or of those that the caller passes; their fields are checked against
-their annotations. A pickle is trusted, as all pickles are: it may also hold other classes and
+(`symfric.foundation.storable`) or of classes that the caller passes; their fields are checked
+against their annotations. A pickle is trusted, like all pickles: it may also hold other classes and
 CasADi's own serialization.
 """
 
@@ -35,12 +35,12 @@ ABOUT, OLD = "about", "expressions"
 @final
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A function without arguments that returns what it was given; a pack may hold it."""
+    """Function without arguments that returns a stored value; a pack may hold it."""
 
     value: Any
 
     def __call__(self) -> Any:
-        """It."""
+        """Return the stored value."""
         return self.value
 
 
@@ -48,7 +48,7 @@ T = TypeVar("T")
 
 
 def shallow(thing: T) -> T:
-    """Another object with the same fields."""
+    """Return another object with the same fields."""
     made = object.__new__(type(thing))
     made.__dict__.update(vars(thing))
     return made
@@ -57,23 +57,23 @@ def shallow(thing: T) -> T:
 def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:
     """Write the pack of `thing` to an open file.
 
-    An object that has `to_pack()` says itself what its fields are in a pack; one that has
-    `packed_as()` is packed as another object, whose `unpacked()` makes it again.
+    An object with `to_pack()` defines its own fields in a pack; one with `packed_as()` is packed as
+    another object, whose `unpacked()` restores it.
 
     Args:
         file: open for writing.
-        thing: what is packed.
-        kind: what the file calls itself.
+        thing: object to pack.
+        kind: name of the file type.
         form: number of the format, raised whenever older programs would misread it.
 
     Raises:
-        ValueError: something that no file holds, such as a function, and where it is.
+        ValueError: an object that a file cannot hold, such as a function, with its place.
     """
     _Writer(trusted=False).pack(file, thing, kind, form)
 
 
 def dumps(thing: object) -> bytes:
-    """The pack of `thing` in a pickle."""
+    """Return the pack of `thing` for a pickle."""
     buffer = BytesIO()
     _Writer(trusted=True).pack(buffer, thing, "", 0)
     return buffer.getvalue()
@@ -92,17 +92,17 @@ def load(
     file: IO[bytes], kind: str = "", form: int = 0,
     own: Iterable[type | Callable[..., Any]] = (), reader: str = "load_run",
 ) -> Any:  # fmt: skip
-    """What `dump` wrote.
+    """Return the object that `dump` wrote.
 
     Args:
         file: open for reading.
-        kind, form: as they were given to `dump`; older formats are read, too.
+        kind, form: as given to `dump`; older formats are read, too.
         own: classes and functions in it that are not symfric's.
-        reader: to whom users hand them over.
+        reader: function to which users pass them, for messages.
 
     Raises:
-        ValueError: no pack of this kind, a damaged one, one of a newer format, or a class or
-            function that is not known.
+        ValueError: not a pack of this kind, a damaged one, one of a newer format, or an unknown
+            class or function.
     """
     try:
         arrays = archive.read(file)
@@ -119,24 +119,26 @@ def load(
         if not 1 <= about["format"] <= form:
             raise UnreadableError(
                 f"expected format {form} or older, got {checks.shown(about['format'])}; it was "
-                "written by a newer version of symfric, which reads it"
+                "written by a newer version of symfric; use that version"
             )
         known = {storable.path_of(one): one for one in own}
         return _Reader(arrays, known, reader).unpack(about)
     except UnreadableError:
         raise
-    except Exception as error:  # a damaged file makes zipfile, NumPy and CasADi raise anything
+    except Exception as error:  # zipfile, NumPy and CasADi raise various errors for damaged files
         raise _foreign() from error
 
 
 def loads(data: bytes) -> Any:
-    """What `dumps` wrote, in a pickle: with classes of anybody."""
+    """Return the object that `dumps` wrote in a pickle, with any classes."""
     arrays = archive.read(BytesIO(data))
     return _Reader(arrays, None).unpack(json.loads(arrays.pop(ABOUT).tobytes()))
 
 
 class UnreadableError(ValueError):
-    """A pack of another version, or with a class that is neither symfric's nor handed over."""
+    """Pack of another version, or with a class that is neither symfric's nor passed by the
+    caller.
+    """
 
 
 def _foreign() -> ValueError:
@@ -145,9 +147,9 @@ def _foreign() -> ValueError:
 
 @final
 class _Writer:
-    """Turns objects into JSON; arrays and expressions are put aside.
+    """Conversion of objects to JSON; arrays and expressions are collected separately.
 
-    In a pickle, which is `trusted`, MX expressions and Functions are as CasADi serializes them.
+    In a pickle, which is `trusted`, MX expressions and Functions use CasADi's serialization.
     """
 
     def __init__(self, trusted: bool) -> None:
@@ -175,7 +177,7 @@ class _Writer:
         np.savez(file, **{ABOUT: about}, **arrays)  # pyright: ignore[reportArgumentType]
 
     def write(self, where: str, value: Any) -> Any:
-        """`value` as JSON; what has more than a text or a number is {kind: content}."""
+        """Return `value` as JSON; types other than text and number become {kind: content}."""
         if value is None or isinstance(value, bool | str | int):
             return value
         if isinstance(value, float | np.floating | np.integer | np.bool_):
@@ -205,7 +207,9 @@ class _Writer:
         return self._object(where, value)
 
     def _of_casadi(self, where: str, value: Any) -> Any:
-        """A Function as expressions of its arguments; in a pickle whatever CasADi serializes."""
+        """Return a Function as expressions of its arguments; in a pickle use CasADi's
+        serialization.
+        """
         if self._trusted:
             return {"serialized": identity.serialized(value)}
         if isinstance(value, ca.Function):
@@ -218,7 +222,7 @@ class _Writer:
         raise checks.refused(f"pack{where}", what, value)
 
     def _function(self, where: str, value: Any) -> Any:
-        """A function of Python, by where it stands."""
+        """Return a Python function as its import path."""
         try:
             same = storable.found_at(storable.path_of(value)) is value
         except (ImportError, AttributeError, ValueError):
@@ -236,7 +240,7 @@ class _Writer:
         return {"array": len(self._arrays) - 1}
 
     def _object(self, where: str, value: Any) -> Any:
-        """An object by class and fields, once; "same" where it stands again."""
+        """Return an object as class and fields; repeated objects as a reference "same"."""
         if id(value) in self._known:
             return {"same": self._known[id(value)]}
         kind = type(value)
@@ -256,13 +260,15 @@ class _Writer:
 
 
 def state_of(thing: Any) -> dict[str, Any]:
-    """The fields of a dataclass."""
+    """Return the fields of a dataclass."""
     return {item.name: getattr(thing, item.name) for item in fields(thing)}
 
 
 @final
 class _Reader:
-    """Makes objects of JSON; `own` None, of a pickle, lets classes and functions of anybody in."""
+    """Construction of objects from JSON; `own` None, for a pickle, allows any classes and
+    functions.
+    """
 
     def __init__(
         self, arrays: Mapping[str, NDArray[Any]], own: Mapping[str, Any] | None, reader: str = ""
@@ -294,7 +300,7 @@ class _Reader:
         return self.read(about["content"])
 
     def read(self, value: Any) -> Any:
-        """The object that was written as `value`."""
+        """Return the object that was written as `value`."""
         if isinstance(value, list):
             return [self.read(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
         if not isinstance(value, dict):
@@ -305,7 +311,7 @@ class _Reader:
         return self._ways[cast(str, way)](content)
 
     def _object(self, kind: type, has: Mapping[str, Any]) -> Any:
-        """An object with these fields; out of a file its own checks hold for them."""
+        """Build an object with these fields; for a file its own checks are applied."""
         made, place = object.__new__(kind), len(self._known)
         self._known.append(None)
         values = {name: self.read(held) for name, held in has.items()}
@@ -323,13 +329,13 @@ class _Reader:
         return made
 
     def _same(self, k: int) -> object:
-        """The object of this number, which is complete."""
+        """Return the object of this number, which must be complete."""
         if self._known[k] is None:
             raise _foreign()
         return self._known[k]
 
     def _class(self, path: str, wanted: type) -> Any:
-        """The class of this name, if it is one that may be in a pack."""
+        """Return the class of this name, if packs may contain it."""
         path = storable.current(path)
         if self._own is not None and not storable.may_hold(path):
             raise _foreign()
@@ -345,19 +351,19 @@ class _Reader:
         return found
 
     def _of_expressions(self, parts: Any) -> ca.Function:
-        """A Function of SX expressions; options of CasADi, which could run code, have no place."""
+        """Return a Function of SX expressions, without CasADi options, which could run code."""
         if not storable.fits(tuple(parts), FUNCTION):
             raise _foreign()
         return ca.Function(*parts)
 
     def _serialized(self, content: Any) -> Any:
-        """An expression or Function in CasADi's own format, which may run code."""
+        """Return an expression or Function from CasADi's own format, which may run code."""
         if self._own is not None:
             raise _foreign()
         return identity.deserialized(*content)
 
     def _function(self, path: str) -> Any:
-        """The function of this name; out of a file only one that was handed over."""
+        """Return the function of this name; for a file only one passed by the caller."""
         if self._own is not None and path not in self._own:
             raise self._unknown("functions", path)
         return self._named(path, "functions")
@@ -366,7 +372,7 @@ class _Reader:
         return partial(function, *args, **keywords)
 
     def _named(self, path: str, what: str) -> Any:
-        """What has this name, handed over or of a known package."""
+        """Return the object of this name, passed by the caller or of a known package."""
         place, _, name = path.partition(":")
         if self._own is not None and path in self._own:
             return self._own[path]
@@ -377,12 +383,12 @@ class _Reader:
         except (ImportError, AttributeError) as error:
             raise UnreadableError(
                 f"expected {what} that this version of symfric has, got {name} of {place}; it was "
-                "written by another one"
+                "written by another version"
             ) from error
 
     def _unknown(self, what: str, path: str) -> UnreadableError:
         place, _, name = path.partition(":")
         return UnreadableError(
-            f"expected {what} of symfric, got {name} of {place}; hand it over, as in "
+            f"expected {what} of symfric, got {name} of {place}; pass it, as in "
             f"{self._reader}(path, own=[{name}])"
         )

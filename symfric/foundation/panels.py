@@ -1,8 +1,8 @@
-"""Empty panels with a light grid, figures written whole, and figures for a printed page.
+"""Empty figures and panels with a light grid, atomic saving, and figures for print.
 
-Figures are made without `matplotlib.pyplot`: nothing keeps them once they are forgotten, a notebook
-shows the one that a cell returns, once, and a program without a screen needs no setting. Whoever
-wants a window says `figure.show()`.
+Figures are made without `matplotlib.pyplot`: they are garbage-collected, a notebook shows the one
+that a cell returns, once, and a program without a screen needs no setting. `figure.show()` opens a
+window.
 """
 
 from pathlib import Path
@@ -24,15 +24,15 @@ from symfric.foundation.style import COLOURS
 
 Shared = bool | Literal["none", "all", "row", "col"]
 NARROW, WIDE = 5.0, 7.0
-"""Widths of pictures [inch]."""
+"""Widths of figures [inch]."""
 
 
 @final
 class Picture(Figure):
-    """A figure that no registry keeps: a notebook shows it where it is returned."""
+    """Figure outside pyplot's registry: a notebook shows it where it is returned."""
 
     def _repr_png_(self) -> bytes:  # pyright: ignore[reportUnusedFunction]  (notebooks call it)
-        """What a notebook shows."""
+        """Return the PNG for a notebook."""
         return png(self, dpi=100)
 
     def show(self, warn: bool = True) -> None:
@@ -44,7 +44,7 @@ class Picture(Figure):
         Raises:
             ValueError: Matplotlib has no windows here, as on a machine without a screen.
         """
-        import matplotlib.pyplot as plt  # noqa: PLC0415  (only where there shall be a window)
+        import matplotlib.pyplot as plt  # noqa: PLC0415  (only needed for windows)
 
         manager = self.canvas.manager
         if manager is None:
@@ -54,7 +54,7 @@ class Picture(Figure):
                 plt.close(empty)
                 raise ValueError(
                     "show: expected a Matplotlib backend with windows, got "
-                    f"'{plt.get_backend().lower()}'; give plot() a path=, or choose one, "
+                    f"'{plt.get_backend().lower()}'; pass path= to plot(), or choose a backend, "
                     "such as MPLBACKEND=TkAgg; in a notebook the figure shows itself as the last "
                     "line of a cell"
                 )
@@ -64,7 +64,7 @@ class Picture(Figure):
 
 
 def blank(width: float = WIDE, height: float = 4.0, *, free: bool = False) -> Figure:
-    """An empty figure of `width` and `height` [inch] that keeps its labels apart, unless `free`."""
+    """Return an empty figure [inch] that keeps its labels apart, unless `free`."""
     return Picture(figsize=(width, height), layout=None if free else "constrained")
 
 
@@ -78,7 +78,7 @@ def grid(
     sharey: Shared = False,
     **more: Any,
 ) -> tuple[Figure, list[list[Axes]]]:
-    """A figure of `width` and `height` [inch] and its panels with a light grid, row by row.
+    """Return a figure of `width` and `height` [inch] and its panels with a light grid, row by row.
 
     Further arguments go to `Figure.subplots`.
     """
@@ -90,13 +90,15 @@ def grid(
 def panels(
     count: int, width: float = WIDE, height: float = 1.9, shared: bool = True
 ) -> tuple[Figure, list[Axes]]:
-    """`count` panels under each other with a light grid, their abscissa shared by default."""
+    """Return a figure and `count` panels in a column with a light grid, abscissa shared by
+    default.
+    """
     figure, axes = grid(count, 1, width, 0.7 + height * count, sharex=shared)
     return figure, [axis for (axis,) in axes]
 
 
 def dressed(axis: Axes) -> Axes:
-    """The same panel with a light grid behind its curves, and colours that all can tell apart."""
+    """Add a light grid behind the curves and colours for colour-blind readers; return the panel."""
     axis.set_prop_cycle(cycler(color=COLOURS))
     axis.set_axisbelow(True)
     axis.grid(alpha=0.3)
@@ -117,7 +119,7 @@ def save(figure: Figure, path: str | Path | None, dpi: float = 150) -> Figure:
 
 MILLIMETRE = 1 / 25.4
 DOTS = 300
-"""Of a picture of pixels, an inch."""
+"""Resolution of pixel images [dots per inch]."""
 FONTS: dict[Any, Any] = {"pdf.fonttype": 42, "ps.fonttype": 42}
 """TrueType in PDF and PS: printers of journals refuse the Type 3 that is Matplotlib's default."""
 
@@ -130,20 +132,20 @@ def for_print(
     height: float | None = None,
     text: float = 8.0,
 ) -> Figure:
-    """Any figure of symfric in the width of a column, as it is returned by `run.plot()` and others.
+    """Return any figure of symfric in the width of a column, such as that of `run.plot()`.
 
-    Texts keep their proportions, legends beside the panels take as many columns as there is room
-    for. The figure itself is changed.
+    Texts keep their proportions, and legends outside the panels take as many columns as fit. The
+    figure itself is changed.
 
     Args:
-        figure: what `plot()` of a run, a fit, an optimal motion, a comparison returned.
+        figure: returned by `plot()` of a run, a fit, an optimal motion, a comparison.
         path: file, its format taken from the ending (.pdf, .svg, .eps, .png).
         width: [mm]; 85 is a column of most journals, 175 a page.
         height: [mm]; None keeps the proportions.
-        text: size of the labels of axes [pt]; other texts keep their size beside it.
+        text: size of the axis labels [pt]; other texts keep their size relative to it.
 
     Raises:
-        ValueError: no figure, sizes that are not positive, an unknown ending.
+        ValueError: not a figure, sizes that are not positive, an unknown ending.
     """
     figure = checks.kind("for_print", figure, Figure, "a figure, such as run.plot()")
     width = checks.number("for_print: width", width, unit="mm", above=0.0)
@@ -161,7 +163,7 @@ def for_print(
 
 
 def _write_at(figure: Figure, text: float) -> None:
-    """Every text of the figure in the size that it has beside one of `text` points."""
+    """Scale all texts of the figure so that axis labels have `text` points."""
     first = next(iter(figure.axes), None)
     ratio = text / (float(mpl.rcParams["font.size"]) if first is None else _size(first.yaxis.label))
     texts = {id(one): one for one in _texts(figure)}
@@ -171,7 +173,7 @@ def _write_at(figure: Figure, text: float) -> None:
             ticks = [one for one in _texts(axis) if one not in kept]
             for one in ticks:
                 texts.pop(id(one), None)
-            if ticks:  # of the axis, for ticks that come and go
+            if ticks:  # set on the axis: ticks are recreated
                 axis.set_tick_params(which="both", labelsize=_size(ticks[0]) * ratio)
     for one in texts.values():
         one.set_fontsize(_size(one) * ratio)
@@ -187,8 +189,8 @@ def _size(text: Text) -> float:
 
 
 def _fit(figure: Figure, legend: Legend) -> None:
-    """A legend outside of the panels in as many columns as the width of the figure allows."""
-    side = getattr(legend, "_outside_loc", None)  # Matplotlib tells nobody where it put it
+    """Arrange a legend outside the panels in as many columns as the figure width allows."""
+    side = getattr(legend, "_outside_loc", None)  # Matplotlib has no public attribute for the place
     texts = legend.get_texts()
     if side not in ("upper", "lower") or not texts:
         return

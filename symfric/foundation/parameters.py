@@ -1,4 +1,4 @@
-"""Parameters of laws and scenes: value, unit, bounds, default; named sets and symbols of them.
+"""Parameters of laws and scenes: value, unit, bounds, default; named sets and their symbols.
 
 A parametric object is a frozen dataclass whose numbers are declared with `param`. A field holds a
 float (folded into every expression as a constant) or a CasADi symbol (visible to derivatives,
@@ -45,7 +45,7 @@ ROLES = {
     "motion": "what moves the machine: a start value, a given velocity or path",
     "sampling": "of random contacts: how many, and which random numbers",
 }
-"""What a parameter may be for, whatever it is called; "" where nobody has said."""
+"""Roles of parameters, independent of their names; "" if unspecified."""
 
 
 def param(
@@ -55,14 +55,14 @@ def param(
     """Declare a parameter field of a `Parametric` dataclass.
 
     Args:
-        default: value used when none is given.
+        default: value used if none is given.
         unit: SI unit as text, "1" for a pure number.
-        doc: what it is, in a few words.
-        role: what it is for, one of `ROLES`, from which identification, temperature and the code
-            generator tell alike parameters; "" says nothing.
-        width: of a parameter that smooths a jump, its exponent in the width of the layer: 1 for
-            the width itself, -1 for a steepness; 0 for any other.
-        lower, upper: closed bounds; identification takes its box constraints from here.
+        doc: short description.
+        role: purpose, one of `ROLES`, by which identification, temperature and the code generator
+            recognise parameters; "" if unspecified.
+        width: of a parameter that smooths a jump, its exponent in the smoothing width: 1 for the
+            width itself, -1 for a steepness; 0 for any other.
+        lower, upper: closed bounds, also the box constraints of identification.
 
     Raises:
         ValueError: an unknown role.
@@ -75,7 +75,7 @@ def param(
 
 
 def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
-    """Declare a field of a `Parametric` dataclass that names one of several forms of it.
+    """Declare a field of a `Parametric` dataclass that selects one of several forms.
 
     A form is chosen when the object is made and leaves no switch in the expressions.
     """
@@ -84,12 +84,12 @@ def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """One parameter as a user sees it.
+    """Parameter with its metadata, for users.
 
     Attributes:
         name: flat name in the whole object, such as "mu_s_pos".
         field: name in the part that declares it, such as "mu_s".
-        role: what it is for, one of `ROLES`, or "".
+        role: purpose, one of `ROLES`, or "".
         width: exponent in the width of a smoothed jump, see `param`.
     """
 
@@ -107,7 +107,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Parametric:
-    """A frozen dataclass with `param` fields; checks its numbers when it is made.
+    """Frozen dataclass with `param` fields, whose numbers are checked on construction.
 
     `eq=False` because comparing fields that hold symbols has no truth value.
     """
@@ -122,7 +122,7 @@ class Parametric:
     """Fixed name endings of the children; without them a child is renamed only on a clash."""
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
-        """A name that is no field is refused with the nearest one."""
+        """Create an object; an unknown field raises an error that offers the nearest name."""
         if not given.keys() <= cls.__dataclass_fields__.keys():
             check_names(cls.__name__, given, [item.name for item in fields(cls)])
         return super().__new__(cls)
@@ -138,7 +138,7 @@ class Parametric:
             raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))
 
     def _repr_html_(self) -> str:
-        """For notebooks: parameters with units, a picture."""
+        """Return HTML for notebooks: parameters with units, and a figure."""
         rows = [(p.name, figure_of(p.value), p.unit, p.doc) for p in parameters(self).values()]
         rows += [(o.name, o.value, "", o.doc) for o in options(self).values()]
         first = (self.__doc__ or "").partition("\n")[0]
@@ -146,7 +146,7 @@ class Parametric:
         return Shown(type(self).__name__, (first,), table).html(self.thumbnail())
 
     def thumbnail(self) -> "Figure | None":
-        """A small picture, if there is one."""
+        """Return a small figure, if there is one."""
 
 
 P = TypeVar("P", bound=Parametric)
@@ -177,7 +177,7 @@ def _problems(obj: Parametric) -> Iterator[str]:
 
 
 def _numbers(value: Any) -> NDArray[np.float64]:
-    """The numbers in a plain number, an array or a constant matrix; none in anything else."""
+    """Return the numbers in a plain number, an array or a constant matrix; else an empty array."""
     if is_casadi(value):
         return ca.DM(value).full().ravel()
     numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
@@ -185,7 +185,7 @@ def _numbers(value: Any) -> NDArray[np.float64]:
 
 
 def _out_of_order(a: Scalar, b: Scalar, strictly: bool) -> bool:
-    """Whether a <= b, or a < b, is broken by numbers; arrays that do not fit are left open."""
+    """Return True if numbers violate a <= b, or a < b; False for arrays of other shapes."""
     if is_symbolic(a) or is_symbolic(b):
         return False
     low, high = _numbers(a), _numbers(b)
@@ -199,7 +199,7 @@ def _shown(value: Scalar) -> str:
 
 
 def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
-    """Nested parametric objects as (field, index in a tuple or None, child)."""
+    """Return nested parametric objects as (field, index in a tuple or None, child)."""
     found: list[tuple[str, int | None, Parametric]] = []
     for item in fields(obj):
         value = getattr(obj, item.name)
@@ -211,7 +211,7 @@ def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
 
 
 def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
-    """Flat name -> (child number or None, name inside it)."""
+    """Return flat name -> (child number or None, name inside it)."""
     own = [item.name for item in fields(obj) if "unit" in item.metadata]
     inner = [list(_names(child)) for _, _, child in _children(obj)]
     if obj.suffixes:
@@ -225,7 +225,7 @@ def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
 
 
 def distinct(groups: Sequence[Sequence[str]], taken: Sequence[str] = ()) -> list[list[str]]:
-    """The names of several groups made unique: one that stands twice gets its group's number."""
+    """Return the names of several groups made unique: repeated names get their group's number."""
     count = Counter([*taken, *(name for group in groups for name in group)])
     used = set(count)
     renamed: list[list[str]] = []
@@ -241,7 +241,7 @@ def distinct(groups: Sequence[Sequence[str]], taken: Sequence[str] = ()) -> list
 
 
 def parameters(obj: Parametric) -> dict[str, Parameter]:
-    """All parameters of `obj` and of what it holds, by flat name.
+    """Return all parameters of `obj` and of its parts, by flat name.
 
     Names are the field names. Terms of a sum that share a name get `_1`, `_2`, ...; the two sides
     of an asymmetric law get `_pos` and `_neg`.
@@ -275,7 +275,7 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
 
 @dataclass(frozen=True)
 class Option:
-    """One option as a user sees it."""
+    """Option with its choices, for users."""
 
     name: str
     value: str
@@ -285,7 +285,7 @@ class Option:
 
 
 def options(obj: Parametric) -> dict[str, Option]:
-    """The options of `obj` itself, by name."""
+    """Return the options of `obj` itself, by name."""
     return {
         item.name: Option(
             item.name,
@@ -300,7 +300,7 @@ def options(obj: Parametric) -> dict[str, Option]:
 
 
 def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
-    """A copy of `obj` with the parameters in `values` replaced, wherever they sit.
+    """Return a copy of `obj` with the parameters in `values` replaced, at any level.
 
     Raises:
         ValueError: a name that `obj` does not have (the closest ones are offered), or a value
@@ -331,10 +331,10 @@ def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
 
 
 def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
-    """A copy of `obj` in which the named parameters are SX symbols, and those symbols.
+    """Return a copy of `obj` with SX symbols for the named parameters, and these symbols.
 
-    Every other parameter stays a constant of the expression, so that a term switched off by a
-    float zero leaves no trace.
+    Every other parameter stays a constant of the expression, so that a term switched off by a float
+    zero leaves no trace.
 
     Returns:
         The copy and one `Variable` per name with start value, unit and bounds of the parameter.

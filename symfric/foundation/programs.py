@@ -1,6 +1,6 @@
-"""The C compiler and other programs of this machine, run to their end or to a time limit.
+"""Run the C compiler and other programs of this machine, with a time limit.
 
-Compilers, what they have made, emulators and the tools beside them are run here and nowhere else.
+Compilers, compiled programs, emulators and related tools are run only through this module.
 """
 
 import os
@@ -16,25 +16,24 @@ from pathlib import Path
 from typing import IO, final
 
 PATIENCE = 60.0
-"""Seconds that a program may take unless told otherwise: one that waits for something is stopped,
-one on a machine under load is not."""
+"""Default time limit of a program [s]: it stops hanging programs, but not slow ones under load."""
 GRACE = 1.0
-"""Seconds for a program that was asked to stop."""
+"""Time [s] for a program to stop after a request."""
 KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 
 
 class ProgramError(RuntimeError):
-    """A program does not start, or comes to no end."""
+    """Program that does not start, or exceeds its time limit."""
 
 
 @final
 @dataclass(frozen=True)
 class Finished:
-    """What is left of a program.
+    """Result of a finished program.
 
     Attributes:
-        status: 0 where it says that all went well.
-        output: what it wrote on standard output.
+        status: 0 for success.
+        output: its standard output.
         said: its standard error, as text.
     """
 
@@ -56,11 +55,11 @@ def finished(
     Its language is English. An interrupt stops it, too.
 
     Args:
-        variables: of its environment, besides those of this process.
-        name: what messages call it; default the command.
+        variables: additional variables of its environment.
+        name: in messages; default the command.
 
     Raises:
-        ProgramError: it does not start, or comes to no end.
+        ProgramError: it does not start, or exceeds the limit.
     """
     pipe = subprocess.PIPE
     process = started(command, stdin=pipe, stdout=pipe, stderr=pipe, variables=variables, name=name)
@@ -84,7 +83,7 @@ def started(
     variables: Mapping[str, str] | None = None,
     name: str = "",
 ) -> subprocess.Popen[bytes]:
-    """A program's process, which leads a session of its own; `end` stops and closes it.
+    """Start a program in its own session; `end` stops and closes it.
 
     Raises:
         ProgramError: it cannot be started.
@@ -103,14 +102,14 @@ def started(
 
 
 def called(command: Sequence[str]) -> str:
-    """A command without the folder of its program."""
+    """Return a command without the folder of its program."""
     return shlex.join((Path(command[0]).name, *command[1:]))
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """Stop a program that still runs, after an interrupt too, and what it has started.
+    """Stop a running program and its children, also after an interrupt.
 
-    It is asked first: then a compiler takes its temporary files away.
+    It is first asked to terminate: a compiler then removes its temporary files.
     """
     if process.poll() is None:
         _signal(process, signal.SIGTERM)
@@ -124,7 +123,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _signal(process: subprocess.Popen[bytes], number: int) -> None:
-    """Send a signal to all that a program has started; there may be nobody left."""
+    """Send a signal to the process group of a program, if it still exists."""
     with suppress(ProcessLookupError, PermissionError):
         if hasattr(os, "killpg"):
             os.killpg(process.pid, number)
@@ -134,17 +133,18 @@ def _signal(process: subprocess.Popen[bytes], number: int) -> None:
 
 NAMES = ("gcc", "clang", "cc")
 PER_BYTE = 1e-4
-"""Seconds that a compiler may take for each byte of C, besides `PATIENCE`: a hundred times the
-usual, for machines under load."""
+"""Additional time limit of a compiler per byte of C [s], besides `PATIENCE`: a hundred times the
+usual, for machines under load.
+"""
 
 
 class CompileError(ProgramError):
-    """There is no compiler, it refused the code, or what it made cannot be used."""
+    """No compiler, rejected code, or an unusable result."""
 
 
 @dataclass(frozen=True)
 class Compiler:
-    """A command that takes the options of gcc."""
+    """Compiler command with gcc-compatible options."""
 
     command: tuple[str, ...]
 
@@ -154,10 +154,10 @@ class Compiler:
     def run(
         self, *arguments: str, code: str = "", variables: Mapping[str, str] | None = None
     ) -> str:
-        """Run it on `code`, its standard input, or on files; returns what it says.
+        """Run it on `code`, its standard input, or on files; return its messages.
 
         Raises:
-            CompileError: it cannot be started, refuses the code, or does not come to an end.
+            CompileError: it cannot be started, rejects the code, or exceeds the time limit.
         """
         try:
             done = finished(
@@ -174,7 +174,7 @@ class Compiler:
         return done.said
 
     def warnings(self, *arguments: str) -> list[str]:
-        """Run it on files; returns the lines in which it warns.
+        """Run it on files; return the lines with warnings.
 
         Raises:
             CompileError: as `run`.
@@ -183,18 +183,18 @@ class Compiler:
 
 
 def is_clang(compiler: Compiler) -> bool:
-    """Whether it is a clang, which refuses some options of gcc; `cc` often is a link to one."""
+    """Return True for clang, which rejects some options of gcc; `cc` often links to it."""
     names = (path.name for path in (Path(compiler.command[0]), Path(compiler.command[0]).resolve()))
     return sys.platform == "darwin" or any("clang" in name for name in names)
 
 
 def patience(code: str) -> float:
-    """Seconds that a compiler may take for `code`."""
+    """Return the time limit of a compiler for `code` [s]."""
     return PATIENCE + PER_BYTE * len(code)
 
 
 def first_error(text: str) -> str:
-    """The head of what a compiler said, and its first error."""
+    """Return the head of a compiler's messages, and its first error."""
     head, _, said = text.partition("\n")
     lines = said.strip().splitlines()
     error = next((line for line in lines if "error" in line), "".join(lines[:1]))
@@ -202,9 +202,10 @@ def first_error(text: str) -> str:
 
 
 def find_compiler(name: str | None = None) -> Compiler | None:
-    """The compiler asked for by `name`, else `$CC`, else the first of gcc, clang and cc.
+    """Return the compiler `name`, else `$CC`, else the first of gcc, clang and cc; None if not
+    found.
 
-    A `$CC` that is not there is not passed over: whoever sets it means it. None if there is none.
+    A `$CC` that does not exist gives None, without trying the others.
 
     Raises:
         ValueError: `name` is given and does not exist.
@@ -220,7 +221,7 @@ def find_compiler(name: str | None = None) -> Compiler | None:
 
 
 def _command(text: str) -> tuple[str, ...] | None:
-    """`text` as a command with the full path of its program; None where there is no such one."""
+    """Return `text` as a command with the full path of its program; None if not found."""
     try:
         words = shlex.split(text)
     except ValueError:  # a quotation mark without its partner
@@ -230,18 +231,18 @@ def _command(text: str) -> tuple[str, ...] | None:
 
 
 def missing_compiler() -> str:
-    """Why `find_compiler` found none, and what to do."""
+    """Return the reason why `find_compiler` found none, with advice."""
     asked = os.environ.get("CC", "").strip()
     if asked:
-        return f"no C compiler found: $CC is {asked!r}, which is not there; correct it or unset CC"
+        return f"no C compiler found: $CC is {asked!r}, which does not exist; fix or unset it"
     return "no C compiler found; install gcc or clang, or set CC"
 
 
 def needed_compiler() -> Compiler:
-    """The compiler of this machine.
+    """Return the compiler of this machine.
 
     Raises:
-        CompileError: there is none.
+        CompileError: not found.
     """
     found = find_compiler()
     if found is None:
@@ -250,9 +251,10 @@ def needed_compiler() -> Compiler:
 
 
 def no_compiler() -> CompileError:
-    """What to say where there is none."""
+    """Return the error for a missing compiler."""
     wanted = os.environ.get("CC")
     found = f"$CC is {wanted!r}, which is not found" if wanted else "found none"
     return CompileError(
-        f"compile: expected a C compiler ($CC, gcc, clang or cc), {found}; use backend='vm'"
+        f"compile: expected a C compiler ($CC, gcc, clang or cc), {found}; install one, or pass "
+        "backend='vm' to simulations"
     )

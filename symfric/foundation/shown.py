@@ -1,6 +1,6 @@
-"""How an object shows itself: one description, as text of one screen and as HTML of a notebook.
+"""Display of objects: one description, as text of one screen and as HTML of a notebook.
 
-Everything that comes from a user is escaped; there are no scripts, and pictures lie inside.
+All user text is escaped; there are no scripts, and images are embedded.
 """
 
 from abc import ABC, abstractmethod
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 100, 25
 """Columns and lines of a screen."""
 DOTS_PER_INCH = 80
-"""Of pictures in notebooks."""
+"""Resolution of images in notebooks."""
 BOX = "font-family:sans-serif;font-size:13px;line-height:1.35;max-width:64em"
 TABLE = "border-collapse:collapse;font-size:13px"
 CELL = "padding:1px 10px 1px 0;vertical-align:top"
@@ -30,10 +30,10 @@ HEAD = f"{CELL};border-bottom:1px solid #888;font-weight:600"
 
 
 class Showing(ABC):
-    """What shows itself: `repr` in one screen, and as HTML in notebooks.
+    """Base class of objects with a `repr` of one screen, and HTML in notebooks.
 
     Attributes:
-        hidden: names that completion leaves out: what other parts of the program ask.
+        hidden: internal names that completion omits.
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset(
@@ -45,10 +45,10 @@ class Showing(ABC):
 
     @abstractmethod
     def shown(self) -> "Shown":
-        """What is to be said, without work that nobody asked for."""
+        """Return the description, without expensive computations."""
 
     def thumbnail(self) -> "Figure | None":
-        """A small picture for notebooks, if there is one."""
+        """Return a small figure for notebooks, if there is one."""
         return None
 
     def __repr__(self) -> str:
@@ -64,9 +64,9 @@ class Table:
     """Rows of texts below a header.
 
     Attributes:
-        header: names of the columns; none where all are "".
-        numbers: columns that stand at the right.
-        rest: what stands below a table that was cut, "{n}" and "{names}" for what is left out.
+        header: names of the columns; no header if all are "".
+        numbers: right-aligned columns.
+        rest: line below a shortened table, with "{n}" and "{names}" of the omitted rows.
     """
 
     header: tuple[str, ...]
@@ -78,10 +78,10 @@ class Table:
 @final
 @dataclass(frozen=True)
 class Shown:
-    """What is to be said of an object.
+    """Description of an object.
 
     Attributes:
-        title: its name and what it is, in a line.
+        title: its name and type, in a line.
         lines: sentences below.
         table: its parts.
         after: sentences below the table.
@@ -93,13 +93,13 @@ class Shown:
     after: tuple[str, ...] = ()
 
     def text(self) -> str:
-        """All of it within a screen."""
+        """Return the description as text within a screen."""
         top = [cut(line) for line in (self.title, *self.lines)]
         bottom = [cut(line) for line in self.after]
         return "\n".join([*top, *_rows(self.table, HEIGHT - len(top) - len(bottom)), *bottom])
 
     def html(self, picture: "Figure | None" = None) -> str:
-        """All of it as HTML, with a picture at its end where there is one."""
+        """Return the description as HTML, with the figure at its end."""
         parts = [f"<div><b>{escape(self.title)}</b></div>"]
         parts += [f"<div>{escape(line)}</div>" for line in self.lines]
         parts += [_html_table(self.table)] if self.table.rows else []
@@ -109,37 +109,37 @@ class Shown:
 
 
 def cut(line: str, width: int = WIDTH) -> str:
-    """`line` within `width` letters."""
+    """Return `line` shortened to `width` letters."""
     return line if len(line) <= width else f"{line[: width - 4].rstrip(', ')} ..."
 
 
 def figure_of(value: object) -> str:
-    """A number in six digits, of an expression that it is one."""
+    """Return a number with six digits; "(expression)" for a symbolic one."""
     if is_casadi(value):
         return str(value) if value.is_constant() else "(expression)"  # pyright: ignore
     return f"{value:.6g}" if is_number(value) else str(value)
 
 
 def valued(named: Iterable[tuple[str, Scalar, str]]) -> str:
-    """Numbers with names and units, such as "m = 0.8 kg, mu_s = 0.2"."""
+    """Return numbers with names and units, such as "m = 0.8 kg, mu_s = 0.2"."""
     units = ((n, v, "" if u in ("", "1") else f" {u}") for n, v, u in named)
     return ", ".join(f"{n} = {figure_of(v)}{u}" for n, v, u in units)
 
 
 def counted(n: int, one: str, many: str = "") -> str:
-    """A count with its noun: "1 state", "3 states", "no states"."""
+    """Return a count with its noun: "1 state", "3 states", "no states"."""
     return f"{n or 'no'} {one if n == 1 else many or one + 's'}"
 
 
 def among(names: Iterable[str], most: int = 8) -> str:
-    """Names with commas; of many the first ones, and how many more there are."""
+    """Join names by commas; if there are many, the first ones and the number of the others."""
     every = list(names)
     more = f", ... {len(every) - most} more" if len(every) > most else ""
     return ", ".join(every[:most]) + more
 
 
 def _rows(table: Table, most: int) -> list[str]:
-    """Aligned lines, at most `most` of them."""
+    """Return aligned lines, at most `most` of them."""
     rows, lines = list(table.rows), [table.header] if any(table.header) else []
     room = most - len(lines)
     shown = rows if len(rows) <= room else rows[: max(0, room - 1)]
@@ -174,19 +174,19 @@ def _html_table(table: Table) -> str:
 
 
 def png(figure: "Figure", dpi: float = 100) -> bytes:
-    """`figure` as the bytes of a PNG file."""
+    """Return `figure` as the bytes of a PNG file."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi)
     return buffer.getvalue()
 
 
 def data_uri(figure: "Figure", dpi: float = 60) -> str:
-    """`figure` as text for the `src` of an HTML image: a PNG inside, no file, no network."""
+    """Return `figure` as a data URI for the `src` of an HTML image, without file and network."""
     return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
 
 
 def _image(figure: "Figure", words: str) -> str:
-    """A figure as an image inside the page."""
+    """Return a figure as an embedded image."""
     return (
         f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
         f'src="{data_uri(figure, DOTS_PER_INCH)}">'
@@ -194,11 +194,11 @@ def _image(figure: "Figure", words: str) -> str:
 
 
 SHORT = 8
-"""Numbers that are written out."""
+"""Largest number of values that are written out."""
 
 
 def brief(self: Any) -> str:
-    """Class and fields of a dataclass, a line each, within a screen."""
+    """Return class and fields of a dataclass, a line each, within a screen."""
     lines = [f"  {item.name}: {told(getattr(self, item.name))}" for item in fields(self)]
     if len(lines) > HEIGHT - 2:
         lines = [*lines[: HEIGHT - 2], f"  ... {len(lines) - HEIGHT + 2} more"]
@@ -206,7 +206,7 @@ def brief(self: Any) -> str:
 
 
 def told(value: Any) -> str:
-    """A value in a line."""
+    """Return a value in a line."""
     if isinstance(value, np.ndarray):
         return _array(cast(NDArray[Any], value))
     if is_casadi(value):

@@ -1,4 +1,4 @@
-"""How a solve ended: each member's value is the sentence shown to the user."""
+"""Outcome of a solve: each member's value is the sentence shown to the user."""
 
 from enum import Enum, unique
 from typing import Any
@@ -11,8 +11,8 @@ class Status(Enum):
     SUCCESS = "The end was reached within the tolerances."
     TERMINATED = "A terminal event ended the simulation."
     EVENT_STORM = (
-        "Events pile up without time advancing (Zeno); give the model a mode in which the contact "
-        "rests."
+        "Events accumulate without time advancing (Zeno); give the model a mode in which the "
+        "contact sticks."
     )
     INTERRUPTED = "Interrupted by the user; the result is what was reached by then."
     MAX_STEPS = (
@@ -34,28 +34,28 @@ class Status(Enum):
     )
     MAX_ITERATIONS = "The maximum number of iterations was reached; give a better guess."
     TIME_LIMIT = (
-        "The time allowed was used up before the optimality conditions held; allow more of it or "
-        "start from what was found."
+        "The time limit was reached before the optimality conditions held; raise it or start "
+        "from this result."
     )
     NO_STEP = (
         "No step makes progress although the conditions do not hold: nearly dependent or badly "
         "scaled constraints, or a derivative that jumps, are near this point."
     )
     UNBOUNDED = (
-        "The unknowns grow without bound: no least cost was found where they are finite; bound the "
+        "The unknowns grow without bound: no finite minimum of the cost was found; bound the "
         "inputs or the states, or check the sign of the cost."
     )
     NO_DESCENT = (
-        "No step fits better, although the derivatives say that one should: this is no minimum; "
+        "No step improves the fit, although the derivatives predict one: this is not a minimum; "
         "start elsewhere or narrow the bounds."
     )
     DOUBTFUL = (
-        "The best fit of this model was found, but the residuals say that it does not explain the "
-        "data; use another model, or take the numbers with care."
+        "The best fit of this model was found, but the residuals show that it does not explain the "
+        "data; use another model, or use the values with care."
     )
     IMPLAUSIBLE = (
-        "The optimality conditions hold, but what was found cannot be meant: the record and what "
-        "is asked of it contradict each other."
+        "The optimality conditions hold, but the result is implausible: the record and the "
+        "requested fit contradict each other."
     )
     TERMINAL_MISS = (
         "The optimiser met its conditions, but the re-simulated control misses the target; "
@@ -66,13 +66,13 @@ class Status(Enum):
         "them; use more intervals, or a narrower bound."
     )
     UNSTABLE = (
-        "The motion is right from node to node, but it is unstable: the control alone, without "
-        "feedback, does not hold it; follow it by a controller."
+        "The motion is correct between nodes, but it is unstable: the control alone, without "
+        "feedback, does not hold it; track it with a controller."
     )
 
     @property
     def ok(self) -> bool:
-        """Whether the result can be used as it is."""
+        """True if the result can be used."""
         return self in (
             Status.SUCCESS,
             Status.TERMINATED,
@@ -83,7 +83,7 @@ class Status(Enum):
 
 
 class SolveError(RuntimeError):
-    """A solve failed; `status` says how, `partial` is what there is so far."""
+    """Failed solve; `status` gives the reason, `partial` the result so far."""
 
     def __init__(self, message: str, status: Status, partial: Any = None) -> None:
         super().__init__(message)
@@ -92,8 +92,8 @@ class SolveError(RuntimeError):
 
 
 class OverloadWarning(UserWarning):
-    """Friction above its static level, as of a bristle that does not relax."""
+    """Friction above its static level, for example of a bristle that does not relax."""
 
 
 class EnergyWarning(UserWarning):
-    """Friction that adds energy to the motion, as by a law whose force has the wrong sign."""
+    """Friction that adds energy to the motion, for example of a law with the wrong sign."""

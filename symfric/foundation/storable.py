@@ -126,7 +126,7 @@ def may_hold(path: str) -> bool:
 
 
 def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a class of ours, of the annotated types; missing ones have their defaults."""
+    """Return the checked fields of a symfric class, with defaults for missing ones."""
     known = {item.name: item for item in fields(kind)}
     for name, value in values.items():
         hint = _hint(kind, known.get(name), name)
@@ -142,7 +142,7 @@ def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _hint(kind: type, item: "Field[Any] | None", name: str) -> Any:
-    """The type of a field in a file, or of a cached property that is kept along with the fields."""
+    """Return the type of a field in a file, or of a cached property stored with the fields."""
     if item is not None:
         return item.metadata.get("packed", hints_of(kind)[name])
     if not isinstance(made := vars(kind).get(name), cached_property):
@@ -162,8 +162,8 @@ def hints_of(kind: Any) -> Mapping[str, Any]:
 def fits(value: Any, hint: Any) -> bool:
     """Return True if `value` is of the annotated type, down to the members of containers.
 
-    A float may be an int, an array has the annotated kind of numbers, and an object that stands
-    for a protocol has its methods. `Any` and type variables accept everything.
+    A float may be an int, an array must have the annotated number type, and an object for a
+    protocol must have its methods. `Any` and type variables accept everything.
     """
     origin, of = get_origin(hint), get_args(hint)
     kind = origin or hint
@@ -208,10 +208,10 @@ def _of_numbers(array: np.ndarray[Any, Any], of: tuple[Any, ...]) -> bool:
 
 
 def agree(what: str, *conditions: bool) -> None:
-    """Refuse an object out of a file whose fields contradict each other.
+    """Check that the fields of an object from a file are consistent.
 
     Raises:
         ValueError: one of the conditions is False.
     """
     if not all(conditions):
-        raise ValueError(f"{what}: expected fields that fit each other, got others")
+        raise ValueError(f"{what}: expected consistent fields, got contradictory ones")

@@ -1,11 +1,11 @@
-"""How curves look: colours that the colour-blind tell apart, and line styles for print in grey.
+"""Styles of curves: colours for colour-blind readers, and line styles for print in grey.
 
-The colours keep at least 25 CIELAB units between any two of them, as seen by normal eyes and with
-protanopia, deuteranopia and tritanopia, and a contrast of at least 3 against white paper; a test
-simulates it. The line style changes with the colour, so that curves differ in grey, too.
+The colours differ by at least 25 CIELAB units, as seen with normal vision, protanopia, deuteranopia
+and tritanopia, and have a contrast of at least 3 against white paper; a test simulates it. The line
+style changes with the colour, so that curves also differ in grey.
 
-Nothing here changes the settings of Matplotlib: `symfric.foundation.panels` hands the colours to
-the axes it makes, and whoever draws curves to be told apart says `axis.plot(x, y, **line(k))`.
+This module does not change Matplotlib's settings: `symfric.foundation.panels` sets the colours of
+its axes, and curves that must differ are drawn by `axis.plot(x, y, **line(k))`.
 """
 
 from typing import Literal, TypedDict
@@ -29,10 +29,10 @@ MARKERS = "osD^vPX"
 """Markers of measured points, in this order."""
 
 QUIET = "0.6"
-"""Colour of data that stand behind a model."""
+"""Colour of data behind a model curve."""
 
 EDGE = "#1f1f1f"
-"""Colour of outlines, and of what is no curve."""
+"""Colour of outlines and of anything that is not a curve."""
 
 
 class Line(TypedDict):
@@ -43,22 +43,22 @@ class Line(TypedDict):
 
 
 def colour(k: int) -> str:
-    """Colour number `k`, from 0; they come round again."""
+    """Return colour number `k`, from 0, repeating cyclically."""
     return COLOURS[k % len(COLOURS)]
 
 
 def dash(k: int) -> Dash:
-    """Line style number `k`, from 0; they come round again."""
+    """Return line style number `k`, from 0, repeating cyclically."""
     return DASHES[k % len(DASHES)]
 
 
 def line(k: int, style: int | None = None) -> Line:
-    """Colour and line style of curve number `k`, from 0; the first 28 are all different.
+    """Return colour and line style of curve number `k`, from 0; the first 28 are all different.
 
-    With `style`, the line style has a number of its own, as where runs differ by it.
+    With `style`, the line style has a number of its own, for example if runs differ by it.
     """
     return {"color": colour(k), "linestyle": dash(k if style is None else style)}
 
 
 CYCLE = tuple(line(k) for k in range(len(COLOURS) * len(DASHES)))
-"""As many curves as differ, in colour or in line style."""
+"""Styles of all distinguishable curves."""

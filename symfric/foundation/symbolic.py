@@ -1,4 +1,6 @@
-"""Objects that stand for a symbol: CasADi takes them as it is, and arithmetic writes with it."""
+"""Objects that stand for a symbol: CasADi accepts them, and arithmetic with them gives
+expressions.
+"""
 
 import operator
 from collections.abc import Callable, Mapping
@@ -9,14 +11,14 @@ import casadi as ca
 import numpy as np
 
 EXPRESSIONS = (ca.SX, ca.MX, ca.DM, int, float, np.generic, np.ndarray)
-"""With what a comparison for equality is an expression."""
+"""Types whose comparison for equality with a symbol is an expression."""
 
 
 T = TypeVar("T")
 
 
 def plain(value: Any) -> Any:
-    """The symbol of what stands for one, also in a list, tuple or mapping; all else as it is."""
+    """Return the symbol of a symbolic object, also in a list, tuple or mapping; else the value."""
     if isinstance(value, Symbolic):
         return value.symbol
     if isinstance(value, Equality):
@@ -29,13 +31,13 @@ def plain(value: Any) -> Any:
 
 
 def take_symbols(given: object, *names: str) -> None:
-    """Put symbols into those fields of a frozen dataclass that hold what stands for one."""
+    """Replace symbolic objects in these fields of a frozen dataclass by their symbols."""
     for name in names:
         object.__setattr__(given, name, plain(getattr(given, name)))
 
 
 def with_symbols(given: T) -> T:
-    """A frozen dataclass as it is, or a copy with symbols in fields with what stands for one."""
+    """Return a frozen dataclass with symbols for its symbolic objects; itself if it has none."""
     known = {item.name: getattr(given, item.name) for item in fields(given)}  # pyright: ignore
     changed = {name: plain(value) for name, value in known.items() if _stands(value)}
     return replace(given, **changed) if changed else given  # pyright: ignore
@@ -48,19 +50,19 @@ def _stands(value: Any) -> bool:
 
 
 def _written(operate: Callable[..., Any], *operands: Any) -> Any:
-    """The expression that an operator makes of these operands."""
+    """Return the expression that an operator gives for these operands."""
     if any(isinstance(value, ca.MX) for value in operands):
         name = next(value.symbol for value in operands if isinstance(value, Symbolic))
         raise ValueError(
-            f"variable '{name}': expected SX or numbers beside it, got MX; models are written with "
-            "casadi.SX, and Opti takes them through model.function(...), flow or stepper"
+            f"variable '{name}': expected SX or numbers as operands, got MX; models are written "
+            "with casadi.SX, and Opti takes them through model.function(...), flow or stepper"
         )
     return operate(*map(plain, operands))
 
 
 @final
 class Condition(ca.SX):
-    """A comparison with a symbol, which Python's `if`, `and` and `max` cannot decide."""
+    """Comparison with a symbol, which Python's `if`, `and` and `max` cannot evaluate."""
 
     def __bool__(self) -> bool:
         if self.is_constant():
@@ -94,13 +96,13 @@ def _reflected(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
 
 
 class Symbolic:
-    """Something with an SX symbol; in equations it is that symbol.
+    """Object with an SX symbol; equations use that symbol.
 
         ca.sin(v),  ca.vertcat(s, v),  50 * s - v**2,  np.array([1.0, 2.0]) * v,  v > 0,  v == 0
 
-    are SX. Between two of these objects `==` says whether they are the same one, and is an
-    expression only where CasADi takes it, as in `ca.if_else(v == s, ...)`: so they are found in
-    tuples and may be keys.
+    are SX. Between two of these objects `==` is True if they are the same, and is an expression
+    only where CasADi uses it, as in `ca.if_else(v == s, ...)`; they can therefore be found in
+    tuples and used as keys.
 
     Raises:
         ValueError: an operator with MX on its other side.
@@ -150,7 +152,7 @@ class Symbolic:
 
 @final
 class Equality:
-    """`a == b` or `a != b` of two objects: a truth value, and an expression where CasADi asks."""
+    """Result of `a == b` or `a != b` of two objects: a bool, and an expression for CasADi."""
 
     __slots__ = ("a", "b", "compare")
 

@@ -1,6 +1,6 @@
-"""Signals in CSV files: a header that names columns and units, rows of numbers, SI out of it.
+"""Signals in CSV files: a header with column names and units, rows of numbers, results in SI.
 
-One reader for records to identify from and for inputs of a simulation.
+The reader serves both identification records and simulation inputs.
 """
 
 import csv
@@ -24,19 +24,19 @@ USUAL: Mapping[str, str] = {
     "m/s": "m/s, mm/s, um/s, µm/s", "N m": "N m, Nm, mN m, mNm, kN m, kNm",
     "rad": "rad, mrad, deg, °, rev", "rad/s": "rad/s, deg/s, rpm",
 }  # fmt: skip
-"""SI unit -> units that are usual for it, for messages; a column may have any of its dimension."""
+"""SI unit -> its usual units, for messages; a column may have any unit of its dimension."""
 
 
 @final
 @dataclass(frozen=True)
 class Column:
-    """A column that is looked for.
+    """Column to look for.
 
     Attributes:
-        names: what it may be called in the header, without or with its unit.
+        names: possible names in the header, without or with the unit.
         unit: SI unit of the result.
-        needed: whether it must be there.
-        assumed: whether a header without a unit means the SI unit.
+        needed: True if it is required.
+        assumed: True if a header without a unit means the SI unit.
     """
 
     names: Collection[str]
@@ -48,11 +48,11 @@ class Column:
 @final
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What was found.
+    """Columns that were found.
 
     Attributes:
         columns: name -> values in SI units, shape (n,).
-        first_row: row of the file that holds the first numbers; 0 where there are none.
+        first_row: row of the file with the first numbers; 0 if there are none.
     """
 
     columns: dict[str, Array]
@@ -60,10 +60,10 @@ class Table:
 
 
 def read_table(file: Path, wanted: Mapping[str, Column]) -> Table:
-    """The columns `wanted` of a CSV file.
+    """Return the columns `wanted` of a CSV file.
 
-    Comma, semicolon or tab separates the cells; numbers may have a decimal comma where commas do
-    not separate. Other columns are left out.
+    Comma, semicolon or tab separates the cells; numbers may have a decimal comma if commas are not
+    the separator. Other columns are ignored.
 
     Raises:
         ValueError: all problems of the header, or of the cells, at once, each with its place.
@@ -95,7 +95,7 @@ def _refuse(name: str, problems: Sequence[str]) -> None:
 
 
 def _rows(file: Path) -> tuple[Rows, str]:
-    """Non-empty rows with their number in the file, the header first, and what separates cells."""
+    """Return non-empty rows with their number in the file, the header first, and the separator."""
     if not file.exists():
         raise ValueError(f"read '{file}': expected a file, got nothing there; check the path")
     if not file.is_file():
@@ -125,7 +125,7 @@ def _rows(file: Path) -> tuple[Rows, str]:
 def _places(
     where: str, header: list[str], wanted: Mapping[str, Column]
 ) -> dict[str, tuple[int, float]]:
-    """Name -> index of its column and factor to SI."""
+    """Return name -> index of its column and factor to SI."""
     labels = [_label(cell) for cell in header]
     found: dict[str, tuple[int, float]] = {}
     problems: list[str] = []
@@ -157,7 +157,7 @@ def _places(
 
 
 def _factor(si: str, given: str) -> float | None:
-    """What numbers in the unit `given` are multiplied by to be in `si`; None for another unit."""
+    """Return the factor from the unit `given` to `si`; None for another dimension."""
     meant, wanted = parsed(given or "?"), parsed(si)
     if meant is None or wanted is None or meant.powers != wanted.powers:
         return 1.0 if given == si else None
@@ -165,13 +165,13 @@ def _factor(si: str, given: str) -> float | None:
 
 
 def _label(cell: str) -> tuple[str, str]:
-    """Name and unit of a header cell such as `x [mm]`."""
+    """Return name and unit of a header cell such as `x [mm]`."""
     match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
     return (match[1], match[2].strip().replace("μ", "µ")) if match else (cell, "")
 
 
 def _numbers(rows: Rows, index: int, decimal: str) -> tuple[Array, str]:
-    """One column as numbers, and a sentence about its first bad cell, if any."""
+    """Return one column as numbers, and a sentence about its first bad cell, if any."""
     values = np.full(len(rows), np.nan)
     for k, (number, row) in enumerate(rows):
         cell = row[index].strip() if index < len(row) else ""

@@ -1,8 +1,8 @@
-"""Units as text: one grammar for what is written, its size in SI, its dimension, its prefixes.
+"""Units as text: one grammar for their spelling, size in SI, dimension and prefixes.
 
-A product of symbols with prefixes and powers, `N s^2/m`, `kg m^2`, `1/(N m)`, `m s^-2`. Other ways
-to write the same are taken: `N*s/m`, `kg·m²`, `m/s/s`, `m/s2`, `N.m`, `Nm`. All factors behind a
-slash divide. Newtons stay newtons and radians radians, so that a torque is no energy.
+A unit is a product of symbols with prefixes and powers, `N s^2/m`, `kg m^2`, `1/(N m)`, `m s^-2`.
+Other spellings are accepted: `N*s/m`, `kg·m²`, `m/s/s`, `m/s2`, `N.m`, `Nm`. All factors after a
+slash divide. Newtons stay newtons and radians radians, so that a torque is not an energy.
 """
 
 from collections.abc import Iterable, Mapping
@@ -36,7 +36,7 @@ PREFIXED: Mapping[str, tuple[float, str]] = {
     "cal": (4.184, "J"), "Wh": (3600.0, "J"), "Ah": (3600.0, "C"), "VA": (1.0, "W"),
     "var": (1.0, "W"),
 }  # fmt: skip
-"""Symbols that take a prefix -> their size in SI units, and the unit of the SI that is meant."""
+"""Symbols that take a prefix -> their size in SI units, and that SI unit."""
 ALONE: Mapping[str, Mapping[str, float]] = {
     "1": {
         **dict.fromkeys(_COUNTS, 1.0),
@@ -56,10 +56,10 @@ ALONE: Mapping[str, Mapping[str, float]] = {
     "Pa": {"psi": 6894.757293168, "atm": 101325.0, "mmHg": 133.322387415},
     "degC": {"degC": 1.0}, "degF": {"degF": 5 / 9},
 }  # fmt: skip
-"""SI unit -> symbols of it without prefixes, and their size; what counts things is 1."""
+"""SI unit -> symbols of it without prefixes, and their size; units of counts are 1."""
 _ALONE = {name: (size, unit) for unit, names in ALONE.items() for name, size in names.items()}
 SPOKEN: Mapping[str, str] = {"u/min": "rpm", "r/min": "rpm"}
-"""Whole units that are no product of symbols."""
+"""Complete units that are not products of symbols."""
 WORDS: Mapping[str, str] = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "minute": "min", "minutes": "min",
@@ -74,7 +74,7 @@ WORDS: Mapping[str, str] = {
     "hz": "Hz", "pa": "Pa", "kpa": "kPa",
     "mpa": "MPa", "kn": "kN", "n": "N", "w": "W", "v": "V", "j": "J", "kgm": "kg m",
 }  # fmt: skip
-"""What people write instead, in lower letters, and the unit they mean."""
+"""Common words in lower case, and the unit they mean."""
 
 _SIGNS = (
     ("µ", "u"), ("μ", "u"), ("°C", "degC"), ("°F", "degF"), ("°", "deg"), ("Ω", "Ohm"),
@@ -85,28 +85,28 @@ _POWER = r"\^-?\d+(?:\.\d+)?|\^\(-?\d+(?:[./]\d+)?\)|\^[a-z]\b"
 _doubted: set[str] = set()
 
 _ORDER = ("kg", "N", "J", "V", "A", "K", "W", "", "rad", "m", "s")
-"""Symbols in the order in which a product is written; others stand in the place of ""."""
+"""Order of symbols in a written product; "" is the place of all others."""
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 DERIVED: Mapping[str, str] = {
     "N": "kg m/s^2", "J": "kg m^2/s^2", "W": "kg m^2/s^3", "Pa": "kg/(m s^2)", "Hz": "1/s",
     "V": "kg m^2/(s^3 A)", "C": "s A", "Ohm": "kg m^2/(s^3 A^2)",
 }  # fmt: skip
-"""Units of the SI in its base units."""
+"""Derived SI units in base units."""
 CELSIUS = "degC"
-"""The only unit of FMI that does not count from zero: 273.15 K."""
+"""Temperature unit of FMI with an offset: 273.15 K."""
 
 
 @final
 @dataclass(frozen=True)
 class Unit:
-    """A unit: numbers times `factor` are in the SI unit of these `powers` of symbols."""
+    """Unit: numbers times `factor` are in the SI unit of these `powers` of symbols."""
 
     factor: float
     powers: tuple[tuple[str, float], ...]
 
     @property
     def si(self) -> str:
-        """The SI unit as text."""
+        """SI unit as text."""
 
         def side(sense: int) -> list[str]:
             found = [(s, sense * power) for s, power in self.powers if sense * power > 0]
@@ -119,25 +119,25 @@ class Unit:
 
 
 def checked(where: str, unit: str, stacklevel: int = 4) -> str:
-    """`unit` as it is `written` here.
+    """Return `unit` in the spelling of `written`.
 
-    Warns of one that is none, once a unit, in the line that is `stacklevel` calls above.
+    An unknown unit warns, once per unit, at the line that is `stacklevel` calls above.
     """
     text = written(unit)
     if in_si(text) is None and text not in _doubted:
         _doubted.add(text)
         meant = nearest(text)
-        hint = f"write '{meant}'" if meant else "write '1' for what counts or has none"
+        hint = f"write '{meant}'" if meant else "write '1' for counts and pure numbers"
         message = f"{where}: expected a unit such as 'm/s' or 'N s/m', got '{unit}'; {hint}"
         warn(message, UserWarning, stacklevel=stacklevel)
     return text
 
 
 def turned(unit: str) -> str:
-    """The unit that `unit` becomes where a contact turns: m is rad, N is N m, kg is kg m^2.
+    """Return the rotary unit of a translational one: m is rad, N is N m, kg is kg m^2.
 
-    A law knows the slip in m/s and the force in N; about an axis the same numbers are rad/s and
-    N m. A unit that has rad or N m already stays.
+    A law has the slip in m/s and the force in N; about an axis the same numbers are rad/s and N m.
+    A unit that contains rad or N m already is unchanged.
     """
     if search(r"\brad\b|\bN m\b", unit):
         return unit
@@ -148,7 +148,7 @@ def turned(unit: str) -> str:
 
 @cache
 def written(text: str) -> str:
-    """A unit in the way it is written here: spaces between factors, `^` before powers."""
+    """Return a unit in symfric's spelling: spaces between factors, `^` before powers."""
     text = text.strip()
     for sign, plain in _SIGNS:
         text = text.replace(sign, plain)
@@ -161,7 +161,7 @@ def written(text: str) -> str:
 
 
 def _apart(word: str) -> str:
-    """`Nm` as `N m`, `kgm` as `kg m`; what is a symbol stays one."""
+    """Return `Nm` as `N m`, `kgm` as `kg m`; symbols are unchanged."""
     if _symbol(word) is None and (pair := fullmatch(r"([mkMu]?N|kg|V|A|W)([mcu]?m|s|h)(s?)", word)):
         return " ".join(part for part in pair.groups() if part)
     return word
@@ -169,10 +169,10 @@ def _apart(word: str) -> str:
 
 @cache
 def parsed(text: str) -> Unit | None:
-    """The unit that `text` means; None for what is no unit.
+    """Return the unit of `text`; None if it is not a unit.
 
-    Angles are radians, counts are 1, and degrees Celsius are as large as kelvins. A power that is a
-    letter is NaN.
+    Angles are radians, counts are 1, and degrees Celsius have the size of kelvins. A power given as
+    a letter is NaN.
     """
     plain = written(text)
     found, rest = _quotient(SPOKEN.get(plain.lower(), plain))
@@ -185,15 +185,15 @@ def parsed(text: str) -> Unit | None:
 
 
 def in_si(text: str) -> float | None:
-    """What a number in the unit `text` is multiplied by in SI units; None for what is no unit."""
+    """Return the factor from the unit `text` to SI units; None if it is not a unit."""
     found = parsed(text)
     return None if found is None else found.factor
 
 
 def exponents(text: str) -> dict[str, int] | None:
-    """Exponents of the base units that `text` is made of; None of what is no product of SI units.
+    """Return exponents of the base units of `text`; None if it is not a product of SI units.
 
-    A unit of another size, such as mm, has none, nor has a power that is no whole number.
+    A unit of another size, such as mm, has none, nor has a power that is not an integer.
     """
     unit, found = parsed(text), dict[str, int]()
     if unit is None or unit.factor != 1.0:
@@ -208,7 +208,7 @@ def exponents(text: str) -> dict[str, int] | None:
 
 
 def per_second(unit: str) -> str:
-    """The unit of a rate: m becomes m/s, m/s becomes m/s^2."""
+    """Return the unit of a rate: m becomes m/s, m/s becomes m/s^2."""
     numerator, slash, denominator = unit.partition("/")
     if not slash:
         return f"{numerator}/s"
@@ -222,7 +222,7 @@ _Size = tuple[float, dict[str, float]]
 
 
 def _quotient(text: str) -> tuple[_Size | None, str]:
-    """The size of a product with slashes, and what follows: a bracket that closes, or nothing."""
+    """Return the size of a product with slashes, and the rest: a closing bracket, or nothing."""
     size, powers, sense, text = 1.0, dict[str, float](), 1, text.strip()
     while text and text[0] != ")":
         if text[0] == "/":
@@ -238,7 +238,7 @@ def _quotient(text: str) -> tuple[_Size | None, str]:
 
 
 def _factor(text: str) -> tuple[_Size | None, str]:
-    """The size of one factor with its power, and what follows."""
+    """Return the size of one factor with its power, and the rest."""
     if text.startswith("("):
         size, text = _quotient(text[1:])
         if size is None or not text.startswith(")"):
@@ -255,7 +255,7 @@ def _factor(text: str) -> tuple[_Size | None, str]:
 
 
 def _raised(size: _Size, power: str) -> _Size | None:
-    """A size to a power; one that is a letter leaves SI units as they are."""
+    """Return a size to a power; a letter as power leaves SI units unchanged."""
     if power.isalpha():
         return (1.0, dict.fromkeys(size[1], float("nan"))) if size[0] == 1.0 else None
     above, _, below = power.partition("/")
@@ -281,7 +281,7 @@ def _symbol(text: str) -> _Size | None:
 
 
 def nearest(text: str) -> str:
-    """The unit that is meant by a text that is none; "" where nobody knows."""
+    """Return the unit probably meant by an invalid text; "" if unknown."""
     meant = sub(r"[A-Za-z]+", lambda word: _meant(word[0]), sub(r"[\[\]]", "", written(text)))
     meant = sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", sub(r"\s+per\s+", "/", meant))
     return written(meant) if in_si(meant) is not None else ""
@@ -300,14 +300,16 @@ SHOWN_WITH = (
 
 STEPS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LEAST, MOST = 0.08, 2e4
-"""Largest magnitudes that are written without a prefix."""
+"""Range of largest magnitudes that are written without a prefix."""
 
 CLOCKS = ((YEAR, "years"), (86400.0, "days"), (3600.0, "h"))
-"""What a long time is told in [s]; from three of them on, for hours from six."""
+"""Units of long times [s]; used from three of them on, hours from six."""
 
 
 def clock(times: ArrayLike) -> tuple[float, str]:
-    """A factor and the unit in which `times` [s], times the factor, are easily read on an axis."""
+    """Return a factor and a unit in which `times` [s], times the factor, are easily read on an
+    axis.
+    """
     t = np.asarray(times, dtype=float)
     span = float(np.ptp(t[np.isfinite(t)])) if np.isfinite(t).any() else 0.0
     for size, unit in CLOCKS:
@@ -317,10 +319,10 @@ def clock(times: ArrayLike) -> tuple[float, str]:
 
 
 def readable(unit: str, values: Iterable[ArrayLike]) -> tuple[float, str]:
-    """A factor and the unit in which `values` in `unit`, times the factor, are easily read.
+    """Return a factor and a unit in which `values` in `unit`, times the factor, are easily read.
 
-    As they are between 0.08 and 20000, where they all vanish, or where the unit takes no prefix;
-    beyond, their largest magnitude comes to lie between 0.08 and 80.
+    The unit is unchanged if the largest magnitude is between 0.08 and 20000 or zero, or if the unit
+    takes no prefix; otherwise the largest magnitude is scaled to between 0.08 and 80.
     """
     sizes = [np.abs(np.asarray(v, dtype=float)) for v in values]
     top = max((float(np.max(s[np.isfinite(s)], initial=0.0)) for s in sizes), default=0.0)

@@ -15,9 +15,9 @@ from symfric.foundation.symbolic import Symbolic, take_symbols
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Variable(Symbolic):
-    """A named scalar of a model: its symbol, unit and the numbers that belong to it.
+    """Named scalar of a model: its symbol, unit, start value, bounds.
 
-    Equations are written with it as with its symbol, see `Symbolic`:
+    It is used in equations like its symbol, see `Symbolic`:
 
         s, v = Variable("s", "m"), Variable("v", "m/s", start=0.1)
         Model("spring", x=(s, v), ode=ca.vertcat(v, -50 * s))
@@ -26,18 +26,17 @@ class Variable(Symbolic):
 
     Attributes:
         name: C identifier, such as x or theta_1.
-        unit: as text, SI where a law or a mechanism takes the variable; a text that is no unit is
-            warned of, with what may be meant.
+        unit: as text, SI in laws and mechanisms; an unknown unit warns and suggests a known one.
         symbol: SX symbol, shape (1, 1).
-        start: initial or default value; an expression in other symbols where it depends on them.
+        start: initial or default value; an expression in other symbols if it depends on them.
         nominal: typical magnitude; absolute tolerances and scalings are relative to it.
         lower, upper: bounds for optimisation and identification, and of a given parameter.
-        doc: what it is, in a few words.
-        kind: what it is among the signals of a model, see `symfric.model.kinds`.
+        doc: short description.
+        kind: type among the signals of a model, see `symfric.model.kinds`.
 
     Raises:
-        ValueError: no text as name or unit, a start that is no number or expression, a nominal that
-            is not above zero, bounds that are none.
+        ValueError: name or unit is not a text, start is not a number or expression, nominal is not
+            above zero, or invalid bounds.
     """
 
     name: str
@@ -74,12 +73,12 @@ class Variable(Symbolic):
         return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{said}>"
 
     def within(self, where: str, value: object) -> float:
-        """`value` as a finite number inside the bounds."""
+        """Return `value` as a finite number inside the bounds."""
         return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
 
 
 def take_si(where: str, given: object, *names: str) -> None:
-    """Put symbols into fields of a frozen dataclass that hold variables, which are in SI units.
+    """Replace variables, which must be in SI units, by symbols in fields of a frozen dataclass.
 
     Laws and mechanisms compute in SI: 50 mm/s would be taken for 50 m/s.
 
@@ -94,7 +93,7 @@ def take_si(where: str, given: object, *names: str) -> None:
 
 
 def check_si(where: str, value: object) -> None:
-    """Refuse a variable whose unit is known and not of the SI, such as mm/s; all else passes."""
+    """Check that a variable with a known unit is in SI units; other values pass."""
     size = units.in_si(value.unit) if isinstance(value, Variable) else None
     if isinstance(value, Variable) and size not in (None, 1.0):
         raise ValueError(
@@ -104,28 +103,30 @@ def check_si(where: str, value: object) -> None:
 
 
 def stacked(rows: Iterable[Scalar]) -> ca.SX:
-    """`rows` one below the other, SX (n, 1); no rows where there are none."""
+    """Return `rows` as a column, SX (n, 1), empty without rows."""
     return ca.vertcat(ca.SX(0, 1), *rows)
 
 
 def symbols_of(variables: Iterable[Variable]) -> ca.SX:
-    """Their symbols, SX (n, 1)."""
+    """Return their symbols, SX (n, 1)."""
     return stacked(v.symbol for v in variables)
 
 
 def starts_of(variables: Iterable[Variable]) -> ca.SX:
-    """Their start values, SX (n, 1); expressions where they depend on other symbols."""
+    """Return their start values, SX (n, 1); expressions if they depend on other symbols."""
     return stacked(v.start for v in variables)
 
 
 def at_start(expression: Scalar, variables: Sequence[Variable]) -> ca.DM:
-    """Its numbers where `variables`, the only symbols in it, have their start values."""
+    """Return the value of `expression` with `variables`, its only symbols, at their start
+    values.
+    """
     starts = ca.SX(starts_of(variables))
     return ca.DM(ca.substitute(ca.SX(expression), symbols_of(variables), starts))
 
 
 def strays(expression: Scalar, known: ca.SX) -> list[str]:
-    """Names of the symbols in `expression` that are not among `known`, each once."""
+    """Return the names of symbols in `expression` that are not among `known`, each once."""
     declared = {symbol.__hash__() for symbol in ca.symvar(known)}
     found = (str(s) for s in ca.symvar(ca.SX(expression)) if s.__hash__() not in declared)
     return list(dict.fromkeys(found))

@@ -1,14 +1,14 @@
-"""Vectors that go through the expressions of a scalar law: what changes sign has a direction.
+"""Vectors in the expressions of a scalar law: quantities that change sign have a direction.
 
-A quantity of a law either changes sign when the motion is mirrored (v, deflections, forces) or it
-does not (N, ages, levels). In a plane or in space the first are vectors, the second numbers:
+A quantity of a law either changes sign when the motion is mirrored (v, deflections, forces) or does
+not (N, ages, levels). In a plane or in space the first are vectors, the second numbers:
 
     number * vector = vector         vector + vector = vector
-    vector * vector = number, a.b    vector + number: none, the law has no isotropic form
+    vector * vector = number, a.b    vector + number: error, the law has no isotropic form
     odd f(a) = f(|a|) a/|a|          even f(a) = f(|a|)
 
-On vectors of one line this is the arithmetic of their components, and it knows no axes: a law
-evaluated with vectors is the scalar law in straight slip of any direction, and turns with its
+On collinear vectors this is the arithmetic of their components, and it does not depend on axes: a
+law evaluated with vectors is the scalar law in straight slip of any direction, and rotates with its
 arguments. Only products of three vectors depend on their order.
 """
 
@@ -17,27 +17,27 @@ from typing import Any, final
 
 Scalar = Any
 Vectors = Any
-"""A `Vector`, or a number."""
+"""`Vector`, or a number."""
 
 ODD = frozenset({"sin", "tan", "tanh", "atan", "asin", "asinh", "erf"})
 EVEN = frozenset({"cos"})
 ROUND = 1e-6
-"""Smoothing of the length of a vector without unit; what is odd errs by its square."""
+"""Smoothing of the length of a unitless vector; odd functions err by its square."""
 TINY = 1e-30
-"""Smoothing of a length whose kink is wanted: keeps derivatives at zero finite."""
+"""Smoothing of a length whose kink is intended: keeps derivatives at zero finite."""
 
 
 class NotIsotropicError(TypeError):
-    """An expression that treats a vector as a number."""
+    """Expression that treats a vector as a number."""
 
 
 @final
 class Vector:
-    """A vector as the list of its components, each a number of any kind.
+    """Vector as the list of its components, each a number of any type.
 
     Attributes:
         parts: components.
-        turn: width over which `along` goes from unloading to loading, carried to all results.
+        turn: width over which `along` goes from unloading to loading, passed on to all results.
     """
 
     __slots__ = ("parts", "turn")
@@ -48,20 +48,20 @@ class Vector:
         self.parts, self.turn = parts, turn
 
     def dot(self, other: "Vector") -> Scalar:
-        """The scalar product."""
+        """Return the scalar product."""
         return sum(a * b for a, b in zip(self.parts, other.parts, strict=True))
 
     def length(self, width: Scalar) -> Scalar:
-        """Smooth length, sqrt(a.a + width^2)."""
+        """Return the smooth length, sqrt(a.a + width^2)."""
         return (self.dot(self) + width * width) ** 0.5
 
     def odd(self, f: Callable[[Scalar], Scalar], width: Scalar) -> "Vector":
-        """f(|a|) a/|a| of an odd function, the length smooth over `width`."""
+        """Return f(|a|) a/|a| of an odd function, with the length smoothed over `width`."""
         size = self.length(width)
         return f(size) / size * self
 
     def apply(self, f: Callable[[Scalar], Scalar], name: str) -> Vectors:
-        """The elementary function f; raises NotIsotropicError for one without parity."""
+        """Apply the elementary function f; raises NotIsotropicError for one without parity."""
         if name in ODD:
             return self.odd(f, ROUND)
         if name in EVEN:
@@ -114,17 +114,17 @@ class Vector:
 
 @final
 class Rows(tuple[Vectors, ...]):
-    """A column some of whose rows are vectors."""
+    """Column with vectors in some rows."""
 
     __slots__ = ()
 
     @property
     def shape(self) -> tuple[int]:
-        """The number of rows."""
+        """Number of rows."""
         return (len(self),)
 
 
 def no_vector(what: str, *values: Vectors) -> None:
-    """Refuse vectors where a function needs numbers."""
+    """Raise an error for vectors where a function needs numbers."""
     if any(isinstance(value, Vector) for value in values):
         raise NotIsotropicError(f"{what} what has a direction")

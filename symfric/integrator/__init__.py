@@ -1,4 +1,4 @@
-"""Integration of a `Model` over time. Knows nothing of laws or mechanisms."""
+"""Integration of a `Model` over time, independent of laws and mechanisms."""
 
 from typing import TYPE_CHECKING
 

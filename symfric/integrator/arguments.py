@@ -1,4 +1,4 @@
-"""Checks that the doors of the integrator have in common."""
+"""Argument checks shared by the entry points of the integrator."""
 
 import warnings
 
@@ -16,22 +16,22 @@ from symfric.model import check_model as check_model
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5
-"""Above this relative tolerance whole stick phases may be lost without a sign of it."""
+"""Relative tolerance above which whole stick phases may be missed without notice."""
 BACKENDS = ("auto", "vm", "compiled")
-"""Engines: CasADi's virtual machine, the step as machine code, and whichever is faster."""
+"""Engines: whichever is faster, CasADi's virtual machine, and the step as machine code."""
 MOST_SAMPLES = 10**7
-"""Beyond these the times alone need gigabytes."""
+"""Limit of samples: beyond it the times alone need gigabytes."""
 
 
 def check_span(
     where: str, model: Model, t_start: float, t_end: float, rtol: float, stacklevel: int = 4
 ) -> tuple[float, float, float]:
-    """Start and end [s] and relative tolerance, that of the model's events at most.
+    """Check start and end [s] and relative tolerance, limited to that of the model's events.
 
-    Warns of a loose one, in the line that is `stacklevel` calls above this warning.
+    A loose tolerance warns at the line that is `stacklevel` calls above this function.
 
     Raises:
-        ValueError: no numbers, an empty span, a tolerance out of range.
+        ValueError: not numbers, an empty span, a tolerance out of range.
     """
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
     t_end = checks.number(f"{where}: t_end", t_end, unit="s")
@@ -44,25 +44,25 @@ def check_span(
 
 
 def warn_of_loose(where: str, rtol: float, stacklevel: int) -> None:
-    """Warn of a relative tolerance that is loose."""
+    """Warn of a loose relative tolerance."""
     if rtol > LOOSE:
         warnings.warn(
             f"{where}: rtol = {rtol:g} is above {LOOSE:g}; whole stick phases may be lost "
-            "without a sign of it, compare with a tighter run",
+            "without notice, compare with a tighter run",
             UserWarning,
             stacklevel=stacklevel,
         )
 
 
 def check_times(where: str, t_start: float, t_end: float, t_eval: ArrayLike) -> Array:
-    """`t_eval` as an array of increasing times inside the span."""
+    """Return `t_eval` as an array of increasing times inside the span."""
     return checks.times(f"{where}: t_eval", t_eval, t_start, t_end)
 
 
 def result_times(
     where: str, t_start: float, t_end: float, t_eval: ArrayLike | None, samples: int
 ) -> Array:
-    """Times of the result [s]: `t_eval`, or `samples` equally spaced ones."""
+    """Return the times of the result [s]: `t_eval`, or `samples` equally spaced ones."""
     samples = checks.count(f"{where}: samples", samples, least=2, most=MOST_SAMPLES)
     if t_eval is None:
         return np.linspace(t_start, t_end, samples)
@@ -70,7 +70,7 @@ def result_times(
 
 
 def check_flags(where: str, progress: object = None, **flags: object) -> None:
-    """Refuse what is no truth value, and a `progress` that cannot be called."""
+    """Check that flags are bool and that `progress`, if given, is callable."""
     for name, value in flags.items():
         if value is not True and value is not False:
             checks.flag(f"{where}: {name}", value)
@@ -87,7 +87,7 @@ def tolerances(
     max_steps: int | None,
     max_step: float | None = None,
 ) -> Tolerances:
-    """What a run has to meet.
+    """Return the checked tolerances and limits of a run.
 
     Args:
         where: for messages.
@@ -95,7 +95,7 @@ def tolerances(
         atol: in multiples of `nominal`; 0.1 rtol by default.
         nominal: typical magnitude of each state.
         event_tolerance: tolerance of event times [s].
-        max_steps: attempts allowed; None for as many as the pace of the run asks for.
+        max_steps: attempts allowed; None for as many as the progress rate of the run needs.
         max_step: longest step [s]; any by default.
     """
     relative = 0.1 * rtol if atol is None else checks.number(f"{where}: atol", atol, above=0.0)
@@ -111,19 +111,21 @@ def tolerances(
 def stopping(
     where: str, inputs: InputData, times: ArrayLike, t_start: float, t_end: float
 ) -> InputData:
-    """`inputs` with an end of a step at each of `times` [s]."""
+    """Return `inputs` with a step end at each of `times` [s]."""
     if (isinstance(times, tuple) and not times) or np.size(times) == 0:
         return inputs
     return inputs.stopping_at(checks.times(f"{where}: times", times, t_start, t_end))
 
 
 def another(method: Method) -> str:
-    """A formula that does not share the mistakes of `method`: one that iterates, or does not."""
+    """Return a formula that is unlike `method`: with an iteration instead of without, or vice
+    versa.
+    """
     return "rodas5p" if isinstance(method, Radau) else "radau5"
 
 
 def chosen(where: str, name: str, rtol: float) -> Method:
-    """The adaptive method of this name; "auto" is Rodas5P, and Radau5 at loose tolerances.
+    """Return the adaptive method of this name; "auto" is Rodas5P, and Radau5 at loose tolerances.
 
     Raises:
         ValueError: unknown name, or a method of fixed steps.
@@ -132,7 +134,7 @@ def chosen(where: str, name: str, rtol: float) -> Method:
     if name in METHODS and name not in ADAPTIVE:
         raise ValueError(
             f"{where}: method: expected one with error control, one of {', '.join(ADAPTIVE)}, got "
-            f"{name}, which has fixed steps; it is for flow and for the C of plants"
+            f"{name}, which has fixed steps; use it with flow or in the C of plants"
         )
     automatic = "radau5" if rtol > LOOSE else "rodas5p"
     return ADAPTIVE[automatic if name == "auto" else name]

@@ -1,21 +1,22 @@
-"""Simulate a model with an integrator of others, as a second opinion.
+"""Simulate a model with CasADi's own implicit integrators, as an independent check.
+
+The integrators are rosenbrock and SUNDIALS' cvodes and idas.
+
+Mechanisms are integrated in the form of index 1, whose constraints drift, or with idas in the
+stabilised form of index 2 ("ggl"). Nothing is projected: the norms of the constraints among the
+results show the drift.
 
 The stabilised form of a mechanism has positions and velocities on the constraints:
 
     q' = q_rate + phi_q' eta,   M a + phi_q' lam = Q,   phi(q) = 0,   phi_q q_rate = 0
 
 The accelerations a, the multipliers lam and eta and the normal forces are algebraic unknowns; eta
-is zero along the exact solution. The form of index 1 holds phi_q a + gamma = 0 alone, so that
-constraints drift away under it.
+is
+zero along the exact solution. The form of index 1 enforces only phi_q a + gamma = 0, so constraints
+drift.
 
 Limits: of index 2, so the methods of this package, which take index 1, do not apply.
 Source: Gear, Leimkuhler, Gupta, J. Comput. Appl. Math. 12-13, 1985.
-
-CasADi's own implicit integrators as a second opinion: rosenbrock, SUNDIALS' cvodes and idas.
-
-Mechanisms are integrated in the form of index 1, whose constraints drift, or with idas in the
-stabilised form of index 2 ("ggl"). Nothing is projected: the norms of the
-constraints among the results show what each of them makes of it.
 """
 
 from __future__ import annotations
@@ -55,16 +56,16 @@ from symfric.results.trajectory import Trajectory
 
 
 def stabilised(system: System) -> System:
-    """`system` with multipliers eta as last unknowns and the constraints on two levels.
+    """Return `system` with multipliers eta as last unknowns and the constraints on two levels.
 
     Raises:
-        ValueError: it is no mechanism.
+        ValueError: it is not a mechanism.
     """
     manifold = system.manifold
     if manifold is None:
         raise ValueError(
-            "simulate_by_peer: expected rosenbrock or sundials for a model that is no mechanism, "
-            "got ggl"
+            "simulate_by_peer: expected rosenbrock or sundials for a model that is not a "
+            "mechanism, got ggl"
         )
     n, m = manifold.n, manifold.m
     eta = ca.SX.sym("eta", m)
@@ -88,19 +89,19 @@ PEERS = ("sundials", "rosenbrock", "ggl")
 CHUNKS = 32
 COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
 STEPS_PER_INTERVAL = 100_000
-"""SUNDIALS would otherwise spend minutes in front of a singularity."""
+"""Limit of SUNDIALS, which would otherwise spend minutes before a singularity."""
 HINTS = {
     1: "look for a discontinuity or a NaN there, or loosen rtol",
     2: "its corrector seldom converges below rtol = 1e-8 in this form of index 2, loosen rtol; "
     "or look for a discontinuity there",
 }
-"""What to try when CasADi's integrator stops, by the index of the equations."""
+"""Advice if CasADi's integrator stops, by the index of the equations."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Peer:
-    """A system for `casadi.integrator`, its differential states scaled by nominal values."""
+    """System for `casadi.integrator`, its differential states scaled by nominal values."""
 
     system: System
     inputs: InputData
@@ -111,7 +112,7 @@ class Peer:
     index: int = 1
 
     def over(self, grid: Array, y: Array | None = None) -> tuple[ca.Function, Array]:
-        """Integrator from grid[0] over grid[1:], and the input data for it.
+        """Return the integrator from grid[0] over grid[1:], and the input data for it.
 
         Args:
             grid: times [s].
@@ -135,11 +136,13 @@ class Peer:
         return solver, self.inputs.values[:, first]
 
     def _begin(self, grid: Array, y: Array, data: Array) -> dict[str, Any]:
-        """A start that spares idas a search for consistent values, which index 2 makes singular."""
+        """Return start options for idas, whose search for consistent values is singular with
+        index 2.
+        """
         rates, nominal = rates_of(self.system)
         f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
-        # its own guess of a first step is so long that tight tolerances are never met
+        # its own first step is so long that tight tolerances are never met
         return {
             "init_xdot": slope.tolist(),
             "step0": first_step(float(grid[-1] - grid[0])),
@@ -147,7 +150,7 @@ class Peer:
 
 
 def rates_of(system: System) -> tuple[list[int], Array]:
-    """Which unknowns are differential states, and their nominal values."""
+    """Return the rows of the differential states, and their nominal values."""
     still = {*system.algebraic[1], *(system.manifold.basis if system.manifold else ())}
     rates = [i for i in range(system.n) if i not in still]
     nominal = np.ones(system.n)
@@ -156,16 +159,16 @@ def rates_of(system: System) -> tuple[list[int], Array]:
 
 
 def peer(system: System, inputs: InputData, p: Array, tolerances: Tolerances, name: str) -> Peer:
-    """Semi-explicit DAE of `system` for CasADi, with time as its own variable.
+    """Return the semi-explicit DAE of `system` for CasADi, with time as its own variable.
 
     Args:
-        system, inputs, p, tolerances: what is integrated, and how well.
-        name: "sundials" (cvodes, or idas where there are algebraic unknowns), "rosenbrock" or
-            "ggl", which is idas on the stabilised form of index 2.
+        system, inputs, p, tolerances: equations and data of the run.
+        name: "sundials" (cvodes, or idas if there are algebraic unknowns), "rosenbrock" or "ggl",
+            which is idas on the stabilised form of index 2.
 
     Raises:
-        ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for
-            what is no mechanism.
+        ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for a
+            model that is not a mechanism.
     """
     if name == "ggl":
         system = stabilised(system)
@@ -213,7 +216,7 @@ def integrate_by_peer(
     tolerances: Tolerances,
     name: str,
 ) -> tuple[Run, dict[str, int]]:
-    """Integrate with CasADi over `times`; a failure keeps what came before it."""
+    """Integrate with CasADi over `times`; a failure keeps the results before it."""
     problem = peer(system, inputs, p, tolerances, name)
     (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
     y = consistent(system, "simulate_by_peer", y0, np.concatenate([p, inputs.values[:, 0]]))
@@ -230,7 +233,7 @@ def integrate_by_peer(
             result = solver(x0=found[rates, -1] / nominal, z0=found[columns, -1], p=p, u=data)
         except RuntimeError as error:
             if piece.size == grid.size - 1 > 1:
-                # again in pieces, so that everything before the failure is kept
+                # repeat in pieces to keep everything before the failure
                 pieces = np.array_split(piece, min(CHUNKS, piece.size))
                 continue
             last = [line for line in str(error).splitlines() if line.strip()][-1]
@@ -266,7 +269,7 @@ def _counts(solver: ca.Function) -> dict[str, int]:
 
 
 def _dense(system: System, inputs: InputData, p: Array, grid: Array, y: Array) -> Dense:
-    """Cubic interpolation of the rates' columns on the grid, linear of the algebraic ones."""
+    """Interpolate the columns with rates by cubics on the grid, the algebraic ones linearly."""
     if grid.size < 2:
         return Dense(grid, np.nextafter(grid, np.inf), y.T, y.T, np.zeros((1, 2, system.n)))
     d = np.vstack([np.tile(p[:, None], (1, grid.size)), inputs.values[:, inputs.interval(grid)]])
@@ -295,22 +298,23 @@ def simulate_by_peer(
 ) -> Trajectory:
     """Integrate `model` as `simulate` does, with one of CasADi's own integrators.
 
-    For comparisons: the constraints of mechanisms drift under them, they pass through friction that
-    jams without a sign of it, leap over friction peaks and pulses of inputs, and know no events.
+    It is meant for comparisons: the constraints of mechanisms drift, jamming friction goes
+    unnoticed,
+    friction peaks and pulses of inputs may be skipped, and events are not supported.
 
     Args:
         model: the equations; the mass matrix must be diagonal.
         t_end: last time [s].
-        peer: "sundials" is cvodes, or idas where there are algebraic variables; "rosenbrock" is
+        peer: "sundials" is cvodes, or idas if there are algebraic variables; "rosenbrock" is
             CasADi's Rosenbrock 5(4); "ggl" is idas with the constraints of a mechanism on positions
             and velocities (`stabilised`).
         t_start, x0, u, p, rtol, atol, t_eval, samples, max_steps, throw: as in `simulate`.
 
     Returns:
-        The trajectory. A failure keeps what came before it.
+        The trajectory. A failure keeps the results before it.
 
     Raises:
-        ValueError: bad input; events; coupled rates; "ggl" for what is no mechanism.
+        ValueError: bad input; events; coupled rates; "ggl" for a model that is not a mechanism.
         SolveError: the integration failed; its `partial` is the trajectory so far.
     """
     where = "simulate_by_peer"

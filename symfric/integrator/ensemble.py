@@ -1,4 +1,4 @@
-"""Many runs of one model: over arrays of parameters and start values, on one machine or many."""
+"""Many runs of one model over arrays of parameters and start values, local or on a cluster."""
 
 from __future__ import annotations
 
@@ -66,9 +66,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
 RESULTS = 2
-"""Raised whenever folders hold something else."""
+"""Format of the result folders, raised with every change."""
 CHUNK = 500
-"""Members of a task for processors."""
+"""Members of a CPU task."""
 
 
 def simulate_many(
@@ -98,52 +98,52 @@ def simulate_many(
 
     Args:
         model: the equations.
-        t_end: last time [s], or an array with that of each member.
+        t_end: last time [s], or an array with one per member.
         t_start: first time [s], common to all members.
         x0, p: start values and parameters by name: numbers, or arrays with an entry per member.
-        u: inputs by name, as `simulate` takes them, for all members; or an array with a number per
-            member; or `Hold` or `Linear` with values of shape (members, n), a row per member at
-            common times.
-        t_eval: times of the results [s]; NaN behind the end of a member. Default `t_end`, of each
-            member its own.
+        u: inputs by name, as in `simulate`, for all members; or an array with a number per member;
+            or `Hold` or `Linear` with values of shape (members, n), a row per member at common
+            times.
+        t_eval: times of the results [s]; NaN after the end of a member. By default the `t_end` of
+            each member.
         rtol, method, event_tolerance, max_steps, max_step, times: as in `simulate`; the absolute
-            tolerance is 0.1 rtol nominal, for each member as `simulate` has it by default.
-        backend: "compiled", "vm", or "auto": compiled where there is a compiler. Compiled members
-            run side by side in the lanes of vector instructions; exp, sin, pow, ... of vectors may
-            have another last digit than those of "vm" and `simulate`, and steps that stick and slip
-            then be a few more or less, within the tolerance. "cuda": on a graphics processor
-            through CuPy (extra 'cuda'), one member a thread, for ensembles of a hundred thousand
-            members and more; models without events, with the equations, steps, failures and counts
-            of the others, but for last digits. "auto" never chooses it, nothing replaces it.
+            tolerance is 0.1 rtol nominal, for each member with the defaults of `simulate`.
+        backend: "compiled", "vm", or "auto": compiled if there is a compiler. Compiled members run
+            in parallel in the lanes of vector instructions; the last digits of exp, sin, pow, ...
+            may differ from "vm" and `simulate`, and the number of steps with stick and slip by a
+            few, within the tolerance. "cuda": on a graphics processor through CuPy (extra 'cuda'),
+            one member per thread, for ensembles of a hundred thousand members and more; models
+            without events, with the same equations, steps, failures and counts as the others, up
+            to last digits. "auto" never chooses it, and there is no fallback.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
-            `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain
-            data and the C source, so a worker needs nothing but this package and, for compiled
-            code, a compiler. The task of a model with events holds the model, and each worker
-            builds its integrator once.
-        workers: number of threads or processes, or of the executor's workers; default all cores
-            of this machine. Twice as many chunks are under way at once.
-        chunk: members per task; default 500, on a graphics processor so many that an attempt of
-            all is a billion operations, or their results are a gigabyte.
+            `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain data
+            and the C source, so a worker needs only this package and, for compiled code, a
+            compiler. The task of a model with events holds the model, and each worker builds its
+            integrator once.
+        workers: number of threads or processes, or of the executor's workers; default all cores of
+            this machine. Twice as many chunks are in progress at once.
+        chunk: members per task; default 500, on a graphics processor so many that an attempt of all
+            is a billion operations, or their results are a gigabyte.
         real: "double", or with backend="cuda" "float", single precision: for rtol of 1e-5 and more
             (`symfric.integrator.cuda`).
-        out: folder that takes the results chunk by chunk, so that memory stays bounded; a call
-            with the same arguments resumes where an interrupted one stopped, once the checksums
-            of what is there are right.
+        out: folder for the results, written chunk by chunk, so that memory stays bounded; a call
+            with the same arguments resumes an interrupted one, after checking the checksums of
+            stored chunks.
         progress: called with the fraction done.
 
     Returns:
-        The ensemble. A member that fails is reported by number and does not disturb the others;
-        an interrupt (Ctrl-C) returns what is finished.
+        The ensemble. A member that fails is reported by number and does not affect the others; an
+        interrupt (Ctrl-C) returns the finished members.
 
     Raises:
         ValueError: bad input; arrays of different lengths.
-        SolveError: a worker process ended; its `partial` has the members that were finished.
-        RuntimeError: compiled code was asked for, and there is no compiler or it failed; or a
-            graphics processor, and there is none, or no CuPy.
+        SolveError: a worker process ended; its `partial` has the finished members.
+        RuntimeError: compiled code was requested without a working compiler, or a graphics
+            processor without a device or CuPy.
 
     Warns:
-        UserWarning: rtol above 1e-5, where stick phases may get lost; results in `out` that are
-            damaged, and computed again.
+        UserWarning: rtol above 1e-5, where stick phases may be missed; damaged results in `out`,
+            which are computed again.
         OverloadWarning: friction above its static level in some members (`Ensemble.doubtful`).
     """
     check_model("simulate_many", model)
@@ -201,7 +201,7 @@ def simulate_many(
 def _ensemble(
     model: Model, looks: Array, given: Members, store: Store, ended: BaseException | None
 ) -> Ensemble:
-    """The result, of as many members as there are."""
+    """Return the ensemble of the stored members."""
     units = {n: unit for n, unit in units_of(model).items() if n in (given.varied | given.fixed)}
     reach = {
         v.name: in_results(v.kind, ends)
@@ -224,7 +224,7 @@ def _ensemble(
 
 
 def _doubted(found: Ensemble, model: Model, given: Members) -> Ensemble:
-    """The result with what is doubtful of it, and one warning about all of that."""
+    """Return the result with its doubtful members, and issue one warning about all of them."""
     p = np.tile(model.values("p"), (given.count, 1))
     for k, v in enumerate(model.p):
         p[:, k] = given.p.get(v.name, p[:, k])
@@ -238,7 +238,7 @@ def _doubted(found: Ensemble, model: Model, given: Members) -> Ensemble:
 
 
 def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
-    """The error for a pool that lost a worker process."""
+    """Return the error for a pool that lost a worker process."""
     how = "the same call continues" if kept else "out=FOLDER keeps finished members"
     said = (
         f"simulate_many of '{found.scene}': a worker process ended after {done} of {len(found)} "
@@ -256,8 +256,8 @@ def _check(model: Model, backend: str, executor: object, real: str) -> None:
     checks.choice("simulate_many: real", real, REALS)
     if real != "double" and backend != CUDA:
         raise ValueError(
-            f"simulate_many: real: expected double, which is what processors compute in, got "
-            f"{real}; single precision is for backend='cuda'"
+            f"simulate_many: real: expected double for this backend, got "
+            f"{real}; single precision needs backend='cuda'"
         )
     if not isinstance(executor, str | Executor):
         what = f"one of {', '.join(EXECUTORS)} or a concurrent.futures.Executor"
@@ -280,14 +280,14 @@ def _points(integrator: Integrator, given: Members) -> tuple[tuple[Array, Array]
 @final
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """How chunks are solved.
+    """Method by which chunks are solved.
 
     Attributes:
-        job: what they share.
+        job: data shared by the chunks.
         prepare: members -> their chunk.
         solve: chunk -> its results.
-        chunk: members of a chunk where nobody says.
-        device: the graphics processor that does it; None for processors.
+        chunk: default number of members of a chunk.
+        device: the graphics processor used; None for CPUs.
     """
 
     job: Job
@@ -304,7 +304,7 @@ def _way(
     looks: Array,
     wanted: tuple[str, str, str | Executor],
 ) -> _Way:
-    """How the members are solved where `wanted` are a backend, a type and an executor."""
+    """Return the method to solve the members for a backend, a precision and an executor."""
     (backend, real, executor), most = wanted, allowed.max_steps
     model, inputs = integrator.model, given.inputs
     if backend == CUDA:
@@ -326,13 +326,13 @@ def _way(
 
 
 def _devices() -> Any:
-    from symfric.integrator.cuda import on_device  # noqa: PLC0415  (nobody else needs the emitter)
+    from symfric.integrator.cuda import on_device  # noqa: PLC0415  (only CUDA needs the emitter)
 
     return on_device
 
 
 def _job(make: Callable[[str, int], Job], backend: str, max_steps: int, here: bool) -> Job:
-    """What workers do; compiled before they begin if they are `here`, or each would do that."""
+    """Return the job of the workers; if they are `here`, it is compiled once before they start."""
     job = make(backend, max_steps)
     if here:
         try:
@@ -340,20 +340,20 @@ def _job(make: Callable[[str, int], Job], backend: str, max_steps: int, here: bo
         except CompileError:
             if backend == "compiled":
                 raise
-            job = make("vm", max_steps)  # a broken compiler is no reason not to simulate
+            job = make("vm", max_steps)  # simulate in the VM if the compiler is broken
     return job
 
 
 def _alone(
     integrator: Integrator, given: Members, pick: slice
 ) -> tuple[Array, Array, Array, Array]:
-    """Start values, parameters, input data and ends of members."""
+    """Return start values, parameters, input data and ends of members."""
     y, p = given.starts(integrator.system, pick)
     return y, p, given.data(pick), given.ends[pick]
 
 
 def _chunk(integrator: Integrator, given: Members, tolerances: Tolerances, pick: slice) -> Chunk:
-    """Start columns and run data of members, and their inputs and ends."""
+    """Return start columns and run data of members, and their inputs and ends."""
     y, p, data, ends = _alone(integrator, given, pick)
     t_start = float(given.inputs.breaks[0])
     S = np.ascontiguousarray(State.at(t_start, 0.0, y))
@@ -371,7 +371,7 @@ def _identity(
     given: Members,
     picks: dict[int, slice],
 ) -> str:
-    """Hash of everything that the results depend on, and of how they are cut in chunks."""
+    """Return a hash of everything that the results depend on, and of the division into chunks."""
     parts: list[Any] = [RESULTS, job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
     parts.append(tolerances.max_step)
     for event in integrator.model.events:

@@ -1,4 +1,4 @@
-"""A plant: a model that goes from sample to sample with its inputs held."""
+"""Plant: a model that advances from sample to sample with held inputs."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ Numbers = Mapping[str, ArrayLike]
 
 @final
 class Plant:
-    """A model that goes from sample to sample; made by `stepper`.
+    """Model that advances from sample to sample; made by `stepper`.
 
     Attributes:
         model: its equations.
         dt: interval [s].
-        failed: number of a plant that did not reach its sample -> why, after a `SolveError`.
+        failed: number of a plant that did not reach its sample -> reason, after a `SolveError`.
     """
 
     def __init__(
@@ -62,14 +62,14 @@ class Plant:
         self._use(integrator)
 
     def _use(self, integrator: Integrator) -> None:
-        """Go on with an integrator of the same equations."""
+        """Continue with an integrator of the same equations."""
         self._integrator, plants = integrator, self._plants
         try:
             self._advance = self._loop(integrator)
         except CompileError:
             if self._backend == "compiled":
                 raise
-            self._backend = "vm"  # a broken compiler is no reason not to go on
+            self._backend = "vm"  # continue in the VM if the compiler is broken
             self._advance = self._loop(integrator)
         signals = np.zeros((plants.S.shape[0], integrator.signals.numel_out(0)))
         self._looks, self._seen = Looks(integrator, plants, signals), False
@@ -79,7 +79,7 @@ class Plant:
         self._u: Array = plants.u[0] if one else plants.u
 
     def _loop(self, integrator: Integrator) -> Advance:
-        """What makes the plants go on."""
+        """Return the function that advances the plants."""
         vm, plants = self._backend == "vm", self._plants
         self._in_python = vm or integrator.crossings is not None
         if integrator.crossings is not None:
@@ -97,17 +97,18 @@ class Plant:
         """Hold inputs for `dt` and return the states at the end, shape (nx,) or (batch, nx).
 
         Args:
-            u: inputs in the order of the model, shape (nu,) or (batch, nu); a number where there is
-                one input and one plant; or by name, where a number serves for all plants and others
-                stay as they were. By default what was held last; at first, where those of the model
-                start.
+            u: inputs in the order of the model, shape (nu,) or (batch, nu); a number if there is
+            one
+                input and one plant; or by name, where a number applies to all plants and other
+                inputs keep their values. By default the inputs held last; at first, the start
+                values of the model.
 
         Raises:
-            ValueError: unknown names, another shape, no finite numbers; nothing has happened.
-            SolveError: a plant did not get to its sample; `failed` says which one and why, and
-                `partial` holds the states. `reset` it, or have it go on to that sample from where
-                it stands, with other inputs.
-            KeyboardInterrupt: Ctrl-C, before anything has happened; compiled code goes on first.
+            ValueError: unknown names, another shape, not finite; the plant is unchanged.
+            SolveError: a plant did not reach its sample; `failed` gives the plants and reasons, and
+                `partial` holds the states. Call `reset` for it, or `step` with other inputs, which
+                continues to that sample from its current time.
+            KeyboardInterrupt: Ctrl-C; the plant is unchanged. Compiled code finishes first.
         """
         if not self._in_python:
             return self._go(u)
@@ -141,18 +142,18 @@ class Plant:
         p: Numbers | None = None,
         members: Sequence[int] | None = None,
     ) -> Array:
-        """Put plants back to the start, with inputs where those of the model start.
+        """Put plants back to the start, with inputs at the start values of the model.
 
         Args:
-            x0: start values by name; the others start where the model says.
-            p: parameters by name; the others stay as they are.
+            x0: start values by name; the others start at the model's defaults.
+            p: parameters by name; the others keep their values.
             members: numbers of the plants; default all. Arrays in `x0` and `p` have an entry each.
 
         Returns:
             The states of all plants, as `step` does.
 
         Raises:
-            ValueError: unknown names, other lengths, no consistent start; nothing has happened.
+            ValueError: unknown names, other lengths, no consistent start; the plant is unchanged.
         """
         which = self._which(members)
         guesses, values = self._starts(
@@ -178,7 +179,7 @@ class Plant:
         return self._x.copy()
 
     def copy(self) -> Plant:
-        """A plant in the same state that goes its own way."""
+        """Return an independent plant in the same state."""
         plants = self._plants.copy()
         other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
         other._fresh, other.failed = dict(self._fresh), dict(self.failed)
@@ -219,8 +220,9 @@ class Plant:
 
     @property
     def terminated(self) -> Any:
-        """Whether a terminal event has ended the run of a plant, which stands there until `reset`;
-        with a batch of every plant, shape (batch,).
+        """True if a terminal event has ended the run of a plant; it then stays there until `reset`.
+
+        With a batch it is an array for all plants, shape (batch,).
         """
         over = self._plants.why == OVER
         return bool(over[0]) if self._batch is None else over
@@ -247,7 +249,7 @@ class Plant:
         return self._looks.values
 
     def _take(self, u: ArrayLike | Numbers) -> None:
-        """Write the inputs to hold next."""
+        """Store the inputs to hold next."""
         where, own = f"plant of '{self.model.name}': u", self._u
         if isinstance(u, Mapping):
             for name, value in self.model.named("u", u).items():
@@ -257,7 +259,7 @@ class Plant:
             self._write(where, own, u)
 
     def _write(self, where: str, place: Array, value: Any, common: bool = False) -> None:
-        """Write `value` to its `place`; `common` is a number for all plants."""
+        """Store `value` in its `place`; with `common` a number applies to all plants."""
         given = np.asarray(value)
         single = place.shape[-1] == 1 and given.shape == place.shape[:-1]
         if given.dtype.kind not in "fiub":
@@ -271,12 +273,12 @@ class Plant:
             raise ValueError(f"{where}: expected shape {place.shape}{or_}, got {given.shape}")
 
     def _hold_on(self) -> None:
-        """Forget what was to be held next."""
+        """Discard the inputs to hold next."""
         plants = self._plants
         plants.u[:] = plants.R[:, plants.R.shape[1] - plants.u.shape[1] :]
 
     def _settle(self) -> None:
-        """Let plants that have not moved yet start with the inputs that they are to hold."""
+        """Make the starts of new plants consistent with the inputs to hold."""
         plants, system = self._plants, self._integrator.system
         nu = plants.u.shape[1]
         if not np.isfinite(plants.u).all():
@@ -290,7 +292,7 @@ class Plant:
         self._fresh.clear()
 
     def _mend(self, short: int) -> None:
-        """Help the plants that did not get to their sample, and tell of those that cannot."""
+        """Resolve plants that did not reach their sample; raise an error for the others."""
         plants = self._plants
         if short == REFUSED:
             given = self._u.tolist()
@@ -315,7 +317,7 @@ class Plant:
             raise SolveError(which + message + more, status, self._x.copy())
 
     def _help(self, b: int) -> tuple[Status, str] | None:
-        """Have a plant go on, or say why it cannot."""
+        """Let a plant continue, or return why it cannot."""
         plants, system = self._plants, self._integrator.system
         t, y, d = plants.S[b, State.T], plants.S[b, State.Y], plants.R[b, Given.d(system.nx)]
         where = f"stepper '{self.model.name}' at t = {t:.9g} s"
@@ -330,13 +332,13 @@ class Plant:
                 return Status.SINGULAR, str(error)
         elif not self._found_pivots(y.copy(), d.copy()):
             status, message = explain(self._integrator, t, y, d, float(plants.S[b, State.H]))
-            plants.S[b] = State.at(t, plants.first_step(), y.copy())  # other inputs may help
+            plants.S[b] = State.at(t, plants.first_step(), y.copy())  # so that a retry can work
             return status, message.replace("simulate", "stepper", 1)
         plants.why[b] = AGAIN
         return None
 
     def _found_pivots(self, y: Array, d: Array) -> bool:
-        """Whether other pivots are sound where steps failed; they are used from now on."""
+        """Return True if other pivots are stable where steps failed; they are used from now on."""
         if len(self._places) > MOST_ORDERS:
             return False
         other = self._integrator.suited([*self._places, (y, d)], SAMPLES * self.dt)
@@ -347,7 +349,7 @@ class Plant:
         return True
 
     def _which(self, members: Sequence[int] | None) -> list[int]:
-        """Numbers of plants."""
+        """Return numbers of plants."""
         count = self._plants.S.shape[0]
         if members is None:
             return list(range(count))
@@ -359,7 +361,7 @@ class Plant:
         return found
 
     def _each(self, what: str, given: Numbers | None, which: list[int]) -> dict[str, Array]:
-        """Values by name, an entry for each of the plants `which`."""
+        """Return values by name, an entry for each of the plants `which`."""
         found: dict[str, Array] = {}
         for name, value in self.model.named(what, given).items():
             where = f"plant of '{self.model.name}': {what}: {name}"
@@ -376,7 +378,7 @@ class Plant:
     def _starts(
         self, x0: dict[str, Array], p: dict[str, Array], which: list[int]
     ) -> tuple[Array, Array]:
-        """Unknowns from which consistent ones are sought, and parameters, a row for each plant."""
+        """Return initial guesses of the unknowns, and parameters, a row for each plant."""
         plants, system, count = self._plants, self._integrator.system, len(which)
         own = plants.R[which, Given.d(system.nx)].T
         every = {v.name: own[i] for i, v in enumerate(self.model.p)} | p
@@ -389,7 +391,7 @@ class Plant:
         return y, values
 
     def _suit(self, which: list[int], guesses: Array) -> None:
-        """Use pivots that are sound at the start of the first plant."""
+        """Use pivots that are stable at the start of the first plant."""
         if which:
             d = self._plants.R[which[0], Given.d(self._integrator.system.nx)]
             suited = self._own.suited([(guesses[0], d.copy())], SAMPLES * self.dt)

@@ -1,7 +1,6 @@
 """Simulate a model: one call for every method and engine.
 
-Loops over parameters call with the same settings again and again, and a short run takes less time
-than the checks of its arguments.
+Checked settings are cached per model: checking the arguments takes longer than a short run.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ from symfric.results.trajectory import Trajectory
 Array = NDArray[np.float64]
 PLAIN: frozenset[type] = frozenset((float, int, bool, str, type(None)))
 REMEMBERED, MOST_TIMES = 16, 10_000
-"""Settings kept per model, the oldest goes first; and how many times of results one may have."""
+"""Settings cached per model (the oldest is dropped first), and the longest cached result grid."""
 
 
 @final
@@ -59,10 +58,10 @@ class Settings:
     """Checked settings of a model.
 
     Attributes:
-        t_start, t_end: span [s].
+        t_start, t_end: time span [s].
         formula: the method.
-        allowed: tolerances; its `atol` is that of the model's states.
-        times: of the result [s]; not to be handed out, others share them.
+        allowed: tolerances; `atol` is per state of the model.
+        times: times of the result [s]; shared between runs, so callers must copy it.
     """
 
     t_start: float
@@ -84,7 +83,7 @@ def settings(
     max_steps: int | None,
     max_step: float | None,
 ) -> Settings:
-    """Check how `simulate` is to run; arguments as there.
+    """Check the settings of `simulate` and return them, cached; arguments as there.
 
     Raises:
         ValueError: bad input.
@@ -96,7 +95,7 @@ def settings(
         t_start, t_end, rtol, atol, samples, method, event_tolerance, max_steps, max_step
     )  # fmt: skip
     known: dict[Hashable, Settings] = model.memory.setdefault("settings", {})
-    # 1.0 and True are equal, and only one of them is a time
+    # 1.0 and True are equal keys, but only 1.0 is a valid time
     key = (*asked, *map(type, asked))
     if not PLAIN.issuperset(key[len(asked) :]):
         return _checked(model, *asked)  # arrays and expressions of a number are numbers, no keys
@@ -131,13 +130,14 @@ def _checked(
 
 
 NOTHING = 1e-9
-"""Derivatives smaller than this in nominal values are rounding of none."""
+"""Derivatives below this, in nominal values, are treated as rounding of zero."""
 
 
 def difference(model: Model, one: Trajectory, other: Trajectory) -> float:
-    """Largest difference of a state over both runs, relative to its magnitude.
+    """Return the largest difference of a state over both runs, relative to its magnitude.
 
-    That is its nominal value, or its largest value where that is larger or tiny (`own_scale`).
+    The magnitude is its nominal value, or its largest value if that is larger or tiny
+    (`own_scale`).
     """
     n = min(one.t.size, other.t.size)
     worst = 0.0
@@ -152,14 +152,14 @@ def difference(model: Model, one: Trajectory, other: Trajectory) -> float:
 def differences_of_derivatives(
     model: Model, names: Sequence[str], one: Trajectory, other: Trajectory
 ) -> dict[str, float]:
-    """For each name, the largest difference of the derivative of a state over both runs.
+    """Return the largest difference of each derivative over both runs.
 
-    It is relative to the largest value of that derivative. Derivatives jump at events: where one
-    run has an event behind it that the other has still before it, they are not compared.
+    It is relative to the largest value of that derivative. Derivatives jump at events, so times at
+    which only one of the runs has passed an event are not compared.
 
     Returns:
-        Name -> relative difference; NaN for all of them where an event has no derivative, which
-        `Trajectory.sensitivities` then says.
+        Name -> relative difference; NaN for all of them if the derivative at an event is undefined
+        (`Trajectory.sensitivities` reports that).
     """
     try:
         found, finer = one.sensitivities, other.sensitivities
@@ -179,7 +179,9 @@ def differences_of_derivatives(
 
 
 def _on_the_same_side(one: Trajectory, other: Trajectory) -> NDArray[np.bool_]:
-    """Times of `one` with equally many events of both runs before; all where numbers differ."""
+    """Return True at times of `one` after equally many events of both runs; all True if totals
+    differ.
+    """
     times = [np.array([t for t, _ in run.happened]) for run in (one, other)]
     if times[0].size != times[1].size:
         return np.ones(one.t.size, dtype=bool)
@@ -216,68 +218,70 @@ def simulate(
         model: the equations; its events and monitored expressions are respected.
         t_end: last time [s].
         t_start: first time [s].
-        x0: start values of states by name; the others start where the model says (bristles in
+        x0: start values of states by name; the others start at the model's defaults (bristles in
             steady sliding).
         u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time,
             sampled at 8193 times and within its jumps to detect short pulses; list those in
             `times` that lie between two samples and leave no jump.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
-        atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol, and
-            for a motion of less than 1e-3 nominal that much of its own size, found by a first run.
-            Below 1e-12 nominal is rest.
-        t_eval: times of the result [s]; default `samples` equal intervals. They force no steps.
+        atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol. For
+            motions below 1e-3 nominal the default is scaled to the size of the motion, found by a
+            first run. Motion below 1e-12 nominal is treated as zero.
+        t_eval: times of the result [s]; default `samples` equally spaced. They force no steps.
         samples: number of equally spaced times.
-        method: which formula; the numbers are of Rabinowicz's stick-slip over 20 s.
-            "auto": rodas5p, and radau5 where rtol > 1e-5 or derivatives are asked for, then with
+        method: the formula; the numbers below refer to Rabinowicz's stick-slip over 20 s.
+            "auto": rodas5p, and radau5 if rtol > 1e-5 or if derivatives are requested, then with
             steps of at most half a law's width where it slides slowly.
             "rodas5p": order 5, the fewest steps at 1e-6 and below; error about rtol.
-            "rodas4p": order 4; steps cost 2/3, and grow more in number with tighter rtol.
-            "rodas3": order 3; for comparisons with plants in fixed steps.
-            "radau5": order 5, the most careful one: its iteration fails where a contact changes
-            within a step, so that no slip is lost even at rtol = 1e-3; error a tenth of rtol, for
-            1.5 to 2 times the steps. Between steps of order 4.
-            "dopri5": order 5, explicit, for ODEs that are not stiff: orbits, pendulums, contacts
-            that only slide, and mechanisms without friction from reactions, of which multipliers
-            have no error estimate. Bristles and sticking cost it 20 to 100 times the steps. No
-            cheap criterion proves an equation not to be stiff, so it is never chosen by itself.
+            "rodas4p": order 4; a step costs 2/3, but the number of steps grows faster with tighter
+            rtol.
+            "rodas3": order 3; for comparisons with fixed-step plants.
+            "radau5": order 5, the most robust one: its iteration fails if a contact changes
+            within a step, so no slip is missed even at rtol = 1e-3; error a tenth of rtol, for
+            1.5 to 2 times the steps. Order 4 between steps.
+            "dopri5": order 5, explicit, for non-stiff ODEs: orbits, pendulums, contacts that only
+            slide, and mechanisms without friction from reactions (their multipliers have no error
+            estimate). With bristles and sticking it needs 20 to 100 times the steps. "auto" never
+            chooses it, since no cheap test proves that an equation is not stiff.
         backend: the engine: "vm" needs no compiler; "compiled" compiles the step once and keeps
-            it in the user's cache; "auto" starts in the former, has the step compiled beside when
-            that is predicted to pay, and goes over to it, in this run or a later one, when it is
-            there. So do signals. Both give the same bits. Integrators of others have a door of
-            their own, `simulate_by_peer`.
+            it in the user's cache; "auto" starts in the VM, compiles the step in a background
+            thread if that is expected to save time, and switches to the compiled step once it is
+            available, in this run or a later one. Signals are handled the same way. Both give the
+            same bits. For third-party integrators see `simulate_by_peer`.
         event_tolerance: events this near [s] happen together; they are located to a thousandth of
             it, or to rounding.
         max_steps: attempts allowed. By default a run takes as many as it needs, unless the last
             10 million advance so little that a billion more would not reach `t_end`.
-        max_step: longest step [s]; none by default. For what error control cannot see coming: a
-            model with short events of its own, such as a function of time in its equations.
+        max_step: longest step [s]; none by default. For features that error control cannot detect
+            in advance: a model with short events of its own, such as a function of time in its
+            equations.
         times: increasing times [s] at which a step has to end.
-        sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
+        sensitivities: names of free parameters, and of start values as "x0.v"; the trajectory then
             gives the derivatives of all signals (`Trajectory.sensitivities`), gradients of sums of
             them (`Trajectory.gradient`) and those of event times
             (`Trajectory.event_sensitivities`), exact for the steps that were taken. Error control
-            sees states alone, and derivatives err by more: at rtol = 1e-6 by 1e-5 of their largest
-            value with smooth laws, by 1e-4 or 1e-3 of a peak where bristles let go or bearings are
-            relieved for a moment. A method that is named takes the steps of a run without
+            monitors states only, and derivatives have larger errors: at rtol = 1e-6, 1e-5 of their
+            largest value with smooth laws, 1e-4 or 1e-3 of a peak where bristles slip or bearings
+            are unloaded for a moment. A `method` given by name takes the same steps as without
             derivatives.
         measure_error: run again at rtol/100, by another formula in steps half as long, and report
-            the difference in the statistics, that of each of the `sensitivities`, too.
+            the difference in the statistics, also that of each of the `sensitivities`.
         progress: called with the fraction done every few tens of milliseconds.
         throw: raise `SolveError` on failure; with False the partial trajectory is returned.
 
     Returns:
-        The trajectory. An interrupt (Ctrl-C) returns it, too, with status INTERRUPTED.
+        The trajectory. An interrupt (Ctrl-C) also returns it, with status INTERRUPTED.
 
     Raises:
         ValueError: bad input.
         SolveError: the integration failed; its `partial` is the trajectory so far.
 
     Warns:
-        UserWarning: rtol above 1e-5, where stick phases may get lost.
-        OverloadWarning: friction above its static level, as of a bristle that does not relax. The
-            run ended well all the same; its `doubts` say where.
-        EnergyWarning: friction that adds energy to the motion, as by a law of the wrong sign.
+        UserWarning: rtol above 1e-5, where stick phases may be missed.
+        OverloadWarning: friction above its static level, for example from a bristle that does not
+            relax. The run is still returned; its `doubts` give the contact and the time.
+        EnergyWarning: friction that adds energy to the motion, for example a law of the wrong sign.
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
@@ -348,7 +352,9 @@ def _solve(
     build_time: float,
     times: Array,
 ) -> tuple[Run, Integrator, Callable[[], Statistics]]:
-    """Run the chosen engine; what came of it, the integrator it ended with, what it took."""
+    """Run the selected engine; return the run, the last integrator and a function for
+    statistics.
+    """
     compiled_before, begin = integrator.compile_time, perf_counter()
     run, own = integrate(integrator, inputs, y0, p, allowed, backend, progress, times)
     compile_time = integrator.compile_time - compiled_before

@@ -1,4 +1,4 @@
-"""A model from sample to sample: as a plant for control loops, and as a differentiable Function."""
+"""Step a model from sample to sample: plants for control loops, and differentiable flow maps."""
 
 from __future__ import annotations
 
@@ -39,39 +39,39 @@ def stepper(
     max_steps: int = 100_000,
     max_step: float | None = None,
 ) -> Plant:
-    """A plant of `model` that holds its inputs for `dt` [s] at a time.
+    """Return a plant of `model` that holds its inputs for `dt` [s] at a time.
 
         plant = stepper(drive(LuGre()), dt=1e-3)
         x = plant.step({"force": 2.0})      # or plant.step(2.0), plant.step([2.0])
         plant.t, plant["friction"]
 
-    Adaptive steps of the method of `simulate` lie inside an interval, so that results are accurate
-    whatever `dt` is; a step ends at every sample, and the memory of the step size goes on to the
-    next interval. The numbers are those of one `simulate` over `Hold` samples at k dt, to the bit
-    where that has 1000 intervals (its first step depends on the span), sound pivots and motions
-    that are not tiny (`simulate` runs those again with an `atol` of their own).
+    Adaptive steps of the method of `simulate` are made inside an interval, so results are accurate
+    for any `dt`; a step ends at every sample, and the step size control continues in the next
+    interval. The numbers equal those of one `simulate` over `Hold` samples at k dt. They agree bit
+    for bit if that run has 1000 intervals (its first step depends on the span), stable pivots, and
+    motions that are not tiny (`simulate` repeats those with a smaller `atol`).
 
     Args:
-        model: the equations. Events happen inside the intervals; plants with events go one after
-            the other, and each costs some tens of microseconds more.
+        model: the equations. Events happen inside the intervals; plants with events advance one
+            after the other, and each costs some tens of microseconds more.
         dt: interval [s] between samples.
         t_start: time [s] of the start.
         x0, p: start values and parameters by name, as in `simulate`; with `batch` arrays, too.
-        batch: number of plants that go together, all by one call; then inputs, states and signals
-            have a row for each plant. Compiled, eight and more go side by side in vector lanes,
-            three to four times faster: the same as each alone but for rounding, and to the bit
-            whoever is beside it.
+        batch: number of plants that advance together in one call; inputs, states and signals then
+            have a row for each plant. Compiled, eight and more run in parallel in vector lanes,
+            three to four times faster: the results equal those of a single plant up to rounding,
+            and do not depend on the other plants.
         rtol, atol, method, event_tolerance, max_step: as in `simulate`.
-        backend: "compiled", "vm", or "auto": compiled (once, kept in the user's cache) where there
-            is a compiler.
+        backend: "compiled", "vm", or "auto": compiled (once, kept in the user's cache) if there is
+            a compiler.
         max_steps: attempts allowed in one interval.
 
     Raises:
         ValueError: bad input; no consistent start.
-        CompileError: compiled code was asked for, and there is no compiler or it failed.
+        CompileError: compiled code was requested without a working compiler.
 
     Warns:
-        UserWarning: rtol above 1e-5, where stick phases may get lost.
+        UserWarning: rtol above 1e-5, where stick phases may be missed.
     """
     where = "stepper"
     check_model(where, model)
@@ -81,7 +81,7 @@ def stepper(
     formula = chosen(where, method, rtol)
     checks.choice(f"{where}: backend", backend, BACKENDS)
     members = 1 if batch is None else checks.count(f"{where}: batch", batch)
-    # as held samples, each input is one number of the run data
+    # as held samples, each input is one entry of the run data
     inputs = input_data(model, {v.name: float(v.start) for v in model.u}, t_start, t_end)
     integrator, _ = built(model, inputs, formula)
     allowed = tolerances(
@@ -96,7 +96,7 @@ def stepper(
 def _plants(
     integrator: Integrator, members: int, dt: float, t_start: float, allowed: Tolerances
 ) -> Plants:
-    """Plants that have no start yet."""
+    """Return plants without a start."""
     model, system = integrator.model, integrator.system
     u = np.tile(model.values("u"), (members, 1))
     d = np.hstack([np.tile(model.values("p"), (members, 1)), u])
@@ -112,20 +112,20 @@ def _plants(
 
 
 def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Function:
-    """The flow of a model as a CasADi Function (x0, u, p, T) -> xf, for the user's own NLP.
+    """Return the flow of a model as a CasADi Function (x0, u, p, T) -> xf, for the user's own NLP.
 
         xf = x(T),   x(0) = x0,   u and p constant
 
-    `steps` equal steps of the method; derivatives of any order by CasADi, exact for the discrete
-    map. Time in the equations counts from 0. Algebraic variables start where their equations hold,
-    by Newton's method from their start values. Compare a result with `simulate`: fixed steps have
-    no error control, and do not see friction that jams.
+    It makes `steps` equal steps of the method; CasADi gives derivatives of any order, exact for the
+    discrete map. Time in the equations counts from 0. Algebraic variables start where their
+    equations hold, by Newton's method from their start values. Compare a result with `simulate`:
+    fixed steps have no error control, and do not detect friction that jams.
 
     Args:
         model: explicit or implicit model without events.
         steps: number of steps; choose it so that h = T/steps resolves the transition velocity.
         method: as in `simulate`, or one of fixed steps: "backward_euler" (order 1, stays bounded
-            where h resolves nothing), "exponential" (order 1, one evaluation).
+            if h resolves nothing), "exponential" (order 1, one evaluation).
 
     Raises:
         ValueError: unknown method, events, fewer than one step.
@@ -136,7 +136,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
     if model.events:
         raise ValueError(
             f"flow: expected a model without events, got {len(model.events)} in '{model.name}'; "
-            "leave out events of your own, and use a smooth or bristle law"
+            "remove your own events, and use a smooth or bristle law"
         )
     u = model.vector("u")
     whole = system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
@@ -153,7 +153,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
 
 
 def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
-    """All unknowns at time 0, the algebraic ones consistent."""
+    """Return all unknowns at time 0, the algebraic ones consistent."""
     guess = first_guess(whole, model, np.zeros(whole.nx))[whole.nx :]
     y, free = ca.vertcat(x0, ca.DM(guess)), ca.DM(whole.free)
     if whole.manifold is not None:
@@ -168,7 +168,7 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
 
 
 def _on_constraints(whole: System, manifold: Manifold) -> ca.Function:
-    """(y, d) -> y on the constraints, with a basis of the tangent space where one is needed."""
+    """Return (y, d) -> y on the constraints, with a basis of the tangent space if needed."""
     y = ca.SX(manifold.project(whole.y, whole.d))
     if manifold.charted:
         phi = manifold.defect(whole.y, whole.d)[: manifold.m]

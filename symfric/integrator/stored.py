@@ -1,4 +1,4 @@
-"""The result of a run: a trajectory, and its data in files that last and in pickles."""
+"""Run results: the trajectory of a run, and its data for files and pickles."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ Slopes = dict[str, dict[str, Array]]
 
 @final
 class Later:
-    """The integrator of a stored run, built when something is asked that the file does not hold."""
+    """Integrator of a stored run, built only when needed for data that are not in the file."""
 
     def __init__(self, model: Model, inputs: InputData, method: str) -> None:
         self.model = model
@@ -39,7 +39,7 @@ class Later:
 
     @cached_property
     def now(self) -> Integrator:
-        """It, built."""
+        """Integrator, built on first use."""
         inputs, method = self._how
         return built(self.model, inputs, method)[0]
 
@@ -70,13 +70,13 @@ class Later:
 @final
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """What derivatives along stored steps need besides them.
+    """Data that derivatives along stored steps need in addition.
 
     Attributes:
-        which: by what a run is differentiated.
-        guess: unknowns from which consistent ones at the start were found.
+        which: names to differentiate with respect to.
+        guess: initial guess of the consistent start values.
         jumps: events that were carried out.
-        tolerance: how sharply they were located [s].
+        tolerance: of their location [s].
     """
 
     which: Seeds
@@ -88,7 +88,7 @@ class Basis:
         self, integrator: Integrator, steps: Dense, inputs: InputData, p: Array, backend: str,
         known: tuple[Array, Array],
     ) -> Path:  # fmt: skip
-        """The run; `known` are times of the result [s] and unknowns there."""
+        """Return the path of the run; `known` are times of the result [s] and unknowns there."""
         made = self.guess, self.jumps, self.tolerance, known
         return Path(integrator, steps, inputs, p, backend, *made)
 
@@ -96,20 +96,20 @@ class Basis:
 @final
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """A run as data.
+    """Run as data.
 
     Attributes:
-        model, inputs, p: what was run.
-        method: by which formula, a key of `METHODS`.
-        backend, engine: what evaluates signals, and what ran the steps.
+        model, inputs, p: of the run.
+        method: a key of `METHODS`.
+        backend, engine: for signals, and for the steps.
         steps: all accepted ones.
         times, reached: of the result, and the unknowns there.
         signals: at `times`, in the order of `Model.signals`.
         happened: (time [s], name) of every event.
-        status, message, statistics: how it ended, and what it took.
-        slopes, delays: derivatives at `times` and of the events, where they were asked for.
-        unable: why there are none although they were.
-        basis: what others need; None in files of the first format.
+        status, message, statistics: how it ended, and its cost.
+        slopes, delays: derivatives at `times` and of the events, if requested.
+        unable: reason if requested derivatives do not exist.
+        basis: data for other derivatives; None in files of the first format.
     """
 
     model: Model
@@ -136,7 +136,7 @@ class Stored:
         cls, integrator: Integrator, inputs: InputData, run: Run, p: Array, backend: str,
         trajectory: Trajectory, basis: Basis | None = None,
     ) -> "Stored":  # fmt: skip
-        """A run and its trajectory, with steps that are found again where there were too many."""
+        """Build from a run and its trajectory; steps that were not kept are recomputed."""
         stored = cls(
             integrator.model,
             inputs,
@@ -157,7 +157,7 @@ class Stored:
         return stored if trajectory.differentiate is None else stored._with_slopes(trajectory)
 
     def check_fields(self) -> None:
-        """Refuse a file whose arrays do not fit each other: compiled code does not look again."""
+        """Check that the arrays of a file match: compiled code does not check them again."""
         steps, inputs, model = self.steps, self.inputs, self.model
         (k, n), m = steps.y0.shape, self.times.size
         agree(
@@ -182,7 +182,7 @@ class Stored:
             return replace(self, unable=str(error))
 
     def unpacked(self) -> Trajectory:
-        """The run again."""
+        """Return the trajectory of the stored run."""
         found = self.reached.shape[1]
         run = Run(
             float(self.steps.t0[0]),
@@ -213,7 +213,7 @@ class Stored:
         return replace(made, **again, **self._derivatives(later, made.t))
 
     def _derivatives(self, later: Later, t: Array) -> dict[str, Any]:
-        """What gives derivatives: those at `t` are stored, others are found along the steps."""
+        """Return the derivative functions: those at `t` are stored, others use the steps."""
         if self.slopes is None and not self.unable:
             return {}
 
@@ -233,8 +233,8 @@ class Stored:
                 return known()
             if self.basis is None:
                 raise ValueError(
-                    f"trajectory of '{self.model.name}': expected derivatives at `t`, which are "
-                    "all that a file of the first format holds, got other times; simulate again"
+                    f"trajectory of '{self.model.name}': expected derivatives at `t`, since a file "
+                    "of the first format has no others, got other times; simulate again"
                 )
             return between(self.basis).at(at)
 
@@ -251,7 +251,7 @@ class Stored:
         return {"differentiate": differentiate, "pull_back": pull_back, "delays": delays}
 
     def _path(self, basis: Basis, integrator: Integrator) -> Path:
-        """The run as its derivatives see it, with pivots that are sound at its start and end."""
+        """Return the path of the run, with pivots that are stable at its start and end."""
         if integrator.has_pivots:
             d = [np.concatenate([self.p, self.inputs.values[:, k]]) for k in (0, -1)]
             ends = [(basis.guess, d[0]), (self.steps.y1[-1], d[1])]
@@ -274,18 +274,18 @@ RUN = Format("symfric run", 3, "load_run", "a saved run", Stored)
 def load_run(
     path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()
 ) -> Trajectory:
-    """Load the run that `run.save(path)` wrote, equal to the bit.
+    """Load the run that `run.save(path)` wrote, equal bit for bit.
 
     Reading runs no code from the file: it holds arrays, lists of elementary operations and fields
     of known classes, which are checked before use.
 
     Args:
         path: the file.
-        own: your classes in it, such as a law of yours.
+        own: your own classes in it, such as a law.
 
     Raises:
-        ValueError: no such file, one that something else wrote, a damaged one, one of another
-            format, or classes that are not known.
+        ValueError: no such file, a file of another program, a damaged one, another format, or
+            unknown classes.
     """
     return RUN.load(path, own).unpacked()
 
@@ -298,16 +298,16 @@ def trajectory_of(
     count: Callable[[], Statistics],
     backend: str = "vm",
 ) -> Trajectory:
-    """The trajectory of a run.
+    """Return the trajectory of a run.
 
     Args:
-        integrator, inputs, p: what was run.
-        run: what came of it; of the times of its outputs those that were reached.
-        count: what it took.
-        backend: what evaluates signals: "vm", else whatever is predicted to be fastest.
+        integrator, inputs, p: of the run.
+        run: its results; only output times that were reached are used.
+        count: returns the statistics.
+        backend: for signals: "vm", otherwise the engine that is expected to be fastest.
 
-    Foreign integrators let the constraints of mechanisms drift, and their results show it; ours
-    hold them to the tolerance between steps, and exactly at results.
+    Third-party integrators let the constraints of mechanisms drift, and their results show it;
+    symfric's methods hold them to the tolerance between steps, and exactly in results.
     """
     model, outputs = integrator.model, run.outputs
     names, drifts = model.signals, run.engine.startswith("casadi")
@@ -354,6 +354,6 @@ def trajectory_of(
         model,
         tuple(run.happened),
         keep=None
-        if isinstance(integrator, Later)  # it is stored already
+        if isinstance(integrator, Later)  # already stored
         else partial(Stored.of, integrator, inputs, run, p, backend),
     )

@@ -1,6 +1,6 @@
 """Friction laws as CasADi expressions: `force(v, N, z)` and `rate(v, N, z)`.
 
-Knows nothing of mechanisms, integration or optimisation; a law drops into any CasADi code.
+The laws are independent of mechanisms, integration and optimisation, and work in any CasADi code.
 """
 
 from typing import TYPE_CHECKING

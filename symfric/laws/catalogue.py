@@ -1,4 +1,4 @@
-"""Every law by the name that a user types, and the laws that a text names."""
+"""Catalogue of laws by name, and laws from text."""
 
 from re import fullmatch
 
@@ -78,17 +78,17 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
     "armstrong": dwell.Armstrong,
     "exact_coulomb": stick_slip.ExactCoulomb,
 }
-"""Every law with states that stands alone, by name."""
+"""Laws with states by name."""
 
 ALL_LAWS: dict[str, type[Law]] = {**STATIC_LAWS, **DYNAMIC_LAWS}
-"""Every law that stands alone, by name; the contract tests run over them."""
+"""All laws by name; the contract tests cover each of them."""
 
 
 POPULATIONS: dict[str, type[GenericAsperity | RandomBristles]] = {
     "generic_asperity": GenericAsperity,
     "random_bristles": RandomBristles,
 }
-"""References of many random contacts by name: figures and a force along a motion, no equations."""
+"""Populations of random contacts by name, as references: figures and a force along a motion."""
 
 ALIASES = {
     "bo_pavelescu": "stribeck",
@@ -103,7 +103,7 @@ ALIASES = {
     "dieterich_ruina": "rate_and_state",
     "haessig_friedland_bristles": "random_bristles",
 }
-"""Other names of the same law, as papers and programs use them."""
+"""Other names of laws in papers and programs."""
 
 WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDependent]] = {
     "load_dependent": LoadDependent,
@@ -111,15 +111,17 @@ WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDe
     "lagged": Lagged,
     "temperature_dependent": TemperatureDependent,
 }
-"""Laws around one law, by the name that stands before its parentheses."""
+"""Wrappers of one law, by the name before the parentheses."""
 
 
 DEEPEST = 20
-"""Laws in each other; deeper texts are no laws, and exhaust the stack."""
+"""Largest nesting depth of laws in a text; deeper texts would exhaust the stack."""
 
 
 def law_name(law: AnyLaw) -> str:
-    """The text that `any_from_text` turns into a law of this kind; the class name of your own."""
+    """Return the text from which `any_from_text` makes this law; the class name for other
+    classes.
+    """
     if not isinstance(law, Law | Population):  # pyright: ignore[reportUnnecessaryIsInstance]
         check_law("law_name", law)
     if isinstance(law, Sum):
@@ -134,17 +136,19 @@ def law_name(law: AnyLaw) -> str:
 
 
 def any_from_text(text: str) -> AnyLaw:
-    """The law or population with default parameters that `text` names; raises `law_from_text`'s."""
+    """Return the law or population with default parameters of this name; raises as
+    `law_from_text`.
+    """
     checks.text("law", text, "the name of a law, such as lugre")
     name = ALIASES.get(text.strip(), text.strip())
     return POPULATIONS[name]() if name in POPULATIONS else law_from_text(text)
 
 
 def law_from_text(text: str) -> Law:
-    """The law with default parameters that `text` names.
+    """Return the law with default parameters given by `text`.
 
-    `brown_mcphee`, another name of a law as `adams`, sums `coulomb+viscous`, wrappers
-    `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `load_normalised(lugre)`,
+    Examples are `brown_mcphee`, another name of a law such as `adams`, sums `coulomb+viscous`,
+    wrappers `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `load_normalised(lugre)`,
     `lagged(stribeck)` and `temperature_dependent(lugre)`.
 
     Raises:
@@ -167,7 +171,7 @@ def _single(term: str, text: str) -> Law:
     if name in POPULATIONS:
         raise ValueError(
             f"law '{text}': expected a law with equations, got {name}, a population of random "
-            "contacts; it has figures and `force(t, x, N)`; gms is the law next to it"
+            "contacts; it has figures and `force(t, x, N)`; the most similar law is gms"
         )
     if name in ("asymmetric", *WRAPPERS):
         raise ValueError(f"law '{text}': expected a law to wrap, as in {name}(stribeck), got none")
@@ -184,7 +188,7 @@ def _split_terms(text: str) -> list[str]:
         if depth < 0:
             break
         if depth > DEEPEST:
-            raise ValueError(f"{where}: expected at most {DEEPEST} laws in each other, got more")
+            raise ValueError(f"{where}: expected at most {DEEPEST} nested laws, got more")
         if letter == "+" and depth == 0:
             terms.append("")
         else:

@@ -1,4 +1,4 @@
-"""The one interface between those who write equations and those who solve them."""
+"""Models: the interface between equations and solvers."""
 
 from typing import TYPE_CHECKING
 

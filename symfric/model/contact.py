@@ -1,11 +1,11 @@
-"""Contacts with friction: where a model slides, what presses there, and its friction force.
+"""Contacts with friction: sliding velocity, normal force and friction force in a model.
 
 Equations written with the symbol of the friction force are closed by a law,
 
     F = law.force(slip, N, z),   z' = law.rate(slip, N, z)
 
-or by something else: another law, the force of sliding on one side, an unknown that holds the
-contact at rest. `Model.contacts` says where, `Model.open` has the forces as inputs, and
+or by another expression: another law, the force of sliding to one side, an unknown that keeps the
+contact sticking. `Model.contacts` lists them, `Model.open` has the forces as inputs, and
 `Model.with_forces` closes it again.
 """
 
@@ -28,11 +28,11 @@ from symfric.model.parts import Event, Monitor
 
 Variables = tuple[Variable, ...]
 APPLIED = "F_e"
-"""The applied force among the inputs of a law."""
+"""Name of the applied force among the inputs of a law."""
 
 
 class FrictionLaw(Protocol):
-    """What a model asks of a friction law; see `symfric.laws.Law`, which is one."""
+    """Interface of a friction law for models; `symfric.laws.Law` implements it."""
 
     @property
     def states(self) -> tuple[Any, ...]: ...  # noqa: D102
@@ -56,26 +56,26 @@ class FrictionLaw(Protocol):
 class Contact:
     """Friction at one place of a model, along one direction.
 
-    Write the equations with `force`, pass the contact to `Model(contacts=...)`: the model then
-    holds the law, with its states behind those of the model and its changes of mode as events.
+    Write the equations with `force`, and pass the contact to `Model(contacts=...)`: the model then
+    contains the law, with its states after those of the model and its changes of mode as events.
 
     Attributes:
         name: of its states and events, "<name>_<state>".
         slip: sliding velocity [m/s], a variable or an expression of the model, shape (1, 1).
-        N: normal force [N], an expression or an algebraic variable of the model; NaN where a
+        N: normal force [N], an expression or an algebraic variable of the model; NaN if a
             mechanism's law does not depend on it.
         law: any friction law of a scalar slip.
         given: further inputs of the law by name. The applied force F_e, if omitted, follows from
             the equations of the model.
-        rest: state of the model -> its value at which `slip` is exactly zero, which a law by modes
-            gives it when sliding ends; if omitted, the first state in which `slip` is linear.
-        states: variables for the states of the law; made, starting in steady sliding.
-        force: SX symbol of the friction force [N] that opposes the slip; made.
-        turning: the law is one of a rate [rad/s], and its force a moment [N m].
-        widths: what is smoothed beside the law: name -> parameter of `Model.open`, whose start
-            value is the number in the closed model. `JointFriction.eps` is one.
-        bare: states and events have the names of the law, without "<name>_"; None: if the model
-            has one contact.
+        rest: state of the model -> its value at which `slip` is exactly zero, set by a law with
+            modes when sliding ends; by default the first state in which `slip` is linear.
+        states: variables for the states of the law; created, starting in steady sliding.
+        force: SX symbol of the friction force [N] that opposes the slip; created.
+        turning: True if the law is one of a rate [rad/s], and its force a moment [N m].
+        widths: further smoothing widths: name -> parameter of `Model.open`, whose start value is
+            the number in the closed model. `JointFriction.eps` is one.
+        bare: True if states and events have the names of the law, without "<name>_"; None: True if
+            the model has one contact.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Contact:
         missing = [f"{n} ({doc})" for n, doc in known.items() if n not in (*self.given, APPLIED)]
         if missing:
             raise ValueError(
-                f"{where}: expected what {type(self.law).__name__} needs besides v and N, got no "
+                f"{where}: expected all inputs of {type(self.law).__name__}, got no "
                 f"{', '.join(missing)}; give it by name, as given={{...}}"
             )
         given = {name: self.given[name] for name in known if name in self.given}
@@ -121,7 +121,7 @@ class Contact:
         return f"<contact '{self.name}' by {type(self.law).__name__}{kept}>"
 
     def unit(self, of_sliding: str) -> str:
-        """A unit of the law: that of sliding, or of turning."""
+        """Return a unit of the law, of sliding or of turning."""
         return turned(of_sliding) if self.turning else of_sliding
 
     def called(self, name: str) -> str:
@@ -140,17 +140,17 @@ class Contact:
 
     @property
     def variable(self) -> Variable:
-        """The friction force as an input, "<name>_F"."""
+        """Friction force as an input, "<name>_F"."""
         return Variable(f"{self.name}_F", self.unit("N"), symbol=self.force, doc="friction force")
 
     @property
     def further(self) -> dict[str, Scalar]:
-        """What the law is given besides the applied force, for `sliding` and `static_level`."""
+        """Inputs of the law except the applied force, for `sliding` and `static_level`."""
         return {name: value for name, value in self.given.items() if name != APPLIED}
 
     @cached_property
     def friction(self) -> ca.SX:
-        """The friction force by the law [N]."""
+        """Friction force by the law [N]."""
         return self._of_law("force", 1)
 
     @cached_property
@@ -159,7 +159,7 @@ class Contact:
         return self._of_law("rate", len(self.states))
 
     def _of_law(self, what: str, rows: int) -> ca.SX:
-        """The force or the rates that the law returns, (rows, 1)."""
+        """Return the force or the rates by the law, (rows, 1)."""
         if any(i.name == APPLIED for i in self.law.inputs) and APPLIED not in self.given:
             raise checks.refused(
                 f"contact '{self.name}': {APPLIED}", "an applied force", None,
@@ -178,21 +178,21 @@ class Contact:
         return found
 
     def sliding(self, side: int) -> ca.SX:
-        """The force of sliding to one side as the widths of the law vanish [N]."""
+        """Return the force of sliding to one side in the limit of zero widths [N]."""
         return ca.SX(self.law.sliding(self.slip, self.N, side, **self.further))
 
     def static_level(self, side: int = 1) -> ca.SX:
-        """The largest force at rest against being pulled to one side [N]."""
+        """Return the largest force in stick against a pull to one side [N]."""
         return ca.SX(self.law.static_level(self.N, side, **self.further))
 
     @property
     def most_held(self) -> ca.SX:
-        """The largest force that the states of the law carry in any motion [N]."""
+        """Largest force that the states of the law carry in any motion [N]."""
         sides = [ca.SX(self.law.most_held(self.N, s, **self.further)) for s in (1, -1)]
         return ca.fmax(*sides)
 
     def events(self) -> tuple[Event, ...]:
-        """The changes of mode of the law."""
+        """Return the changes of mode of the law."""
         names = {s.name: v.name for s, v in zip(self.law.states, self.states, strict=True)}
         return tuple(
             Event(
@@ -208,9 +208,9 @@ class Contact:
         )
 
     def monitors(self, p: Sequence[Variable]) -> tuple[Monitor, ...]:
-        """What error control must watch: the sliding velocity, on the law's scale.
+        """Return the monitor of the sliding velocity, on the law's scale, for error control.
 
-        The scale follows `p`; a law without one, at the start values of `p`, adds nothing.
+        The scale follows `p`; a law without a scale at the start values of `p` has no monitor.
         """
         scale = self.law.velocity_scale
         return (Monitor(self.slip, scale),) if isfinite(float(at_start(scale, p))) else ()

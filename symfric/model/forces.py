@@ -1,4 +1,4 @@
-"""Friction forces of a model: those of its laws, as inputs, or others in their place.
+"""Friction forces of a model: by its laws, as inputs, or replaced by others.
 
 The force that a contact must carry to keep its sliding velocity follows from the equations. The
 rate of a sliding velocity s_i is affine in the friction forces F of a model,
@@ -6,7 +6,7 @@ rate of a sliding velocity s_i is affine in the friction forces F of a model,
     ds_i/dt = a_i - M_i F,   M = -(d slip/dx) (d ode/dF)
 
 and the applied force F_e of contact i is the force with which ds_i/dt = 0 while every other contact
-does what it does: it slides with the force of its law, or it sticks and keeps its own velocity.
+keeps its mode: it slides with the force of its law, or it sticks and keeps its own velocity.
 
     ds_i/dt = 0,   and for j != i   ds_j/dt = 0 if j sticks, else F_j = force of its law
 
@@ -31,11 +31,12 @@ from symfric.model.parts import Event, Monitor, Output
 from symfric.model.start import System
 
 STICKS = 0.5
-"""A mode, which is -1, 0 or 1 but for what error control adds, below which a contact sticks."""
+"""Absolute value of a mode below which a contact sticks; modes are -1, 0 or 1 up to integration
+errors."""
 
 
 def completed(model: System) -> tuple[Contact, ...]:
-    """Return the contacts of an open model with `F_e`, `rest` and `bare` where none was given.
+    """Return the contacts of an open model with default values of `F_e`, `rest` and `bare`.
 
     Raises:
         ValueError: an applied force that the equations do not determine.
@@ -65,16 +66,17 @@ def _complete(c: Contact) -> bool:
 
 
 def _mode(c: Contact) -> ca.SX | None:
-    """Return the mode of a law that sticks, 0 at rest; None for a law without one."""
+    """Return the mode of a law that sticks, 0 in stick; None for a law without one."""
     modes = [v.symbol for s, v in zip(c.law.states, c.states, strict=True) if s.whole]
     needs = any(i.name == APPLIED for i in c.law.inputs)
     return modes[0] if needs and modes else None
 
 
 def _resting(c: Contact, model: System) -> Contact:
-    """Set a state in which the slip is linear to the value where the slip vanishes.
+    """Set `rest`: a state in which the slip is linear, and its value for zero slip.
 
-    Of several it is the one in the fewest sliding velocities, since a reset moves those, too.
+    If there are several, it is the one in the fewest sliding velocities, since a reset also moves
+    those.
     """
     slip = ca.SX(c.slip)
     slopes = {v: ca.jacobian(slip, v.symbol) for v in model.x}
@@ -122,7 +124,7 @@ def _change(c: Contact, model: System) -> ca.SX:
 
 
 def _row(c: Contact, model: System) -> ca.SX:
-    """Return the equation of a contact that does what it does, = 0."""
+    """Return the equation (= 0) of a contact that keeps its mode."""
     mode = _mode(c)
     if mode is None:
         return c.force - c.friction if _complete(c) else c.force
@@ -132,7 +134,7 @@ def _row(c: Contact, model: System) -> ca.SX:
 
 
 def _connected(i: int, rows: list[ca.SX], F: ca.SX) -> list[int]:
-    """Return the contacts whose forces appear in the equation of contact `i`, which comes last."""
+    """Return the contacts whose forces appear in the equation of contact `i`, with `i` last."""
     found, queue = {i}, [i]
     while queue:
         slope = ca.jacobian(rows[queue.pop()], F)
@@ -143,10 +145,10 @@ def _connected(i: int, rows: list[ca.SX], F: ca.SX) -> list[int]:
 
 
 def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
-    """Return the last unknown of A y = b by elimination, or None where it does not appear.
+    """Return the last unknown of A y = b by elimination, or None if it does not appear.
 
-    No pivoting: each leading block has rows of the identity, of contacts that slide, and rows of a
-    matrix M that is positive definite where contacts do not depend on each other.
+    No pivoting: each leading block has rows of the identity, of sliding contacts, and rows of a
+    matrix M that is positive definite if contacts do not depend on each other.
     """
     n = b.numel()
     rows = ca.SX(ca.horzcat(A, b))
@@ -172,26 +174,26 @@ M = TypeVar("M", bound=System)
 
 
 def by_laws(model: System, expression: ca.SX) -> ca.SX:
-    """Return `expression` with the laws of all contacts in the place of their forces.
+    """Return `expression` with the laws of all contacts in place of their forces.
 
     Raises:
-        ValueError: friction forces that need each other.
+        ValueError: friction forces that depend on each other.
     """
     forces = {c.name: c.friction for c in model.contacts}
     return _Put(f"model '{model.name}': contacts", model.contacts, forces)(expression)
 
 
 def closed(model: System) -> dict[str, Any]:
-    """The parts of an open model that change as the laws of its contacts close it.
+    """Return the parts of an open model that change when the laws of its contacts close it.
 
     Raises:
-        ValueError: `holonomic`, which a mechanism closes itself; friction forces that need each
-            other.
+        ValueError: `holonomic`, which a mechanism closes itself; friction forces that depend on
+            each other.
     """
     where = f"model '{model.name}': contacts"
     if model.holonomic is not None:
         raise checks.refused(
-            where, "none beside `holonomic`; a Mechanism makes them", model.contacts
+            where, "none together with `holonomic`; a Mechanism makes them", model.contacts
         )
     contacts = completed(model)
     put = _Put(where, contacts, {c.name: c.friction for c in contacts})
@@ -210,21 +212,23 @@ def closed(model: System) -> dict[str, Any]:
 
 
 def opened(given: Mapping[str, Any], make: Callable[..., M]) -> M:
-    """The model of the parts `given`, written with friction forces, as inputs of it."""
+    """Return the model of the parts `given`, with its friction forces as inputs."""
     inputs = (*given["u"], *(c.variable for c in given["contacts"]))
     return make(**{**given, "u": inputs, "contacts": (), "opening": None})
 
 
 def reopened(model: System, made: M) -> M:
-    """The open model `made` of a model, if that is still the one it was made with."""
+    """Return the open model `made` of a model if its variables are unchanged, else raise an
+    error.
+    """
     inputs = {c.variable.name for c in model.contacts}
     now, then = ({letter: {v.name for v in getattr(m, letter)} for letter in "xup"}
                  for m in (model, made))  # fmt: skip
     if then["x"] <= now["x"] and now["u"] == then["u"] - inputs and now["p"] <= then["p"]:
         return made
     raise ValueError(
-        f"model '{model.name}': open: expected states, inputs and parameters as they were made, "
-        "got others; change its `open` and close that by `with_forces`"
+        f"model '{model.name}': open: expected unchanged states, inputs and parameters, "
+        "got others; change its `open` and close it with `with_forces`"
     )
 
 
@@ -237,19 +241,19 @@ def with_forces(
     alg: Scalar | None = None,
     monitors: tuple[Monitor, ...] = (),
 ) -> dict[str, Any]:
-    """The parts of the open model `bare` that change with other forces than those of its laws.
+    """Return the parts of the open model `bare` that change with other friction forces.
 
-    States, events and monitors of the laws are gone with them.
+    States, events and monitors of the laws are removed.
 
     Args:
         forces: contact -> force [N] opposing its slip, in the symbols of the model, of `p` and of
-            `z`; those of other contacts may stand in it.
-        p, z: what parameters and algebraic variables come with them. A width of a contact stays a
-            parameter if it is in `p`, else it is its number. In a mechanism `z` are forces that
-            hold it somehow, and stand next to its multipliers.
+            `z`; it may contain the forces of other contacts.
+        p, z: additional parameters and algebraic variables. A width of a contact stays a parameter
+            if it is in `p`, else it is its number. In a mechanism `z` are constraint forces of
+            sticking contacts, placed next to its multipliers.
         alg: as many more algebraic equations as `z`; in a mechanism they may be written with the
             accelerations `holonomic.a`.
-        monitors: what error control watches of these contacts.
+        monitors: for error control of these contacts.
 
     Raises:
         ValueError: a contact that does not exist, or one without a force.
@@ -272,7 +276,7 @@ def with_forces(
     if bare.holonomic is not None:
         mechanics = bare.holonomic
         known = put(mechanics.implicit)
-        # forces that hold stand next to the multipliers, their equations next to the constraints
+        # stick forces follow the multipliers, their equations the constraints
         count = mechanics.phi.numel()
         first = mechanics.n + count
         columns = (*bare.z[:count], *z, *bare.z[count:])
@@ -296,7 +300,7 @@ def with_forces(
 
 @final
 class _Put:
-    """Puts expressions in the place of the symbols of friction forces."""
+    """Substitution of expressions for the symbols of friction forces."""
 
     def __init__(
         self, where: str, contacts: Sequence[Contact], forces: Mapping[str, Scalar],
@@ -309,8 +313,8 @@ class _Put:
                 values = ca.substitute(values, F, values)
         if ca.depends_on(values, F):
             raise ValueError(
-                f"{where}: expected friction forces that do not need each other, got a loop; make "
-                "the normal force an algebraic variable"
+                f"{where}: expected friction forces that do not depend on each other, got a loop; "
+                "make the normal force an algebraic variable"
             )
         fixed = tuple(fixed)
         numbers = ca.SX(starts_of(fixed))
@@ -321,7 +325,7 @@ class _Put:
         return ca.substitute(ca.SX(expression), self.old, self.new)
 
     def explicit(self, model: System) -> dict[str, Any]:
-        """Equations, outputs, monitors and events of a model."""
+        """Return equations, outputs, monitors and events of a model."""
         names = list(model.outputs)
         parts = [ca.SX(0, 1) if model.ode is None else ca.SX(model.ode), ca.SX(model.alg)]
         parts += [ca.SX(model.outputs[name].expression) for name in names]
@@ -337,14 +341,14 @@ class _Put:
         }
 
     def outputs(self, write: Callable[[], Mapping[str, Output]]) -> dict[str, Output]:
-        """Further results, written when somebody asks."""
+        """Return further results, written on demand."""
         return {n: replace(o, expression=self(o.expression)) for n, o in write().items()}
 
     def monitor(self, monitor: Monitor) -> Monitor:
-        """What error control watches."""
+        """Return a monitor for error control."""
         return replace(monitor, expression=self(monitor.expression))
 
     def event(self, event: Event) -> Event:
-        """What happens at zero crossings."""
+        """Return an event."""
         reset = {name: self(value) for name, value in event.reset.items()}
         return replace(event, expression=self(event.expression), reset=reset)

@@ -1,4 +1,4 @@
-"""What a mechanical model knows beyond its equations."""
+"""Structure of a mechanical model beyond its equations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,15 +13,15 @@ from symfric.foundation.packed import state_of
 @final
 @dataclass(frozen=True, eq=False)
 class Inner:
-    """Equations with inner unknowns l, so that each knows its neighbours only.
+    """Equations with inner unknowns l, so that each depends on few unknowns.
 
         0 = f(y, l),   l_k = g_k(y, l_1 ... l_{k-1})
 
     Attributes:
         l: SX symbols (k, 1).
         values: SX (k, 1), g.
-        f: SX, what is written with l.
-        groups: symbols of unknowns and of l, in the order in which they are best eliminated.
+        f: SX, in terms of l.
+        groups: symbols of unknowns and of l, in the best order of elimination.
     """
 
     l: ca.SX  # noqa: E741
@@ -33,20 +33,20 @@ class Inner:
 @final
 @dataclass(frozen=True, eq=False)
 class Solving:
-    """M^-1 r as an expression in the symbols r, SX (n, 1) both."""
+    """Solution M^-1 r as an expression in the symbols r, SX (n, 1) both."""
 
     r: ca.SX
     result: ca.SX
 
     def __call__(self, r: ca.SX) -> ca.SX:
-        """M^-1 r."""
+        """Return M^-1 r."""
         return ca.substitute(self.result, self.r, ca.densify(r))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Holonomic:
-    """What a mechanical model knows beyond its equations: constraints on its coordinates.
+    """Structure of a mechanical model beyond its equations: constraints on its coordinates.
 
     The states of the model begin with coordinates q and their rates q', its algebraic variables
     with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols
@@ -54,7 +54,7 @@ class Holonomic:
 
         M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
 
-    These are the equations of the model: its `ode` and `alg` are made of them, by elimination of a.
+    These are the equations of the model: its `ode` and `alg` follow from them by elimination of a.
 
     Attributes:
         n: number of coordinates.
@@ -63,19 +63,19 @@ class Holonomic:
         implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t;
             the first n are affine in a.
         rates: SX (nx - 2 n, 1), rates of the other states.
-        solve: applies M^-1 to a column, where there is a shorter way than to factorise M.
-        norms: how many of the multipliers, the last ones, belong to norms of Euler parameters: they
-            load nothing, and error control leaves them alone.
-        index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
-            there are degrees of freedom; 1 in all coordinates, which are put back onto the
-            constraints at the end of every step. The solution is the same, to the tolerance.
+        solve: applies M^-1 to a column, if there is a shorter way than to factorise M.
+        norms: number of multipliers, the last ones, that belong to norms of Euler parameters: they
+            carry no load, and error control ignores them.
+        index: 0 for integration in the tangent space of its constraints, with as many unknowns as
+            degrees of freedom; 1 for all coordinates, which are projected onto the constraints at
+            the end of every step. The solution is the same, to the tolerance.
         inner: the same equations for long chains, whose derivatives are sparse only with inner
-            unknowns; None elsewhere.
+            unknowns; None otherwise.
         pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
-        pressed: what they are, in words.
-        advice: what to try where friction and reactions have no solution; may be empty.
-        applied: how many forces that friction at rest must carry are among the algebraic variables,
-            next to the multipliers; with their equations next to those of the constraints.
+        pressed: names of these normal forces.
+        advice: hint if friction and reactions have no solution; may be empty.
+        applied: number of forces carried in stick among the algebraic variables, next to the
+            multipliers, with their equations next to those of the constraints.
     """
 
     n: int
@@ -93,7 +93,7 @@ class Holonomic:
     applied: int = 0
 
     def to_pack(self) -> dict[str, Any]:
-        """The fields and what follows from them; `solve` as an expression."""
+        """Return the fields and derived expressions; `solve` as an expression."""
         state = state_of(self)
         if self.solve is not None:
             right = ca.SX.sym("right", self.n)

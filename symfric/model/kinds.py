@@ -1,4 +1,4 @@
-"""What a signal of a model is, for tables and pictures: `Variable.kind` and `Output.kind`."""
+"""Types of signals for tables and figures: `Variable.kind` and `Output.kind`."""
 
 import casadi as ca
 import numpy as np
@@ -7,17 +7,17 @@ from symfric.foundation.numeric import Scalar, is_casadi
 
 POSITION, RATE, FRICTION_STATE = "position", "rate", "state of friction"
 MODE = "mode of friction"
-"""A whole number that only jumps; results round off what error control adds to it within a step."""
+"""Integer that only jumps; results round off the integration error within a step."""
 NORMAL_FORCE, FRICTION, ENERGY = "normal force", "friction", "energy"
 CONSTRAINTS = "constraints"
-"""Norms of what is left of constraints on positions, velocities and accelerations."""
+"""Norms of the residuals of constraints on positions, velocities and accelerations."""
 INPUT = "input"
 WORK = "work rate"
 """Powers [W] that change the energy of a mechanism."""
 
 
 def in_results(kind: str, value: Scalar) -> Scalar:
-    """The value of a variable of that kind as results give it: a mode as a whole number."""
+    """Return the value of a variable of this type for results: a mode as an integer."""
     if kind != MODE:
         return value
     return ca.floor(value + 0.5) if is_casadi(value) else np.floor(value + 0.5)

@@ -1,7 +1,7 @@
-"""The one interface between those who write equations and those who solve them.
+"""Models: the interface between equations and solvers.
 
 Scenes and mechanisms produce a `Model`; simulation, optimal control, identification and code
-generation consume it. Letters as in CasADi's DaeBuilder: time t, differential states x, algebraic
+generation use it. Letters as in CasADi's DaeBuilder: time t, differential states x, algebraic
 variables z, inputs u, parameters p.
 """
 
@@ -29,15 +29,15 @@ Variables = tuple[Variable, ...]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Showing, System):
-    """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
+    """Dynamic system 0 = F(t, x', x, z, u, p), explicit where possible.
 
-    Explicit form (semi-explicit DAE of index 1; an ODE where there is no z):
+    Explicit form (semi-explicit DAE of index 1; an ODE without z):
 
         x' = ode(t, x, z, u, p),   0 = alg(t, x, z, u, p)
 
     Give `ode` and `alg`, or `residual` with `xdot` for a fully implicit model of index 1, whose
     matrix of rates may be singular (capacitors between nodes), or `holonomic` for a mechanism,
-    whose equations then are the only ones: `ode` and `alg` are made of them.
+    whose equations then define `ode` and `alg`.
 
     Equations are SX expressions of the variables, which stand for their symbols:
 
@@ -45,27 +45,27 @@ class Model(Showing, System):
         Model("mass", x=(x, v), u=(u,), ode=ca.vertcat(v, (u - 50 * x) / 2.0))
 
     Attributes:
-        name: what the scene is called.
+        name: of the model.
         x, z, u, p: named variables; an absent group is empty and costs nothing.
         ode: SX (nx, 1), or None for an implicit model.
         alg: SX (nz, 1).
-        xdot: SX symbols (nx, 1) of an implicit model; made by the explicit one.
+        xdot: SX symbols (nx, 1) of an implicit model; created for an explicit one.
         residual: SX (nx + nz, 1).
         outputs: named results in addition to x, z and u.
-        monitors: expressions that error control watches besides x.
-        events: what happens at zero crossings.
+        monitors: expressions that error control monitors in addition to x.
+        events: actions at zero crossings.
         t: SX symbol of time [s].
-        holonomic: equations of a mechanism, with constraints on its coordinates that the
-            integrator keeps on all levels.
-        details: writes further results, such as reactions, when somebody asks for one of them; to
-            carry one along in derivatives and in C, put it into `outputs`.
-        sketch: writes what is drawn of the machine, when somebody asks for a picture of it.
-        contacts: where friction acts; their laws close equations written with their forces.
-        opening: writes `open` of a model that is closed already.
+        holonomic: equations of a mechanism, with constraints on its coordinates that the integrator
+            enforces on positions, velocities and accelerations.
+        details: writes further results, such as reactions, on demand; put one into `outputs` to use
+            it in derivatives and in C.
+        sketch: writes a drawing of the machine, on demand.
+        contacts: places with friction; their laws close equations written with their forces.
+        opening: writes `open` of a model that is already closed.
 
     Raises:
         ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols; an
-            `ode` or `alg` beside `holonomic` that is not made of it.
+            `ode` or `alg` that contradicts `holonomic`.
     """
 
     opening: "Callable[[], Model] | None" = None
@@ -93,12 +93,12 @@ class Model(Showing, System):
         self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
 
     def check_fields(self) -> None:
-        """Refuse what no model has, without making it again: for models out of files."""
+        """Check a model from a file, without constructing it again."""
         self._refuse(kind_problems(self))
         self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
 
     def shown(self) -> Shown:
-        """What it consists of, without its expressions."""
+        """Describe its parts, without its expressions."""
         return shown(self)
 
     def _refuse(self, problems: list[str]) -> None:
@@ -106,16 +106,16 @@ class Model(Showing, System):
             raise ValueError(f"model {self.name!r}: " + "; ".join(problems))
 
     def _close(self) -> None:
-        """Put the laws of the contacts in the place of their forces, and remember what was."""
+        """Replace the contact forces by their laws, and keep the open form."""
         object.__setattr__(self, "opening", partial(opened, self.__getstate__(), Model))
         for name, value in closed(self).items():
             object.__setattr__(self, name, value)
 
     @cached_property
     def open(self) -> "Model":
-        """The same model with the forces of its `contacts` as inputs, "<name>_F".
+        """Model with the forces of its `contacts` as inputs, "<name>_F".
 
-        Further widths (`Contact.widths`) are parameters; ValueError where variables were replaced.
+        Further widths (`Contact.widths`) are parameters; ValueError if variables were replaced.
         """
         return self if self.opening is None else reopened(self, self.opening())
 
@@ -123,20 +123,20 @@ class Model(Showing, System):
         self, forces: Mapping[str, Scalar], p: Variables = (), z: Variables = (),
         alg: Scalar | None = None, monitors: tuple[Monitor, ...] = (),
     ) -> "Model":  # fmt: skip
-        """The same model with other friction forces than those of its laws: see `with_forces`."""
+        """Return the model with other friction forces than those of its laws: see `with_forces`."""
         bare = self.open
         return replace(bare, **with_forces(self, bare, forces, p, z, alg, monitors))
 
     def _take(self, mechanics: Holonomic) -> None:
-        """Make `ode` and `alg` of the equations of a mechanism."""
+        """Set `ode` and `alg` from the equations of a mechanism."""
         acceleration, alg = mechanics.explicit
         rate = self.vector("x")[mechanics.n : 2 * mechanics.n, 0]
         for name, made in (("ode", ca.vertcat(rate, acceleration, mechanics.rates)), ("alg", alg)):
             given = getattr(self, name)
             if given is not None and not given.is_empty() and not _same(given, made):
                 raise ValueError(
-                    f"model '{self.name}': {name}: expected none beside `holonomic`, of whose "
-                    "equations it is made, got others; change `holonomic.implicit`"
+                    f"model '{self.name}': {name}: expected none with `holonomic`, from whose "
+                    "equations it is derived, got others; change `holonomic.implicit`"
                 )
             object.__setattr__(self, name, made)
 
@@ -145,21 +145,21 @@ class Model(Showing, System):
 
     @cached_property
     def memory(self) -> dict[str, Any]:
-        """What solvers keep of this model for the next call; it dies with the model."""
+        """Caches of solvers for this model, deleted with the model."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields; a copy remembers nothing."""
+        """Return the fields; a copy has no caches."""
         return packed.state_of(self)
 
     def __copy__(self) -> "Model":
-        """A model of the same symbols."""
+        """Return a model of the same symbols."""
         made = object.__new__(Model)
         vars(made).update(self.__getstate__())
         return made
 
     def to_pack(self) -> dict[str, Any]:
-        """The fields, with all that would be written when somebody asks."""
+        """Return the fields, with all parts that are written on demand."""
         state, Given = self.__getstate__(), packed.Given
         state["details"] = Given(dict(self.further))
         state["sketch"] = None if self.sketch is None else Given(self.sketch())
@@ -167,7 +167,7 @@ class Model(Showing, System):
         return state
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds all that the model says, in symbols that stay themselves."""
+        """Pickle the whole model; symbols keep their identity."""
         return packed.loads, (packed.dumps(self),)
 
     @cached_property
@@ -178,10 +178,10 @@ class Model(Showing, System):
 
     @cached_property
     def further(self) -> dict[str, Output]:
-        """The `details`, written out, and accelerations, `<q>_acc`, that have no such name.
+        """`details`, written out, and accelerations, `<q>_acc`, unless these names are in use.
 
         Raises:
-            ValueError: one has a name that the model has already.
+            ValueError: a name that the model already has.
         """
         found = dict(self.details())
         repeated = sorted(found.keys() & {*self.signals, *(v.name for v in self.p)})
@@ -194,7 +194,7 @@ class Model(Showing, System):
         return found | {name: output for name, output in own if name not in taken}
 
     def expression(self, name: str) -> ca.SX:
-        """The signal or detail `name` in the symbols of the model.
+        """Return the signal or detail `name` in the symbols of the model.
 
         Raises:
             ValueError: unknown name.
@@ -208,12 +208,12 @@ class Model(Showing, System):
         return ca.SX(outputs[name].expression)
 
     def function(self, what: str) -> ca.Function:
-        """One CasADi Function with named arguments.
+        """Return a CasADi Function with named arguments.
 
         Args:
             what: "ode" and "alg" (t, x, z, u, p), "residual" (t, xdot, x, z, u, p), "signals"
-                (t, x, z, u, p), which stacks x, z, u and the outputs in the order of `signals`,
-                or the name of one output or detail.
+                (t, x, z, u, p), which stacks x, z, u and the outputs in the order of `signals`, or
+                the name of one output or detail.
 
         Raises:
             ValueError: unknown name, or "ode" of an implicit model.
@@ -242,12 +242,12 @@ class Model(Showing, System):
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:
-    """Whether two columns hold the same expressions."""
+    """Return True if two columns hold the same expressions."""
     return a.shape == b.shape and ca.is_equal(ca.densify(a), ca.densify(b))
 
 
 def check_model(where: str, model: object) -> None:
-    """Refuse what is no model: a law, a scene, a mechanism that nobody built."""
+    """Raise an error for anything but a model: a law, a scene, a mechanism that was not built."""
     if isinstance(model, Model):
         return
     hint = ""
@@ -272,7 +272,7 @@ WORDS = {
 
 
 def shown(model: System) -> Shown:
-    """Names, units and start values of everything, and where there is friction by which law."""
+    """Describe names, units and start values of all variables, and the laws of all contacts."""
     counts = [counted(len(getattr(model, g)), *words) for g, words in WORDS.items()]
     counts += [counted(len(model.outputs), "output")]
     return Shown(
@@ -303,7 +303,7 @@ def _after(model: System) -> list[str]:
 
 
 def friction(model: System) -> str:
-    """Where there is friction by which law: "belt by LuGre"; all contacts of a law together."""
+    """Return contacts and laws, such as "belt by LuGre"; the contacts of one law together."""
     laws: dict[str, list[str]] = {}
     for contact in model.contacts:
         laws.setdefault(type(contact.law).__name__, []).append(contact.name)

@@ -1,4 +1,4 @@
-"""What a model holds beside its equations: results, what error control watches, events."""
+"""Parts of a model besides its equations: results, monitors of error control, events."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,13 +12,13 @@ from symfric.foundation.symbolic import take_symbols
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Output:
-    """A named result of a model, as in `Model(outputs={"force": Output(50 * s, "N")})`.
+    """Named result of a model, as in `Model(outputs={"force": Output(50 * s, "N")})`.
 
     Attributes:
         expression: in t, x, z, u, p, shape (1, 1).
-        unit: as text; a text that is no unit is warned of.
-        doc: what it is, in a few words.
-        kind: what it is among the signals, see `symfric.model.kinds`; it may be empty.
+        unit: as text; an unknown unit warns.
+        doc: short description.
+        kind: type among the signals, see `symfric.model.kinds`; it may be empty.
     """
 
     expression: Scalar
@@ -39,11 +39,11 @@ class Output:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Monitor:
-    """An expression in t, x, z, u, p whose relative error is controlled along with the states.
+    """Expression in t, x, z, u, p whose relative error is controlled along with the states.
 
     A sliding velocity is the difference of two velocities that may be a thousand times larger;
     `nominal` is the scale on which the friction force changes with it. Near zero, steps change it
-    by no more than a few `nominal`, so that what happens there only is not leapt over.
+    by no more than a few `nominal`, so that narrow features there are not skipped.
 
     Attributes:
         expression: in t, x, z, u, p.
@@ -67,23 +67,23 @@ class Monitor:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Event:
-    """Something that happens when an expression passes through zero.
+    """Action when an expression passes through zero.
 
-    A jump counts, of an input or by the reset of another event, if it leads beyond zero. No two
-    crossings within a step go unseen: where the values at the quarters of a step leave room for a
-    pair of them, the step is cut further, down to the event tolerance. That is certain for an
-    expression that is linear in the states between two events, for it is a polynomial of degree 4
-    there. Others are seen if the quarters show their bends: one that oscillates within a quarter
-    may hide, nor is one seen that was not finite before. Steps follow the pace of expressions in
-    time alone.
+    A jump, of an input or by the reset of another event, also counts if it leads beyond zero. Two
+    crossings within a step are found: if the values at the quarters of a step allow a pair of them,
+    the step is subdivided, down to the event tolerance. That is certain for an expression that is
+    linear in the states between two events, because it is a polynomial of degree 4 there. Other
+    expressions are detected if the quarters show their bends: one that oscillates within a quarter
+    may be missed, and so may one that was not finite before. Expressions in time alone limit the
+    steps.
 
     Attributes:
         expression: in t, x, z, u, p.
         direction: +1 only rising, -1 only falling, 0 both.
         terminal: the simulation ends there.
         reset: state -> its value after the event, in terms of the values before it.
-        at_start: it happens at the start, too, where the expression is beyond zero in the given
-            direction, 1 or -1, already, or leaves zero that way.
+        at_start: True if it also happens at the start if the expression is already beyond zero in
+            the given direction, 1 or -1, or leaves zero in it.
         rtol: largest relative tolerance of a run with this event; it replaces a larger one.
     """
 

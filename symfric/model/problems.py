@@ -1,4 +1,4 @@
-"""What may be wrong with a model: kinds of its parts, names, rows, undeclared symbols."""
+"""Consistency checks of a model: types of its parts, names, rows, undeclared symbols."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -21,11 +21,11 @@ GROUPS: dict[str, tuple[type, str]] = {
     "events": (Event, "events"),
     "contacts": (Contact, "contacts"),
 }
-"""Groups of a model: what they consist of."""
+"""Groups of a model: type and name of their elements."""
 
 
 def kind_problems(model: System) -> list[str]:
-    """Parts that are not of the kind they should be; without these nothing else can be asked."""
+    """Return messages about parts of the wrong type, which prevent all other checks."""
     return [text for text in _wrong_kinds(model) if text]
 
 
@@ -48,7 +48,7 @@ def _wrong_kinds(model: System) -> Iterator[str]:
 
 
 def _said(check: Any, *arguments: Any) -> str:
-    """What a check has to say, or nothing."""
+    """Return the message of a failed check, else an empty text."""
     try:
         check(*arguments)
     except ValueError as error:
@@ -80,7 +80,7 @@ def _column(where: str, value: Any) -> None:
 
 
 def naming_problems(model: System) -> list[str]:
-    """Names that are repeated, reserved or no identifiers, or stand for nothing."""
+    """Return messages about names that are repeated, reserved, invalid or undefined."""
     problems: list[str] = []
     names = [v.name for group in (model.x, model.z, model.u, model.p) for v in group]
     names += list(model.outputs)
@@ -111,7 +111,7 @@ def naming_problems(model: System) -> list[str]:
 
 
 def equation_problems(model: System, known: ca.SX) -> list[str]:
-    """Row counts that do not fit, and symbols that are not among the `known`."""
+    """Return messages about wrong row counts, and symbols that are not among the `known`."""
     nx, nz = len(model.x), len(model.z)
     problems: list[str] = []
     if model.ode is None and nx and model.residual.is_empty():
@@ -153,7 +153,7 @@ def _size(column: ca.SX) -> str:
 
 
 def _declare(stray: list[str], known: ca.SX) -> str:
-    """What to do about the first of the symbols that nobody declared."""
+    """Return advice about the first undeclared symbol."""
     name = stray[0]
     if name == "t":
         return "give the symbol of time as t=t"
@@ -165,7 +165,7 @@ def _declare(stray: list[str], known: ca.SX) -> str:
 
 
 def _start_problems(model: System, known: ca.SX) -> Iterator[str]:
-    """Start values that need each other, or what nobody declared."""
+    """Yield messages about start values with circular dependencies or undeclared symbols."""
     starts = ca.SX(starts_of(model.x))
     if starts.is_constant():
         return
@@ -179,4 +179,4 @@ def _start_problems(model: System, known: ca.SX) -> Iterator[str]:
     if ca.depends_on(starts, states):
         loop = [v.name for v, s in zip(model.x, ca.vertsplit(starts), strict=True)
                 if ca.depends_on(s, states)]  # fmt: skip
-        yield f"start: expected start values that need no other in a circle, got {', '.join(loop)}"
+        yield f"start: expected start values without circular dependencies, got {', '.join(loop)}"

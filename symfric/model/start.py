@@ -1,4 +1,4 @@
-"""The parts of a model, and where its states start: numbers, or expressions in other values."""
+"""Fields of a model, and start values of its states: numbers, or expressions in other values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ PER_SECOND = {"m/s": "m/s^2", "rad/s": "rad/s^2", "1/s": "1/s^2"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class System:
-    """Variables, equations and results of a model, see `Model`; and where its states start."""
+    """Variables, equations and results of a model, see `Model`, and start values of its states."""
 
     name: str
     x: Variables = ()
@@ -44,7 +44,7 @@ class System:
     contacts: tuple[Contact, ...] = ()
 
     def vector(self, letter: str) -> ca.SX:
-        """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
+        """Return the symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
         return self._vectors[letter]
 
     @cached_property
@@ -52,11 +52,13 @@ class System:
         return {letter: symbols_of(getattr(self, letter)) for letter in "xzup"}
 
     def nominal(self, letter: str) -> NDArray[np.float64]:
-        """Typical magnitudes of a group, shape (n,)."""
+        """Return typical magnitudes of a group, shape (n,)."""
         return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
 
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
-        """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
+        """Return values of the group "u" or "p": start values, replaced by those `given` by
+        name.
+        """
         group: Variables = getattr(self, letter)
         if not group and given is None:
             return np.zeros(0)
@@ -70,10 +72,10 @@ class System:
         )
 
     def named(self, what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
-        """What a user `given` by name for "x0", "u" or "p"; nothing for None.
+        """Return the values `given` by name for "x0", "u" or "p"; empty for None.
 
         Raises:
-            ValueError: no mapping, or a name that is not in the group.
+            ValueError: not a mapping, or a name that is not in the group.
         """
         if given is None:
             return {}
@@ -95,7 +97,8 @@ class System:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> NDArray[np.float64]:  # fmt: skip
-        """Start values of x at the time `t` [s], shape (nx,), replaced by those `given` by name.
+        """Return start values of x at the time `t` [s], shape (nx,), replaced by those `given` by
+        name.
 
         A start value that is an expression (a bristle at steady state depends on the sliding
         velocity) is evaluated with the given values of the other states and parameters, and with
@@ -125,7 +128,8 @@ class System:
         count: int,
         t: float | NDArray[np.float64] = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Start values (count, nx) at `t` [s], shape (count,) where times differ, and parameters.
+        """Return start values (count, nx) at `t` [s], shape (count,) if times differ, and
+        parameters.
 
         Parameters have the shape (count, n_p).
         """
@@ -152,7 +156,7 @@ class System:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> NDArray[np.float64]:  # fmt: skip
-        """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
+        """Return the derivative of `initial_state` with respect to p, shape (nx, n_p)."""
         if not self._start_follows:
             return np.zeros((len(self.x), len(self.p)))
         return evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))[0]
@@ -164,7 +168,7 @@ class System:
         p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> NDArray[np.float64]:
-        """Derivative of `initial_state` with respect to the start value of a state, shape (nx,)."""
+        """Return the derivative of `initial_state` by the start value of a state, shape (nx,)."""
         i = [v.name for v in self.x].index(name)
         chosen = dict(given or {}) | {name: float(self.initial_state(given, p, t)[i])}
         return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p, t))[1][:, i]
@@ -188,27 +192,27 @@ class System:
 
     @cached_property
     def _starts_alone(self) -> bool:
-        """Whether each state starts at a number, whatever the others and the parameters are."""
+        """True if all start values are numbers, independent of other states and parameters."""
         return all(ca.SX(v.start).is_constant() for v in self.x)
 
     @cached_property
     def _start_by_p(self) -> bool:
-        """Whether start values depend on parameters."""
+        """True if start values depend on parameters."""
         return self._start.jac_sparsity(0, 3).nnz() > 0
 
     @cached_property
     def _start_by_t(self) -> bool:
-        """Whether start values depend on time, as that of a bristle under a varying load does."""
+        """True if start values depend on time, such as that of a bristle under a varying load."""
         return self._start.jac_sparsity(0, 4).nnz() > 0
 
     @cached_property
     def _start(self) -> ca.Function:
-        """Start values as a Function of (values given, which are given, u, p, t)."""
+        """Start values as a Function of (values given, mask of given ones, u, p, t)."""
         return start_function(self.x, self.vector("u"), self.vector("p"), self.t, self.z)
 
     @cached_property
     def _start_follows(self) -> bool:
-        """Whether some start value is an expression in p."""
+        """True if some start value is an expression in p."""
         return bool(ca.depends_on(stacked(ca.SX(v.start) for v in self.x), self.vector("p")))
 
     @cached_property
@@ -223,10 +227,10 @@ class System:
 def start_function(
     x: Sequence[Variable], u: ca.SX, p: ca.SX, t: ca.SX, z: Sequence[Variable] = ()
 ) -> ca.Function:
-    """Start values of the states as a Function of (values known, which are known, u, p, t).
+    """Return start values of the states as a Function of (values, mask of given ones, u, p, t).
 
-    Where one depends on algebraic variables `z`, it takes their start values: what solves the
-    equations is known only when the states are.
+    Start values that depend on algebraic variables `z` use the start values of these: the solution
+    of the equations is known only after the states.
     """
     n, states = len(x), symbols_of(x)
     known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
@@ -241,10 +245,10 @@ def start_function(
 
 
 def accelerations(model: System) -> dict[str, Output]:
-    """`<q>_acc` for every state q whose rate is a state r: the rate of r, as an expression.
+    """Return `<q>_acc` for every state q whose rate is a state r: the rate of r, as an expression.
 
-    A speed that is the rate of no state, as where angles do not matter, has `<speed>_acc`; states
-    of friction laws have none, and neither have implicit models, whose rates are no expressions.
+    A speed that is not the rate of a state, for example if angles do not matter, has `<speed>_acc`;
+    states of friction laws have none, nor have implicit models, whose rates are not expressions.
     """
     if model.ode is None:
         return {}
@@ -252,7 +256,7 @@ def accelerations(model: System) -> dict[str, Output]:
     of_laws = {v.name for contact in model.contacts for v in contact.states}
     found: dict[str, Output] = {}
     rates = ca.vertsplit(ca.densify(model.ode))
-    # a symbol is told by its node, which it shares with what it was taken from
+    # a symbol is identified by its node, which copies of it share
     pairs = [(v, places.get(r.__hash__()) if r.is_symbolic() else None)
              for v, r in zip(model.x, rates, strict=True)]  # fmt: skip
     taken = {i for _, i in pairs if i is not None}

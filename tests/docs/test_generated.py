@@ -90,11 +90,12 @@ def test_tools_stand_side_by_side_as_they_were_measured() -> None:
     measured = {one["columns"][0]: one for one in measure.stored()["interop"]["tables"]}
     moves = measure.rows(measured["tool"])
     for line in moves:
-        if not line[""]:
-            miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")
-            said = f"{miss}, {line['it.']}, {line['s']} s"
+        if not line["status"]:
+            miss = f"{float(line['miss [m]']):.1e}".replace("e-0", "e-")
+            said = f"{miss}, {line['iterations']}, {line['processor time [s]']} s"
             assert said in shown["interop_moves"], line
-    assert shown["interop_moves"].count("out of time") == sum(m[""] == "out of time" for m in moves)
+    late = sum(m["status"] == "out of time" for m in moves)
+    assert shown["interop_moves"].count("out of time") == late
     assert "``cvodes``" in shown["interop_integrators"]
     assert "symfric bench interop" in shown["interop_by"]
 

@@ -106,7 +106,7 @@ def test_inverse_dynamics_finds_mass_and_friction() -> None:
 
 
 def test_what_the_kind_takes_out_of_free() -> None:
-    with pytest.raises(ValueError, match="dead_time, which Points has not"):
+    with pytest.raises(ValueError, match="dead_time, which Points lacks"):
         Fit(Points(), "stribeck", points(), free={"dead_time": (0.0, 0.1)}).solve()
     fit = Fit(Shooting(), "lugre", motion(Coulomb(mu_d=1.0)), free={"x0": "given"})
     assert fit.prepared().task.unknowns.nuisance == ()
@@ -153,7 +153,7 @@ def test_a_static_level_that_no_point_comes_near_is_not_told() -> None:
     """Points from twice the Stribeck velocity on: the level is read off a curve far beyond them."""
     v = np.linspace(0.02, 0.2, 200)
     v = np.concatenate([-v, v])
-    for mu_s, note in ((5.0, "not told: far above all forces"), (0.15, "")):
+    for mu_s, note in ((5.0, "not identifiable: far above all forces"), (0.15, "")):
         F = steady_force(Stribeck(mu_s=mu_s, mu_d=0.1, v_s=0.01), v, 1.0)
         F = F + 1e-4 * np.random.default_rng(0).standard_normal(v.size)
         data = Dataset.of(v=v, F=F, points=True, units={"v": "m/s", "F": "N"})
@@ -161,7 +161,7 @@ def test_a_static_level_that_no_point_comes_near_is_not_told() -> None:
         found = fit.parameters["mu_s"]
         assert found.note == note
         assert (found.standard_error is None) == bool(note)
-        assert ("mu_s is not told: no friction force" in str(fit)) == bool(note)
+        assert ("mu_s is not identifiable: no friction force" in str(fit)) == bool(note)
         assert fit.parameters["mu_d"].standard_error
 
 

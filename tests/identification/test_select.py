@@ -134,7 +134,7 @@ def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking:
 
 def test_folds_that_are_too_short_are_said() -> None:
     found = select(["coulomb"], points(1), Points(), starts=1, folds=1000)
-    assert found.how == "no validation, although 1000 folds were asked for"
+    assert found.how == "no validation, although 1000 folds were requested"
 
 
 def test_an_interrupted_fit_is_not_validated_at_length(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,7 +94,7 @@ MEASURED = (
     ),
     Mutant(
         "a difference of positions falls short of nothing", DATA + "filters.py",
-        "lost = 1 - np.sinc(2 * frequency)", "lost = 0 * frequency", T_VELOCITY,
+        "deficit = 1 - np.sinc(2 * frequency)", "deficit = 0 * frequency", T_VELOCITY,
     ),
     Mutant(
         "Coulomb friction and offset are one column", DATA + "differentiate.py",

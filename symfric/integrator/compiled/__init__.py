@@ -1,1 +1,1 @@
-"""C from CasADi Functions: compiled once, kept, applied to columns of numbers."""
+"""C from CasADi Functions: compiled once, cached, applied to columns of numbers."""

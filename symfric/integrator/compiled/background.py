@@ -1,9 +1,10 @@
-"""Libraries made while everything else goes on.
+"""Compilation of libraries in the background.
 
-One compiler at a time, of low priority, looked at whenever somebody asks whether compiled code is
-there: no thread waits for it. Results never depend on when that is, as both engines give the same
-bits. At exit a compiler that still runs is stopped, and leaves no file. A forked process leaves its
-parent's compiler alone and starts none beside, as it may end without any of that.
+One compiler runs at a time, at low priority, and is polled whenever compiled code is requested: no
+thread waits for it. Results never depend on when it finishes, since both engines give the same
+bits.
+At exit a running compiler is stopped, and leaves no file. A forked process leaves its parent's
+compiler alone and starts none in the background, since it may end without these exit handlers.
 """
 
 import atexit
@@ -18,18 +19,18 @@ from symfric.integrator.compiled.compiler import Unfinished, begun, compiled_bef
 
 _OWNER = os.getpid()
 _row: list["Making"] = []
-"""What is being made, the first one now."""
+"""Queue of libraries; the first one is being compiled."""
 
 
 @final
 @dataclass(eq=False)
 class Making:
-    """A library that is being made; mutable only in how far that is.
+    """Library being compiled; mutable in its progress only.
 
     Attributes:
-        source, names: as `library` takes them.
-        done: whether it lies in a cache or has failed.
-        failed: whether the compiler refused it.
+        source, names: as in `library`.
+        done: True if it is in a cache or has failed.
+        failed: True if the compiler rejected it.
     """
 
     source: str
@@ -39,7 +40,7 @@ class Making:
     _unfinished: Unfinished | None = None
 
     def look(self) -> None:
-        """Start, take or give up what is due."""
+        """Start the compiler, or store its result."""
         if self.done:
             return
         try:
@@ -51,19 +52,19 @@ class Making:
             self.done = self.failed = True
 
     def end(self) -> None:
-        """Keep the library where it is ready, and stop its compiler where not."""
+        """Store the library if it is ready, otherwise stop its compiler."""
         self.look()
         if self._unfinished is not None and not self.done:
             self._unfinished.stop()
 
 
 def beside() -> bool:
-    """Whether a compiler may run beside this process, and is stopped when it ends."""
+    """Return True if a background compiler may run and will be stopped at exit."""
     return processors() > 1 and os.getpid() == _OWNER
 
 
 def make(source: str, *names: str) -> Making:
-    """Have a library made."""
+    """Queue a library for compilation."""
     making = Making(source, names)
     _row.append(making)
     _advance()
@@ -71,7 +72,7 @@ def make(source: str, *names: str) -> Making:
 
 
 def _advance() -> None:
-    """Look at the first of the row, and at the next one where it is done."""
+    """Poll the first library of the queue, and the next one if it is done."""
     while _row and os.getpid() == _OWNER:
         _row[0].look()
         if not _row[0].done:
@@ -80,7 +81,7 @@ def _advance() -> None:
 
 
 def wait() -> None:
-    """Wait until everything is made: for measurements and tests."""
+    """Wait until the queue is empty: for measurements and tests."""
     while _row and os.getpid() == _OWNER:
         _advance()
         sleep(1e-3)
@@ -94,7 +95,7 @@ def _close() -> None:
 
 
 def processors() -> int:
-    """How many this process may use."""
+    """Return the number of processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -103,14 +104,14 @@ def processors() -> int:
 @final
 @dataclass(eq=False)
 class Prospect:
-    """Decides when compiled code is worth its compiler; mutable in what was found out.
+    """Decision when compiled code is worth its compile time; mutable in its findings.
 
     Attributes:
         write: () -> source.
-        names: what the library defines.
-        instructions: of the Function, for what it costs.
+        names: that the library defines.
+        instructions: of the Function, to estimate its cost.
         source: written for a library that is about to be loaded.
-        hopeless: whether compiling failed.
+        hopeless: True if compiling failed.
     """
 
     write: Callable[[], str]
@@ -122,13 +123,14 @@ class Prospect:
     _making: Making | None = None
 
     def pays(self, expected: float) -> bool:
-        """Whether to load the library now, which takes a compiler only where none can run beside.
+        """Return True if the library is to be loaded now.
 
-        It is looked for in the cache when that is predicted to pay, and made when that is, in the
-        background where possible.
+        The cache is searched if that is expected to save time, and the library is compiled if that
+        is, in the background if possible; loading runs the compiler only where no background
+        compiler can run.
 
         Args:
-            expected: time [s] that compiled code is predicted to save.
+            expected: time [s] that compiled code is expected to save.
         """
         look_up = 2e-3 + 1e-5 * self.instructions
         compiling = 0.1 + 1.5e-4 * self.instructions
@@ -154,6 +156,6 @@ class Prospect:
         return False
 
     def written(self) -> str:
-        """The source, for loading; kept no longer."""
+        """Return the source, for loading, and release it."""
         source, self.source = self.source or self.write(), ""
         return source

@@ -1,6 +1,6 @@
-"""A Function applied to many columns, or step after step, without Python in between.
+"""Function applied to many columns, or step after step, without Python in between.
 
-The compiled loop reads the rows of arrays where they lie: nothing is copied.
+The compiled loop reads the rows of arrays in place, without copies.
 """
 
 import ctypes
@@ -22,7 +22,7 @@ from symfric.integrator.compiled.compiler import load
 
 Array = NDArray[np.float64]
 Row = Array | tuple[Array, NDArray[np.intp]]
-"""Arguments, a row each; or a table with the number of a row for each of them."""
+"""Arguments, one per row; or a table and the row number for each of them."""
 NAME = "symfric_rows"
 NUMBER = np.dtype(np.float64).itemsize
 
@@ -30,10 +30,10 @@ NUMBER = np.dtype(np.float64).itemsize
 @final
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A compiled Function with dense results.
+    """Compiled Function with dense results.
 
     Attributes:
-        library: holds `symfric_rows`.
+        library: contains `symfric_rows`.
         sizes: of its arguments and of its results.
         chained: the first result of a row is the first argument of the next one.
     """
@@ -44,10 +44,10 @@ class Rows:
 
     @classmethod
     def of(cls, function: ca.Function, chained: bool, source: str = "") -> "Rows":
-        """Compile `source`, which is `rows_source`, or load it from the cache.
+        """Compile `source`, by default `rows_source`, or load it from the cache.
 
         Raises:
-            CompileError: there is no compiler, or it failed.
+            CompileError: no compiler was found, or it failed.
         """
         library = load(source or rows_source(function), NAME)
         library.symfric_rows.restype = None
@@ -57,7 +57,7 @@ class Rows:
         return cls(library, (into, out), chained)
 
     def __call__(self, rows: Sequence[Row], first: Array | None = None) -> list[Array]:
-        """Results of all rows; see `Columns`."""
+        """Return the results of all rows; see `Columns`."""
         into, out = self.sizes
         begin = int(self.chained)
         count = next(a.shape[0] for a in rows if isinstance(a, np.ndarray))
@@ -68,7 +68,7 @@ class Rows:
             arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
             numbers.insert(0, None)
         results = [np.empty((count, size)) for size in out]
-        # address of the first row, how far the next one is, and of the numbers of rows
+        # address of the first row, distance of rows, address of the row numbers
         of = [0 if a is None else _address(a) for a in (*numbers, *(None for _ in results))]
         every = zip((*arrays, *results), of, strict=True)
         places = np.array([(_address(a), a.strides[0], numbers) for a, numbers in every])
@@ -78,15 +78,15 @@ class Rows:
 
 
 def _address(array: NDArray[Any]) -> int:
-    """Where an array begins; quicker than by its `ctypes`."""
+    """Return the address of an array; faster than its `ctypes`."""
     return array.__array_interface__["data"][0]
 
 
 def _in_rows(array: Array, size: int) -> Array:
-    """An array whose rows are `size` numbers side by side each; itself, where they are.
+    """Return an array whose rows are `size` contiguous numbers; itself if they are already.
 
     Raises:
-        ValueError: rows of another size, which the loop in C would read beyond their end.
+        ValueError: rows of another size, beyond whose end the loop in C would read.
     """
     flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
     if flat.shape[1] != size:
@@ -96,7 +96,7 @@ def _in_rows(array: Array, size: int) -> Array:
 
 
 def rows_source(function: ca.Function) -> str:
-    """C of `function` as CasADi generates it, with the loop over rows."""
+    """Return the CasADi C of `function`, with the loop over rows."""
     generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
     generator.add(function)
     return generator.dump() + Template(_LOOP).substitute(
@@ -113,7 +113,7 @@ def rows_source(function: ca.Function) -> str:
 _LOOP = """
 typedef struct { char *at; long long apart; const long long *of; } symfric_place;
 
-/* Row after row of arguments and results; the first result goes on where they are chained. */
+/* Evaluates row after row; if chained, the first result is the next first argument. */
 void symfric_rows(long long count, int chained, const symfric_place *in, const symfric_place *out)
 {
   const double *arg[$arg];
@@ -133,23 +133,24 @@ void symfric_rows(long long count, int chained, const symfric_place *in, const s
 
 
 CHAINED, SIDE_BY_SIDE = 16, 32
-"""Columns of one call of the virtual machine; the last call repeats its last column."""
+"""Columns per call of the virtual machine; the last call repeats its last column."""
 PER_INSTRUCTION = 3e-9
-"""Seconds that the virtual machine needs."""
+"""Time per instruction of the virtual machine [s]."""
 
 
 @final
 @dataclass(eq=False)
 class Columns:
-    """A Function of columns, applied to the rows of arrays.
+    """Function of columns, applied to the rows of arrays.
 
-    It runs in the virtual machine until compiling pays. Mutable only in what it remembers.
+    It runs in the virtual machine until compiling is expected to save time. Mutable in its caches
+    only.
 
     Attributes:
         function: of dense columns.
         chained: the first result of a column is the first argument of the next one.
         spent: time [s] in the virtual machine.
-        source: C of the function and the loop over rows, where it is not `rows_source`.
+        source: C of the function and the loop over rows, if it is not `rows_source`.
     """
 
     function: ca.Function
@@ -159,7 +160,7 @@ class Columns:
 
     @property
     def size(self) -> int:
-        """Columns of one call."""
+        """Columns per call."""
         return CHAINED if self.chained else SIDE_BY_SIDE
 
     @cached_property
@@ -182,7 +183,7 @@ class Columns:
         return Rows.of(self._dense, self.chained, self._prospect.written())
 
     def _choose(self, backend: str, count: int) -> Rows | None:
-        """Compiled code, or none; "auto" compiles when that is predicted to pay."""
+        """Return compiled code or None; "auto" compiles if that is expected to save time."""
         if backend == "compiled":
             return self._compiled
         if backend == "vm":
@@ -192,19 +193,19 @@ class Columns:
         if self._prospect.pays(self.spent + PER_INSTRUCTION * self._prospect.instructions * count):
             try:
                 return self._compiled
-            except CompileError:  # a broken compiler is no reason not to evaluate
+            except CompileError:  # evaluate in the VM if the compiler is broken
                 self._prospect.hopeless = True
         return None
 
     def __call__(
         self, rows: Sequence[Row], first: Array | None = None, backend: str = "vm"
     ) -> list[Array]:
-        """Results of all rows, each of shape (count, size), matrices column by column.
+        """Return the results of all rows, each of shape (count, size), matrices column by column.
 
         Args:
-            rows: an array (count, ...) for every argument, without the first one where `chained`;
-                or a table and the numbers of its rows, shape (count,).
-            first: where `chained`, the first argument of the first row.
+            rows: an array (count, ...) for every argument, without the first one if `chained`; or a
+                table and the numbers of its rows, shape (count,).
+            first: if `chained`, the first argument of the first row.
             backend: "vm", "compiled" or "auto".
         """
         most, began = self.size, perf_counter()
@@ -239,7 +240,7 @@ class Columns:
 
 
 def densified(function: ca.Function) -> ca.Function:
-    """`function` with dense results, as buffers need them."""
+    """Return `function` with dense results, as buffers need them."""
     if all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
         return function
     arguments = function.mx_in()

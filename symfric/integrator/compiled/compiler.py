@@ -1,9 +1,9 @@
-"""A library in C: compiled with fixed flags, and kept on disk.
+"""C libraries: compiled with fixed flags, and cached on disk.
 
-A library is loaded into the process, so nobody else may be able to write it. The folder is the
-user's (or root's), only its owner may write it, and each file in it likewise; links, pipes and
-devices are passed over. The name of a file ends with a hash of its content: one that is truncated
-or damaged is not the file of that name, and is made again.
+A library is loaded into the process, so no other user may be able to write it. The folder belongs
+to the user (or root) and only its owner may write it, and the same holds for each file in it;
+links, pipes and devices are ignored. The name of a file ends with a hash of its content: a
+truncated or damaged file does not match its name, and is compiled again.
 """
 
 import ctypes
@@ -39,27 +39,28 @@ from symfric.foundation.programs import (
 )
 
 MOST_BYTES = 256 * 2**20
-"""The oldest files go when a cache grows beyond this; a step of a robot has half a megabyte."""
+"""Cache size above which the oldest files are deleted; a step of a robot has half a megabyte."""
 STALE = 86400.0
-"""Seconds after which an unfinished file is one of a process that was killed."""
+"""Age [s] of an unfinished file whose process was killed."""
 
 
 def caches() -> Iterator["Cache"]:
-    """Where compiled code is kept: in `$SYMFRIC_CACHE` alone, else in the user's cache folder, and
-    where that cannot be written in a folder of the user among temporary files.
+    """Yield the caches of compiled code: `$SYMFRIC_CACHE` only, or the user's and a temporary one.
+
+    The temporary folder of the user is for the case that the user's cache folder is not writable.
     """
     chosen = os.environ.get("SYMFRIC_CACHE")
     if chosen:
         yield Cache(Path(chosen))
         return
-    with suppress(RuntimeError):  # nobody knows a home
+    with suppress(RuntimeError):  # the user has no home folder
         yield Cache(users_folder() / "symfric")
     user = str(os.getuid()) if hasattr(os, "getuid") else "user"
     yield Cache(Path(tempfile.gettempdir()) / f"symfric-{user}")
 
 
 def users_folder() -> Path:
-    """Where the system keeps caches of the user.
+    """Return the system's cache folder of the user.
 
     Raises:
         RuntimeError: the user has no home.
@@ -72,7 +73,7 @@ def users_folder() -> Path:
 
 
 def trusted(found: os.stat_result) -> bool:
-    """Whether only this user or root may write what has this status."""
+    """Return True if only this user or root may write a file with this status."""
     if not hasattr(os, "getuid"):
         return True
     return found.st_uid in (0, os.getuid()) and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
@@ -81,12 +82,12 @@ def trusted(found: os.stat_result) -> bool:
 @final
 @dataclass(frozen=True)
 class Cache:
-    """A folder of shared libraries, `<key>-<hash of the content>.so`."""
+    """Folder of shared libraries, `<key>-<hash of the content>.so`."""
 
     folder: Path
 
     def find(self, key: str) -> Path | None:
-        """The file of `key`, whole and trusted; None where there is none."""
+        """Return the file of `key`, complete and trusted; None if not found."""
         try:
             if not trusted(self.folder.stat()):
                 return None
@@ -97,10 +98,10 @@ class Cache:
 
     @contextmanager
     def new(self, key: str) -> Generator[Path]:
-        """A temporary file in the folder that is kept under `key` when the block ends well.
+        """Yield a temporary file in the folder that is kept under `key` if the block succeeds.
 
         Raises:
-            OSError: the folder cannot be made or written, or is somebody else's.
+            OSError: the folder cannot be created or written, or belongs to another user.
         """
         temporary = self.begin(key)
         try:
@@ -111,7 +112,7 @@ class Cache:
                 temporary.unlink()
 
     def begin(self, key: str) -> Path:
-        """An empty temporary file in the folder; raises as `new` does."""
+        """Create an empty temporary file in the folder; raises as `new` does."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = self.folder.stat()
         if not trusted(found) and hasattr(os, "getuid") and found.st_uid == os.getuid():
@@ -129,7 +130,7 @@ class Cache:
         temporary.replace(self.folder / f"{key}-{_digest(content)}.so")
 
     def evict(self) -> None:
-        """Remove the files used longest ago until the others fit, and unfinished ones."""
+        """Remove the least recently used files until the others fit, and stale unfinished ones."""
         found: list[tuple[float, int, Path]] = []
         for path in self.folder.glob("*.so"):
             with suppress(OSError):
@@ -147,9 +148,9 @@ class Cache:
 
 
 def _whole(path: Path) -> bool:
-    """Whether the regular file at `path` is trusted, and has the content its name tells of.
+    """Return True if the regular file at `path` is trusted and matches the hash in its name.
 
-    It counts as used now.
+    The file is marked as used now.
     """
     try:
         found = path.lstat()
@@ -171,23 +172,26 @@ FLAGS = (
     "-O2", "-march=native", "-fno-math-errno", "-ffp-contract=off",
     "-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse", "-fPIC", "-shared",
 )  # fmt: skip
-"""Nothing here lets the compiler round otherwise than CasADi's virtual machine does, so that a
-result does not depend on which of them ran: no fused multiply-add, no reciprocals (repeated
-divisions are taken out of the graph instead), no reordering. Looking for common parts in code that
-has none left would take a third of the compiler's time."""
+"""No flag lets the compiler round differently from CasADi's virtual machine, so results do not
+depend
+on the engine: no fused multiply-add, no reciprocals (repeated divisions are taken out of the graph
+instead), no reordering. Common subexpressions have been removed already; searching for them would
+take
+a third of the compile time.
+"""
 
 OF_GCC = ("-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse")
-"""Those that only gcc knows. clang refuses them."""
+"""Flags of gcc only; clang rejects them."""
 NICENESS = 10
-"""Of a compiler beside something else."""
+"""Niceness of a background compiler."""
 
 _close: Callable[[int], None] | None = getattr(sys.modules["_ctypes"], "dlclose", None)
 
 
 def key_of(source: str, compiler: Compiler, flags: tuple[str, ...]) -> str:
-    """Hash of the source, the compiler (path, size, time), its flags and the machine.
+    """Return a hash of the source, the compiler (path, size, time), its flags and the machine.
 
-    Code of another kind is never loaded, and a shared home does not mix processors.
+    Other code is never loaded, and a shared home does not mix processors.
     """
     binary = Path(compiler.command[0]).stat()
     made_by = (compiler.command, flags, binary.st_size, binary.st_mtime_ns)
@@ -197,7 +201,7 @@ def key_of(source: str, compiler: Compiler, flags: tuple[str, ...]) -> str:
 
 @cache
 def processor() -> str:
-    """What `-march=native` depends on."""
+    """Return the processor features that `-march=native` depends on."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -206,7 +210,7 @@ def processor() -> str:
 
 
 def compiled_before(source: str) -> Path | None:
-    """The library of `source` where a cache holds it, whole; None where it has to be compiled."""
+    """Return the library of `source` if a cache has it; None if it has to be compiled."""
     compiler = find_compiler()
     if compiler is None:
         return None
@@ -215,18 +219,18 @@ def compiled_before(source: str) -> Path | None:
 
 
 def load(source: str, *names: str) -> ctypes.CDLL:
-    """The shared library of `source` as `library` keeps it, loaded."""
+    """Load the shared library of `source`; see `library`."""
     return opened(library(source, *names), names)
 
 
 def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
-    """The shared library of `source`, which defines `names`, compiled unless a cache holds it.
+    """Return the shared library of `source`, which defines `names`, compiled if not cached.
 
-    Several processes may do this at once: a file appears whole, under its final name.
+    Several processes may do this at once: a file appears under its final name only when complete.
 
     Raises:
-        CompileError: no compiler, no place for its result, or it refused the source; its first
-            error is quoted.
+        CompileError: no compiler, no writable cache, or an error in the source; its first error is
+            quoted.
     """
     compiler = needed_compiler()
     key, problems = key_of(source, compiler, flags), list[str]()
@@ -240,8 +244,9 @@ def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
         except OSError as error:
             problems.append(f"{place.folder} ({error.strerror or error})")
     raise CompileError(
-        f"compile: expected to keep compiled code and run it in {' or in '.join(problems)}; set "
-        "SYMFRIC_CACHE to a folder of yours where that is allowed, or use backend='vm'"
+        f"compile: expected a folder to store and load compiled code, tried "
+        f"{' and '.join(problems)}; set SYMFRIC_CACHE to a folder where that is allowed, or use "
+        "backend='vm'"
     )
 
 
@@ -252,7 +257,7 @@ def _made(
     how: tuple[Compiler, tuple[str, ...]],
     names: tuple[str, ...],
 ) -> Path:
-    """The library of `source`, compiled into a cache by a compiler with its flags."""
+    """Compile `source` into a cache with a compiler and its flags; return the library."""
     compiler, flags = how
     with place.new(key) as temporary:
         try:
@@ -261,11 +266,11 @@ def _made(
             )
         except CompileError as error:
             raise CompileError(f"compile: {first_error(str(error))}") from None
-        opened(temporary, names)  # what cannot be used is not kept
+        opened(temporary, names)  # do not keep an unusable library
     place.evict()
     found = place.find(key)
     if found is None:
-        raise OSError(0, "what was written there is not what was read")
+        raise OSError(0, "the stored file differs from the one written")
     return found
 
 
@@ -276,21 +281,21 @@ def _arguments(compiler: Compiler, flags: tuple[str, ...], path: Path) -> tuple[
 
 
 def _folders(place: Cache) -> dict[str, str]:
-    """Where a compiler keeps what it needs for a moment."""
+    """Return environment variables for the compiler's temporary files."""
     return {name: str(place.folder) for name in ("TMPDIR", "TMP", "TEMP")}
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Unfinished:
-    """A library whose compiler runs beside this process.
+    """Library whose compiler runs in the background.
 
     Attributes:
         process: the compiler.
         path: of the temporary file that it writes.
-        place, key: where in which cache the library will lie.
-        names: what it defines.
-        limit: when [s] it is given up, on the clock of `perf_counter`.
+        place, key: cache and key of the library.
+        names: that it defines.
+        limit: time [s] at which it is given up, on the clock of `perf_counter`.
     """
 
     process: subprocess.Popen[bytes]
@@ -301,10 +306,10 @@ class Unfinished:
     limit: float
 
     def finish(self) -> bool:
-        """Whether the library lies in the cache, where it is put now.
+        """Return True if the compiler has finished, after storing the library in the cache.
 
         Raises:
-            CompileError: the compiler refused the source, came to no end, or made no such library.
+            CompileError: an error in the source, a timeout, or an unusable library.
         """
         status = self.process.poll()
         if status is None and perf_counter() < self.limit:
@@ -322,17 +327,17 @@ class Unfinished:
         return True
 
     def stop(self) -> None:
-        """Stop the compiler where it still runs, and take away what it has written."""
+        """Stop the compiler if it still runs, and delete its output."""
         end(self.process)
         with suppress(OSError):
             self.path.unlink()
 
 
 def begun(source: str, names: tuple[str, ...]) -> Unfinished:
-    """The library of `source`, which defines `names`, being compiled at low priority.
+    """Start compiling `source`, which defines `names`, at low priority.
 
     Raises:
-        CompileError: no compiler, no place for its result, or it does not start.
+        CompileError: no compiler, no writable cache, or it does not start.
     """
     compiler = needed_compiler()
     key = key_of(source, compiler, FLAGS)
@@ -360,10 +365,12 @@ def begun(source: str, names: tuple[str, ...]) -> Unfinished:
 
 
 def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:
-    """The library at `path`, in memory until nobody holds it: a process maps some 10,000 at most.
+    """Load the library at `path`; it is unloaded when unreferenced.
+
+    A process can map only some 10,000 libraries.
 
     Raises:
-        OSError: it is none, or may not run there.
+        OSError: it is not a library, or loading is not allowed there.
         CompileError: one of `names` is missing.
     """
     found = ctypes.CDLL(str(path))
@@ -373,7 +380,7 @@ def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:
     missing = [name for name in names if not hasattr(found, name)]
     if missing:
         raise CompileError(
-            f"compile: expected a library with {', '.join(missing)}, found none in what {path.name}"
-            " holds; is $CC a C compiler?"
+            f"compile: expected a library that defines {', '.join(missing)}, found none in "
+            f"{path.name}; is $CC a C compiler?"
         )
     return found

@@ -1,8 +1,8 @@
-"""Graphics processors: what a run needs of one, one by CuPy, and NVRTC without any device.
+"""Graphics processors: the interface a run needs, its implementation with CuPy, and NVRTC.
 
 NVRTC is in the package nvidia-cuda-nvrtc-cu12 (extra 'cuda-check') and needs neither driver nor
-device. For an architecture such as compute_80 it makes PTX, for sm_80 the machine code, of which
-its assembler tells registers and spills.
+device. For an architecture such as compute_80 it generates PTX, for sm_80 machine code, whose
+assembler reports registers and spills.
 """
 
 import ctypes
@@ -24,86 +24,86 @@ Numbers = NDArray[Any]
 
 
 class DeviceError(RuntimeError):
-    """There is no graphics processor that could be used, or it refused its work."""
+    """No usable graphics processor, or an error of the device."""
 
 
 class Held(Protocol):
-    """An array in the memory of a device."""
+    """Array in the memory of a device."""
 
     @property
     def address(self) -> int:
-        """Where it begins there."""
+        """Address of the array on the device."""
         ...
 
     def get(self) -> Numbers:
-        """A copy here."""
+        """Return a copy on the host."""
         ...
 
 
 class Loaded(Protocol):
-    """A kernel that is ready to run."""
+    """Kernel that is ready to run."""
 
     @property
     def threads(self) -> int:
-        """How many threads run at once."""
+        """Number of threads that run at once."""
         ...
 
     def __call__(self, many: bytes, threads: int) -> None:
-        """Run `threads` threads on what the struct `many` says, and wait for them."""
+        """Run `threads` threads on the data of the struct `many`, and wait for them."""
         ...
 
 
 class Device(Protocol):
-    """Takes kernels and arrays."""
+    """Device that loads kernels and stores arrays."""
 
     @property
     def name(self) -> str:
-        """What it is."""
+        """Name of the device."""
         ...
 
     @property
     def free(self) -> int:
-        """Bytes of memory that are free."""
+        """Free memory [bytes]."""
         ...
 
     def load(self, kernel: Kernel) -> Loaded:
-        """Compile a kernel, or take it from a cache."""
+        """Compile a kernel, or load it from a cache."""
         ...
 
     def put(self, array: Numbers) -> Held:
-        """An array of its own, a copy of this one.
+        """Return a copy of the array on the device.
 
         Raises:
-            MemoryError: there is no room for it.
+            MemoryError: there is not enough memory.
         """
         ...
 
     def full(self, shape: tuple[int, ...], value: float, kind: DTypeLike) -> Held:
-        """An array with one value everywhere; raises as `put` does."""
+        """Return an array with one value everywhere; raises as `put` does."""
         ...
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class HostArray:
-    """An array of this machine."""
+    """Array on this machine."""
 
     array: Numbers
 
     @property
     def address(self) -> int:
-        """Where it begins."""
+        """Address of the array."""
         return int(self.array.ctypes.data)
 
     def get(self) -> Numbers:
-        """A copy."""
+        """Return a copy."""
         return self.array.copy()
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class HostLoaded:
-    """A kernel compiled for this machine."""
+    """Kernel compiled for this machine."""
 
     library: ctypes.CDLL
     threads: int
@@ -117,11 +117,11 @@ class HostLoaded:
 @final
 @dataclass(frozen=True, eq=False)
 class HostDevice:
-    """The processor in place of a graphics processor, for tests: the same text, thread by thread.
+    """Processor in place of a graphics processor, for tests: the same text, thread by thread.
 
     Attributes:
-        threads: how many threads it pretends to run at once.
-        free: how much memory it pretends to have [bytes].
+        threads: simulated number of threads that run at once.
+        free: simulated free memory [bytes].
     """
 
     threads: int = 64
@@ -140,48 +140,49 @@ class HostDevice:
         return HostLoaded(library, self.threads)
 
     def put(self, array: Numbers) -> HostArray:
-        """A copy."""
+        """Return a copy."""
         return HostArray(np.array(array, order="C"))
 
     def full(self, shape: tuple[int, ...], value: float, kind: DTypeLike) -> HostArray:
-        """An array with one value everywhere."""
+        """Return an array with one value everywhere."""
         return HostArray(np.full(shape, value, kind))
 
 
 OPTIONS = ("--fmad=false",)
-"""As on the CPU every operation is rounded on its own: what the tests see there runs here, but for
-the last digits of exp, sin, pow and the like."""
+"""Compiler options: as on the CPU every operation is rounded separately, so tests on the CPU cover
+the device up to the last digits of exp, sin, pow and the like.
+"""
 WARP, GRAIN = 32, 256
-"""Threads of a warp; registers are given to a warp in multiples of this."""
+"""Threads of a warp; registers are allocated to a warp in multiples of this."""
 MEANWHILE = "use backend='auto' meanwhile"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class CupyArray:
-    """An array in the memory of the device."""
+    """Array in the memory of the device."""
 
     array: Any
 
     @property
     def address(self) -> int:
-        """Where it begins there."""
+        """Address of the array on the device."""
         return int(self.array.data.ptr)
 
     def get(self) -> Numbers:
-        """A copy here."""
+        """Return a copy on the host."""
         return np.asarray(self.array.get())
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class CupyLoaded:
-    """A kernel on the device.
+    """Kernel on the device.
 
     Attributes:
         cupy: the module.
         function: its `RawKernel`.
-        threads: how many run at once.
+        threads: number that run at once.
     """
 
     cupy: Any
@@ -192,28 +193,29 @@ class CupyLoaded:
         """Run the threads and wait for them.
 
         Raises:
-            DeviceError: the device gave up, as after seconds where it draws a screen, too.
+            DeviceError: the device failed, for example by a time limit on one that also drives a
+            screen.
         """
         held = self.cupy.asarray(np.frombuffer(many, dtype=np.uint8))
         try:
             self.function((-(-threads // BLOCK),), (BLOCK,), (held,))
             self.cupy.cuda.get_current_stream().synchronize()
-        except RuntimeError as error:  # CuPy's own are
+        except RuntimeError as error:  # base class of CuPy's errors
             raise DeviceError(
-                f"simulate_many: the graphics processor stopped ({error}); chunks that were "
-                "complete are in the folder `out`, where one was given"
+                f"simulate_many: the graphics processor stopped ({error}); complete chunks "
+                "are in the folder `out`, if given"
             ) from None
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class CupyDevice:
-    """The current device of CuPy.
+    """Current device of CuPy.
 
     Attributes:
         cupy: the module.
         name: of the device.
-        properties: as `cudaGetDeviceProperties` gives them.
+        properties: as returned by `cudaGetDeviceProperties`.
     """
 
     cupy: Any
@@ -222,10 +224,10 @@ class CupyDevice:
 
     @classmethod
     def found(cls) -> "CupyDevice":
-        """The device that is there.
+        """Return the available device.
 
         Raises:
-            DeviceError: no CuPy, no driver, or no device; it says which.
+            DeviceError: no CuPy, no driver, or no device; the message names the cause.
         """
         try:
             cupy = import_module("cupy")
@@ -238,28 +240,28 @@ class CupyDevice:
         try:
             count = int(runtime.getDeviceCount())
             if not count:
-                raise RuntimeError("it counts none")
+                raise RuntimeError("no device found")
             number = int(runtime.getDevice())
             properties = dict(runtime.getDeviceProperties(number))
         except RuntimeError as error:
             raise DeviceError(
                 f"simulate_many: backend='cuda' needs a graphics processor of NVIDIA and its "
-                f"driver, CuPy finds none ({error}); see what nvidia-smi says, or {MEANWHILE}"
+                f"driver, CuPy finds none ({error}); check the output of nvidia-smi, or {MEANWHILE}"
             ) from None
         name = properties["name"]
         return cls(cupy, name.decode() if isinstance(name, bytes) else str(name), properties)
 
     @property
     def free(self) -> int:
-        """Bytes that are free, those that CuPy keeps for later among them."""
+        """Free memory [bytes], including the pool of CuPy."""
         self.cupy.get_default_memory_pool().free_all_blocks()
         return int(self.cupy.cuda.runtime.memGetInfo()[0])
 
     def load(self, kernel: Kernel) -> CupyLoaded:
-        """Compile a kernel, or take it from CuPy's cache.
+        """Compile a kernel, or load it from CuPy's cache.
 
         Raises:
-            DeviceError: NVRTC is missing or refuses it.
+            DeviceError: NVRTC is missing or rejects it.
         """
         module = self.cupy.RawModule(code=kernel.on_device, options=OPTIONS, backend="nvrtc")
         try:
@@ -268,12 +270,12 @@ class CupyDevice:
             said = (str(error).strip() or type(error).__name__).splitlines()
             raise DeviceError(
                 f"simulate_many: backend='cuda': NVRTC did not compile the kernel ({said[0]}); "
-                f"pip install 'symfric[cuda]' brings one that fits, or {MEANWHILE}"
+                f"pip install 'symfric[cuda]' installs a matching version, or {MEANWHILE}"
             ) from None
         return CupyLoaded(self.cupy, function, self._threads(int(function.num_regs)))
 
     def _threads(self, registers: int) -> int:
-        """How many threads with so many registers run at once."""
+        """Return the number of threads that run at once with this number of registers."""
         p = self.properties
         of_warp = -(-max(1, registers) * WARP // GRAIN) * GRAIN
         warps = int(p["regsPerMultiprocessor"]) // of_warp
@@ -281,32 +283,32 @@ class CupyDevice:
         return int(p["multiProcessorCount"]) * max(BLOCK, threads)
 
     def put(self, array: Numbers) -> CupyArray:
-        """A copy on the device; raises MemoryError."""
+        """Return a copy on the device; raises MemoryError."""
         return CupyArray(self.cupy.asarray(array))
 
     def full(self, shape: tuple[int, ...], value: float, kind: DTypeLike) -> CupyArray:
-        """An array with one value everywhere; raises MemoryError."""
+        """Return an array with one value everywhere; raises MemoryError."""
         return CupyArray(self.cupy.full(shape, value, kind))
 
 
 ARCHITECTURE = "compute_80"
-"""Of the first devices whose double precision is half as fast as single (A100)."""
+"""Architecture of the first devices whose double precision is half as fast as single (A100)."""
 
 
 STANDARD = "--std=c++14"
-"""As CuPy has it by default."""
+"""Language standard, the default of CuPy."""
 
 
 @final
 @dataclass(frozen=True)
 class Built:
-    """What NVRTC made of a kernel.
+    """Output of NVRTC for a kernel.
 
     Attributes:
-        text: PTX; "" where it made machine code.
-        log: warnings, and what the assembler tells.
-        registers: of a thread; 0 where it made PTX.
-        stack: bytes of local memory of a thread for arrays and spills; 0 where it made PTX.
+        text: PTX; "" for machine code.
+        log: warnings and assembler output.
+        registers: of a thread; 0 for PTX.
+        stack: bytes of local memory of a thread for arrays and spills; 0 for PTX.
         spilled: bytes written to local memory because registers were too few.
     """
 
@@ -319,7 +321,7 @@ class Built:
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """NVRTC, if it is installed."""
+    """Return NVRTC if it is installed, else None."""
     found = find_spec("nvidia")
     places = [] if found is None else list(found.submodule_search_locations or [])
     for place in places:
@@ -336,7 +338,7 @@ def build(source: str, architecture: str = ARCHITECTURE) -> Built:
         architecture: compute_80 and the like for PTX, sm_80 for machine code and its registers.
 
     Raises:
-        DeviceError: NVRTC is not installed, or refuses the source; its first error is quoted.
+        DeviceError: NVRTC is not installed, or rejects the source; its first error is quoted.
     """
     nvrtc = library()
     if nvrtc is None:
@@ -355,7 +357,7 @@ def build(source: str, architecture: str = ARCHITECTURE) -> Built:
         log = _text(nvrtc, handle, "ProgramLog")
         if status:
             errors = [line for line in log.splitlines() if "error" in line] or [f"status {status}"]
-            raise DeviceError(f"nvrtc: refused the kernel: {errors[0].strip()}")
+            raise DeviceError(f"nvrtc: rejected the kernel: {errors[0].strip()}")
         if machine:
             return _measured(log)
         return Built(_text(nvrtc, handle, "PTX"), log)
@@ -377,7 +379,7 @@ def _text(nvrtc: ctypes.CDLL, handle: ctypes.c_void_p, what: str) -> str:
 
 
 def _measured(log: str) -> Built:
-    """What the assembler says of the kernel and the functions that it calls."""
+    """Read the assembler's report on the kernel and the functions that it calls."""
 
     def most(pattern: str) -> int:
         return max(map(int, re.findall(pattern, log)), default=0)

@@ -1,7 +1,7 @@
-"""The text of the kernel: one member a thread, in C that is CUDA C++, too.
+"""Source of the kernel: one member per thread, valid as C and as CUDA C++.
 
-What differs between a graphics processor and a compiler of this machine is a few lines before and
-behind it, so that the arithmetic is tested where there is no graphics processor.
+A graphics processor and a host compiler need only different lines before and after it, so the
+arithmetic is tested without a graphics processor.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ BLOCK = 64
 NAME = "symfric_launch"
 
 DONE_IN_SINGLE = 1e-5
-"""As `following.DONE`: last correction behind which rounding is left."""
+"""Value of `following.DONE` in single precision: beyond it is rounding."""
 
 ON_DEVICE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
 #define HUGE_VALF __int_as_float(0x7f800000)
@@ -32,7 +32,7 @@ ON_DEVICE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
 #define BESIDE __device__ __noinline__
 #define TICKET(count) atomicAdd(count, 1)
 """
-"""NVRTC has no header; functions of math.h are built in."""
+"""Prefix for NVRTC, which has no header; functions of math.h are built in."""
 
 LAUNCH_ON_DEVICE = Template("""
 extern "C" __global__ void $name(const Many *all)
@@ -40,7 +40,8 @@ extern "C" __global__ void $name(const Many *all)
     symfric_thread(all);
 }
 """)
-"""Without `__launch_bounds__`: with it, the assembler left a six-joint arm 32 registers of 255."""
+"""Launch without `__launch_bounds__`: with it, the assembler left a six-joint arm 32 registers of
+255."""
 
 ON_HOST = """#include <math.h>
 #include <stdbool.h>
@@ -50,7 +51,7 @@ ON_HOST = """#include <math.h>
 """
 
 LAUNCH_ON_HOST = Template("""
-/* Threads one after another. */
+/* Runs the threads one after another. */
 void $name(const Many *all, long long threads)
 {
     for (long long i = 0; i < threads; ++i) symfric_thread(all);
@@ -61,14 +62,14 @@ void $name(const Many *all, long long threads)
 @final
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """A kernel and the sizes of what it reads and writes.
+    """Kernel and the sizes of its data.
 
     Attributes:
-        text: of functions and loop, without what differs between machines.
+        text: of functions and loop, without the machine-dependent part.
         real: floating point type of all but times.
         rows: of S.
         given: rows of R.
-        states: whose least and greatest values are kept.
+        states: number of states whose least and greatest values are kept.
         signals: of a result.
         operations: of an attempt.
     """
@@ -97,11 +98,11 @@ _KNOWN: WeakKeyDictionary[Integrator, dict[tuple[bool, str], Kernel]] = WeakKeyD
 
 
 def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE) -> Kernel:
-    """The kernel of an integrator's attempt, written once and kept for as long as that lives.
+    """Return the kernel of an integrator's attempt, written once and cached during its lifetime.
 
     Args:
         integrator: of a model without events.
-        between: whether there are results between the ends of steps.
+        between: True if there are results between the ends of steps.
         real: floating point type.
 
     Raises:
@@ -152,5 +153,5 @@ def _text(functions: list[Written], sizes: dict[str, object], real: Real) -> str
     written = "\n".join(one.text for one in functions)
     defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
     loop = Path(__file__).with_name("members.h").read_text(encoding="utf-8")
-    # sizes stand behind the written functions, whose arguments may be called like one of them
+    # define sizes after the written functions, whose arguments may have the same names
     return f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n{defined}\n{loop}"

@@ -1,23 +1,23 @@
-/* Runs of many members, one a thread: a thread whose member is done takes the next one, so that
-   the threads of a warp make attempts together as long as there are members that wait.
+/* Runs many members, one per thread: a thread whose member is done takes the next one, so that the
+   threads of a warp make attempts together as long as members are waiting.
 
-   This is C and CUDA C++ alike. Before it: `real`; DEVICE, BESIDE (a function of its own) and
-   TICKET (add one, return what was there); `symfric_attempt` (S, R -> next, D), `symfric_values`
-   (t, y, d -> signals) and, where FOLLOWS is 2, `symfric_round` (y, d -> after, look); and the
-   sizes of everything: N unknowns, NX states, MEMORY rows of S before them, T and H among these,
-   SIZE_R rows of R, T_END among them, N_D its last ones that are run data, ROWS of dense output
-   (0: results at the ends of members alone), SIGNALS, FLOOR. Where FOLLOWS is 2, algebraic
-   unknowns follow a jump of inputs in ROUNDS with DONE and CONTRACTION; where that fails, or
-   FOLLOWS is 1, the member stops there.
+   This is valid C and CUDA C++. Required before it: `real`; DEVICE, BESIDE (a function that is not
+   inlined) and TICKET (add one, return the old value); `symfric_attempt` (S, R -> next, D),
+   `symfric_values` (t, y, d -> signals) and, if FOLLOWS is 2, `symfric_round` (y, d -> after,
+   look); and all sizes: N unknowns, NX states, MEMORY rows of S before them, with T and H among
+   these, SIZE_R rows of R, with T_END among them, N_D its last ones that are run data, ROWS of
+   dense output (0: results at the ends of members only), SIGNALS, FLOOR. If FOLLOWS is 2, algebraic
+   unknowns are updated after a jump of inputs in ROUNDS with DONE and CONTRACTION; if that fails,
+   or FOLLOWS is 1, the member stops there.
 
-   Time is a double in either type. Where `real` is single (OWN_TIME), an attempt sees time from
-   its own beginning, S[T] = 0, or t + h would have no digits of a short h; TIMED: the last unknown
-   is the time. */
+   Time is a double in either type. If `real` is single (OWN_TIME), an attempt measures time from
+   its own start, S[T] = 0, because t + h would lose the digits of a short h. TIMED: the last
+   unknown is the time. */
 
 enum { S_ROWS = MEMORY + N };
 enum { ENDED = 0, RUNNING = 1, OUT_OF_ATTEMPTS = 2, TOO_SMALL = 3, SEARCH = 7, FRESH = 8 };
 
-/* What all members share, and theirs: number i of member m at [i * members + m] where not said. */
+/* Common data, and data of members: entry i of member m at [i * members + m] by default. */
 typedef struct {
     real *S;               /* columns S, advanced in place */
     const real *R;         /* run data, whose last n_data entries the input intervals fill */
@@ -29,24 +29,24 @@ typedef struct {
     long long n_data, data_step;
     const double *ends;    /* end time of each member */
     const double *h_min;   /* smallest step of each member */
-    const double *times;   /* of results; one at which an interval begins belongs to that interval */
+    const double *times;   /* of results; at a break it belongs to the later interval */
     long long n_times, times_step, max_attempts;
-    long long follow;      /* whether algebraic unknowns follow the data at the start, too */
+    long long follow;      /* 1 if algebraic unknowns follow the data at the start, too */
     real *out;             /* signals, of member m from m * n_times * SIGNALS on */
     int *reason;
     long long *made;
-    real *reach;           /* least and greatest states at the ends of steps, of the start given */
-    int *interval, *next;  /* where each member is: input interval, next result */
-    const int *todo;       /* members that are to go on */
+    real *reach;           /* least and greatest states; on entry those of the start */
+    int *interval, *next;  /* of each member: current input interval, next result */
+    const int *todo;       /* members to continue */
     long long n_todo, budget;
-    int *ticket;           /* how many of them were taken */
+    int *ticket;           /* number of them taken */
 } Many;
 
 typedef struct {
     real S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], least[NX + 1], most[NX + 1];
-    double t, t_after, end; /* time, that behind the attempt, end of the input interval */
+    double t, t_after, end; /* time, time after the attempt, end of the input interval */
     double h_min, due;      /* smallest step; time of the next result */
-    long long left;         /* attempts that are allowed still */
+    long long left;         /* attempts still allowed */
     int member, interval, next;
 } Thread;
 
@@ -55,7 +55,7 @@ static DEVICE const double *times_of(const Many *all, const Thread *x)
     return all->times + x->member * all->times_step;
 }
 
-/* The next result is that at the fraction s of the step just made, or at its start. */
+/* Computes the next result, at a fraction of the step just made. */
 static BESIDE void ask(const Many *all, Thread *x, double fraction)
 {
     const real s = (real)fraction, t = (real)times_of(all, x)[x->next];
@@ -82,7 +82,7 @@ static DEVICE int is_last(const Many *all, const Thread *x)
            || all->breaks[x->interval + 1] >= all->ends[x->member];
 }
 
-/* Whether there is a result to give up to time t. */
+/* Returns 1 if a result is due up to time t. */
 static DEVICE int has_due(const Many *all, const Thread *x, double t)
 {
     if (x->next >= all->n_times) return 0;
@@ -95,7 +95,7 @@ static DEVICE void note_due(const Many *all, Thread *x)
     x->due = x->next < all->n_times ? times_of(all, x)[x->next] : HUGE_VAL;
 }
 
-/* Let the algebraic unknowns follow the run data; whether they could. */
+/* Updates the algebraic unknowns to the run data; returns 0 on failure. */
 static BESIDE int follow(Thread *x)
 {
 #if FOLLOWS == 2
@@ -118,7 +118,7 @@ static BESIDE int follow(Thread *x)
 #endif
 }
 
-/* Time, as an attempt sees it. */
+/* Sets the time of an attempt. */
 static DEVICE void look_ahead(Thread *x)
 {
 #if OWN_TIME
@@ -132,7 +132,7 @@ static DEVICE void look_ahead(Thread *x)
 #endif
 }
 
-/* End and data of the input interval. */
+/* Sets end and data of the input interval. */
 static DEVICE void take_data(const Many *all, Thread *x)
 {
     const real *data = all->data + x->member * all->data_step;
@@ -142,7 +142,7 @@ static DEVICE void take_data(const Many *all, Thread *x)
     look_ahead(x);
 }
 
-/* Begin the input interval; whether that can be. */
+/* Begins the input interval; returns 0 on failure. */
 static BESIDE int enter(const Many *all, Thread *x)
 {
     take_data(all, x);
@@ -152,7 +152,7 @@ static BESIDE int enter(const Many *all, Thread *x)
     return 1;
 }
 
-/* Leave the member, done or not. */
+/* Stores the member, finished or not. */
 static BESIDE void leave(const Many *all, Thread *x, int reason)
 {
     const int m = x->member;
@@ -169,7 +169,7 @@ static BESIDE void leave(const Many *all, Thread *x, int reason)
     x->member = -1;
 }
 
-/* Take the next member, if there is one. */
+/* Takes the next member, if there is one. */
 static BESIDE void fill(const Many *all, Thread *x)
 {
     const int k = TICKET(all->ticket);
@@ -203,7 +203,7 @@ static DEVICE int is_small(const Thread *x)
     return !(h >= x->h_min && h >= FLOOR * fabs(x->t));
 }
 
-/* The member has stopped: its next interval, or the next member, until one can go on. */
+/* Goes to the next interval or the next member, until one can continue. */
 static BESIDE void settle(const Many *all, Thread *x)
 {
     while (x->member != -2) {
@@ -226,7 +226,7 @@ static BESIDE void settle(const Many *all, Thread *x)
     }
 }
 
-/* Take over what an attempt made. */
+/* Stores the results of an attempt. */
 static DEVICE void take(const Many *all, Thread *x)
 {
     --x->left;
@@ -254,7 +254,7 @@ static DEVICE void take(const Many *all, Thread *x)
     if (!(x->t < x->end) || is_small(x) || x->left <= 0) settle(all, x);
 }
 
-/* One thread: attempts of one member after another, as many as its budget. */
+/* Runs one thread: attempts of one member after another, up to its budget. */
 static DEVICE void symfric_thread(const Many *all)
 {
     Thread x;

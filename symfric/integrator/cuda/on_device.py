@@ -22,20 +22,21 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 FRESH = 8
-"""Reason of a member that was not begun (`members.h`)."""
+"""Reason of a member that was not started (`members.h`)."""
 FIRST, LAUNCH = 32, 0.25
-"""Attempts of the first launch of a thread, and how long [s] later ones are to take: far below the
-seconds after which a system takes a graphics processor away, and short enough to interrupt."""
+"""Attempts in the first launch of a thread, and intended duration [s] of later ones: far below the
+seconds after which a system resets a graphics processor, and short enough for interrupts.
+"""
 FASTER = 4.0
-"""How much longer than the one before a launch may be."""
+"""Largest ratio of the budget of a launch to the one before."""
 SHARE = 0.8
-"""Of the free memory of a device that members may take."""
+"""Fraction of the free memory of a device that members may take."""
 
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_longlong
 
 
 class Many(ctypes.Structure):
-    """`Many` of members.h."""
+    """Struct `Many` of members.h."""
 
     _fields_ = (
         ("S", _POINTER), ("R", _POINTER), ("t", _POINTER), ("members", _COUNT),
@@ -53,17 +54,17 @@ class Many(ctypes.Structure):
 @final
 @dataclass(eq=False)
 class DeviceMembers:
-    """Members on a device, one a thread; see `symfric.integrator.many.members.Members`.
+    """Members on a device, one per thread; see `symfric.integrator.many.members.Members`.
 
-    Mutable in what it counts, for reports and tests.
+    Mutable in its counters, for reports and tests.
 
     Attributes:
-        kernel: what they do.
-        device: where.
-        loaded: the kernel there.
-        tell: called between launches with how many of the members of this call are done.
-        launches: how many there were.
-        budget: attempts of a thread in the next one.
+        kernel: source and sizes.
+        device: that runs it.
+        loaded: the kernel on the device.
+        tell: called between launches with the number of finished members of this call.
+        launches: number of launches.
+        budget: attempts of a thread in the next launch.
     """
 
     kernel: Kernel
@@ -75,15 +76,15 @@ class DeviceMembers:
 
     @classmethod
     def of(cls, kernel: Kernel, device: Device) -> "DeviceMembers":
-        """Members of a kernel, which is compiled; raises as `Device.load`."""
+        """Compile a kernel for its members; raises as `Device.load`."""
         return cls(kernel, device, device.load(kernel))
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
-        """Advance members over a stretch, as many at once as the memory of the device takes.
+        """Advance members over a stretch, as many at once as fit in the device memory.
 
         Raises:
-            DeviceError: the device refused.
-            MemoryError: there is no room for a single member.
+            DeviceError: an error of the device.
+            MemoryError: not enough memory for a single member.
             KeyboardInterrupt: Ctrl-C, between two launches.
         """
         count = S.shape[0]
@@ -98,7 +99,7 @@ class DeviceMembers:
             except MemoryError:
                 if most == 1:
                     raise
-                most = (most + 1) // 2  # somebody else took some meanwhile
+                most = (most + 1) // 2  # another process took some memory
                 continue
             part.whole()
             found[pick], reason[pick] = part.results(S[pick], made[pick], reach[pick])
@@ -106,18 +107,18 @@ class DeviceMembers:
         return found, reason, reach
 
     def _most(self, stretch: Stretch) -> int:
-        """Members that the memory takes."""
+        """Return the number of members that fit in memory."""
         return max(1, int(SHARE * self.device.free / member_bytes(self.kernel, stretch)))
 
     def launched(self, spent: float) -> None:
-        """Count a launch that took `spent` seconds, and choose how long the next one is."""
+        """Count a launch that took `spent` seconds, and set the budget of the next one."""
         self.launches += 1
         factor = LAUNCH / max(spent, LAUNCH / FASTER)
         self.budget = max(1, int(self.budget * min(factor, FASTER)))
 
 
 def member_bytes(kernel: Kernel, stretch: Stretch) -> int:
-    """Memory of a member on a device."""
+    """Return the memory of a member on a device [bytes]."""
     numbers = kernel.rows + kernel.given + 2 * kernel.states
     numbers += stretch.times.shape[1] * kernel.signals
     numbers += stretch.data[0].size if stretch.data.shape[0] > 1 else 0
@@ -131,8 +132,8 @@ class _Part:
     """Members that are on the device together.
 
     Attributes:
-        of_all: who runs them.
-        count: how many they are.
+        of_all: runs them.
+        count: number of members.
         held: their arrays there, by the names of the struct.
         numbers: its other fields.
     """
@@ -150,7 +151,7 @@ class _Part:
         columns: tuple[Array, Array, Counts, Array],
         stretch: Stretch,
     ) -> "_Part":
-        """Put members there; raises MemoryError."""
+        """Copy members to the device; raises MemoryError."""
         device, kernel = members.device, members.kernel
         real: DTypeLike = np.float32 if kernel.real.size < 8 else np.float64
         S, R, made, reach = (column[pick] for column in columns)
@@ -182,9 +183,9 @@ class _Part:
         return cls(members, count, held, numbers)
 
     def whole(self) -> None:
-        """Launch until no member is under way.
+        """Launch until all members are finished.
 
-        Those that are go on together: a warp that had one of them left would run for it alone.
+        Unfinished members are regrouped: a warp with one member left would run for it alone.
         """
         all_, device, loaded = self.of_all, self.of_all.device, self.of_all.loaded
         todo = np.arange(self.count, dtype=np.int32)
@@ -206,7 +207,7 @@ class _Part:
                 all_.tell(self.count - todo.size)
 
     def results(self, S: Array, made: Counts, reach: Array) -> tuple[Array, Counts]:
-        """Signals and reasons; S, made and reach are written over."""
+        """Return signals and reasons; overwrite S, made and reach."""
         S[:] = self.held["S"].get().T
         S[:, State.T] = self.held["t"].get()
         made[:] = self.held["made"].get()
@@ -217,24 +218,25 @@ class _Part:
 
 WHERE = "simulate_many: backend='cuda'"
 OPERATIONS, BYTES = 2**30, 2**30
-"""Of one attempt of all members of a chunk, and of their results and data: enough members for all
-threads of the largest devices several times over where they are small, and where they are large few
-enough to keep what is done after an interrupt."""
+"""Limits on the operations of one attempt of all members of a chunk, and on their results and data
+[bytes]: small members fill all threads of the largest devices several times, and chunks of large
+ones are small enough to keep results after an interrupt.
+"""
 LOOSEST = 1e-5
 """Smallest relative tolerance that single precision meets."""
 
 
 def find_device() -> Device:
-    """The graphics processor of this machine.
+    """Return the graphics processor of this machine.
 
     Raises:
-        DeviceError: none, or no CuPy.
+        DeviceError: no device, or no CuPy.
     """
     return CupyDevice.found()
 
 
 def check(model: Model, executor: object, workers: object, rtol: float, real: str) -> None:
-    """Refuse what a device cannot do, or has no use for.
+    """Check that a device supports the arguments.
 
     Raises:
         ValueError: a model with events, an executor, too tight a tolerance for single precision.
@@ -247,9 +249,7 @@ def check(model: Model, executor: object, workers: object, rtol: float, real: st
         )
     if executor not in ("threads", "serial") or workers is not None:
         given = f"workers = {workers}" if workers is not None else f"executor = {executor!r}"
-        raise ValueError(
-            f"{WHERE}: expected no executor and no workers, which are for processors, got {given}"
-        )
+        raise ValueError(f"{WHERE}: expected no executor and no workers (CPU options), got {given}")
     if real == "float" and rtol < LOOSEST:
         raise ValueError(
             f"{WHERE}: rtol: expected at least {LOOSEST:g} with real='float', got {rtol:g}; use "
@@ -260,11 +260,11 @@ def check(model: Model, executor: object, workers: object, rtol: float, real: st
 @final
 @dataclass(frozen=True, eq=False)
 class OnDevice:
-    """An ensemble on a device.
+    """Ensemble on a device.
 
     Attributes:
-        job: what all chunks share.
-        members: who runs them.
+        job: data shared by all chunks.
+        members: that run them.
     """
 
     job: Job
@@ -274,31 +274,31 @@ class OnDevice:
     def of(
         cls, integrator: Integrator, breaks: Array, times: Array, max_steps: int, real: str
     ) -> "OnDevice":
-        """Of an integrator; `times` are those of the results [s], as in `Job`.
+        """Build from an integrator; `times` are those of the results [s], as in `Job`.
 
         Raises:
-            DeviceError: there is none, or it refuses the kernel.
+            DeviceError: there is no device, or it rejects the kernel.
             ValueError: an operation that C does not have.
         """
         device = find_device()
         between = not np.isin(times, breaks).all()
         kernel = kernel_of(integrator, between, REALS[real])
-        # the kernel is the code that the results depend on
+        # the results depend on the code of the kernel
         own = replace(program(integrator, False), code=kernel.text)
         return cls(Job(own, breaks, times, max_steps), DeviceMembers.of(kernel, device))
 
     def chunk(self, own_data: int) -> int:
-        """How many members a chunk has whose own input data are so many numbers each."""
+        """Return the number of members of a chunk with this many input data per member."""
         return chunk_of(self.members.kernel, max(1, self.job.times.size), own_data)
 
     def report(self, progress: Callable[[float], None], done: Callable[[], int], of: int) -> None:
-        """Tell `progress` of members between launches, of whom `done()` are in finished chunks."""
+        """Report progress between launches; `done()` counts the members in finished chunks."""
         most = 0.0
 
         def tell(now: int) -> None:
             nonlocal most
             fraction = min(1.0, (done() + now) / of)
-            if fraction > most:  # those that are run again do not count back
+            if fraction > most:  # progress never goes back when members are run again
                 most = fraction
                 progress(fraction)
 
@@ -306,6 +306,8 @@ class OnDevice:
 
 
 def chunk_of(kernel: Kernel, times: int, own_data: int) -> int:
-    """Members of a chunk; the same on every device, so that a folder of results is found again."""
+    """Return the members of a chunk; equal on all devices, so that stored results are found
+    again.
+    """
     size = kernel.real.size * (kernel.rows + kernel.given + times * kernel.signals + own_data)
     return max(1, min(OPERATIONS // kernel.operations, BYTES // size))

@@ -1,1 +1,1 @@
-"""Derivatives of the steps that were taken, forwards and backwards."""
+"""Derivatives of the steps that were taken, forward and reverse."""

@@ -1,7 +1,8 @@
-"""The Functions that differentiate the steps of an integrator, one name at a time or in lanes.
+"""Functions that differentiate the steps of an integrator, one name at a time or in lanes.
 
-A step by one name holds the step itself, the same for all names, and what is linear in the
-derivatives. On vectors of a lane for each name the former costs what it costs alone, and the latter
+A step differentiated by one name contains the step itself, the same for all names, and a part
+linear in the derivatives. On vectors with one lane per name the former costs as much as alone, and
+the latter
 is done for all names at once, in the same operations as one after another: with the same bits.
 """
 
@@ -31,15 +32,15 @@ ONE = (
     "acosh", "atanh", "erf",
 )  # fmt: skip
 TWO = ("pow", "atan2", "hypot", "fmod", "remainder")
-"""Functions that only what is the same in all lanes is an argument of: libm is asked once."""
+"""Functions whose arguments are the same in all lanes: libm is called once."""
 
 
 def lanes_source(one: ca.Function, of_d: Array) -> str:
-    """C of a sweep over rows (`compiled.columns`) by the names of `of_d`, shape (n_d, names).
+    """Return the C of a sweep over rows (`compiled.columns`) by the names of `of_d` (n_d, names).
 
-    `one` is (X, y, h, d, d', ...) -> (X of the next step, column) of one name, where the last one
-    of the further arguments, if there are any, is another one for each name, too. In the column of
-    all names those of each name follow each other in parts as long as y.
+    `one` is (X, y, h, d, d', ...) -> (X of the next step, column) of one name. The last of any
+    further arguments also differs from name to name. In the column of all names, the columns of
+    each name follow each other in parts as long as y.
     """
     text, slots = vector_source("symfric_one", one)
     names, sizes = of_d.shape[1], [one.numel_in(i) for i in range(one.n_in())]
@@ -79,7 +80,7 @@ def lanes_source(one: ca.Function, of_d: Array) -> str:
 
 
 def _begin(argument: int, place: int) -> str:
-    """Address of the row of an argument that has another column for each name."""
+    """Return the address of the row of an argument that has one column per name."""
     return "X" if argument == 0 else f"symfric_at(in + {place}, k)"
 
 
@@ -108,7 +109,7 @@ static void symfric_same(V *a, const symfric_place *p, long long k, int size)
   for (i = 0; i < size; ++i) a[i] = ALL(x[i]);
 }
 
-/* Columns of the names from b on, one in each lane. */
+/* Loads the columns of the names from b on, one per lane. */
 static void symfric_lanes(V *a, const double *x, int size, int b)
 {
   int i, j;
@@ -146,7 +147,7 @@ $own
 
 
 LARGE = 5000
-"""Functions with more instructions stay as they are: reading them takes time."""
+"""Functions with more instructions stay unchanged: rewriting takes time."""
 
 
 @final
@@ -173,11 +174,12 @@ class Derivatives:
         return [ca.SX.sym(name, self.step.numel_in(i)) for i, name in enumerate("yhd")]
 
     def forward(self, which: Seeds, linked: bool) -> Columns:
-        """(X, y, h, d) -> (X of the next step, Z of its end and of each row of its dense output).
+        """Return (X, y, h, d) -> (X of the next step, Z of its end and of each row of its dense
+        output).
 
-        X holds the derivatives of the start, shape (n, names). Where steps are `linked`
-        (`links`), it has a row more, of the time of the start, and there are arguments share, fall,
-        by_state transposed, by_data d'.
+        X holds the derivatives of the start, shape (n, names). If steps are `linked` (`links`), it
+        has one more row, of the time of the start, and there are arguments share, fall, by_state
+        transposed, by_data d'.
         """
         key = (linked, *which.parameters)
         if key not in self._forward:
@@ -202,7 +204,9 @@ class Derivatives:
         return self._forward[key]
 
     def _by_one(self, linked: bool) -> ca.Function:
-        """(X, y, h, d, d', ...) -> the same by one name, with the derivatives d' of d by it."""
+        """Return (X, y, h, d, d', ...) -> the same by one name, with the derivatives d' of d by
+        it.
+        """
         n, (y, h, d) = self.system.n, self.symbols
         X, of_d = ca.SX.sym("X", n + linked), ca.SX.sym("of_d", d.numel())
         of_h = -X[n:] if linked else ca.SX(1, 1)
@@ -217,15 +221,15 @@ class Derivatives:
         return fast("one", [X, y, h, d, of_d, *more], results)
 
     def _link(self, parts: int) -> list[ca.SX]:
-        """Arguments share, fall, by_state transposed of a link behind a step with these results."""
+        """Return the arguments share, fall, by_state transposed of a link after a step."""
         n = self.system.n
         share, fall = ca.SX.sym("share", parts + 1), ca.SX.sym("fall", n)
         return [share, fall, ca.SX.sym("by_state", n, n + 1)]
 
     def reverse(self, linked: bool) -> Columns:
-        """(adjoint of the next X, y, h, d, weights) -> (adjoint of X, of d).
+        """Return (adjoint of the next X, y, h, d, weights) -> (adjoint of X, of d).
 
-        `weights` are those of the start and of all results of the step, end first. Where steps are
+        `weights` are those of the start and of all results of the step, end first. If steps are
         `linked`, there are arguments weight of the time of the start, share, fall, by_state and
         by_data transposed.
         """
@@ -252,7 +256,7 @@ class Derivatives:
         return self._reverse[linked]
 
     def many(self, function: ca.Function, rows: list[Array], backend: str) -> list[Array]:
-        """Results of one of the Functions here for the rows of arrays."""
+        """Return results of one of the Functions here for the rows of arrays."""
         if function.name() not in self._many:
             self._many[function.name()] = Columns(function)
         return self._many[function.name()](rows, backend=backend)
@@ -275,7 +279,7 @@ class Derivatives:
 
     @cached_property
     def rates(self) -> ca.Function:
-        """(y, d) -> matrix and right-hand side of all rates y', those of algebraic unknowns, too.
+        """(y, d) -> matrix and right-hand side of all rates y', also of algebraic unknowns.
 
         Equations without rates are differentiated by time: M y' = f and g_y y' = 0.
         """
@@ -293,11 +297,11 @@ class Derivatives:
 
     @cached_property
     def of_resets(self) -> ca.Function:
-        """Those of the values of all resets."""
+        """Derivatives of the values of all resets, likewise."""
         return _slopes("of_resets", self.resets)
 
     def of_signals(self, which: Seeds) -> Columns:
-        """Derivatives of all signals (t, y, d, S) -> (signals, names)."""
+        """Return derivatives of all signals (t, y, d, S) -> (signals, names)."""
         if which.parameters not in self._signals:
             names, arguments = len(which.names), self.at_times
             of_d = ca.SX(ca.sparsify(ca.DM(which.of_data(arguments[2].numel()))))
@@ -315,9 +319,9 @@ class Derivatives:
         return [ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd")]
 
     def weighted(self, used: tuple[int, ...]) -> Columns:
-        """Derivatives of a weighted sum of signals (t, y, d, weights) -> (by y, by d).
+        """Return derivatives of a weighted sum of signals (t, y, d, weights) -> (by y, by d).
 
-        Only of those `used`: others may have no derivative, as a norm at zero.
+        Only signals in `used` are included: others may have no derivative, such as a norm at zero.
         """
         if used not in self._weighted:
             t, y, d = self.at_times
@@ -328,7 +332,7 @@ class Derivatives:
 
 
 def fast(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
-    """The Function with fewer divisions and tanh written out; as it is where it is large.
+    """Return the Function with fewer divisions and tanh written out; unchanged if it is large.
 
     A step divides several times by one number and calls tanh, and its derivatives more often.
     """
@@ -343,7 +347,7 @@ def fast(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function
 
 
 def _slopes(name: str, function: ca.Function) -> ca.Function:
-    """Derivatives of a Function (t, y, d) by each of its arguments."""
+    """Return derivatives of a Function (t, y, d) by each of its arguments."""
     arguments = [ca.SX.sym(n, function.numel_in(i)) for i, n in enumerate("tyd")]
     values = function(*arguments)
     return ca.Function(name, arguments, [ca.jacobian(values, x) for x in arguments])
@@ -353,7 +357,7 @@ _MADE: WeakKeyDictionary[Integrator, Derivatives] = WeakKeyDictionary()
 
 
 def derivatives(integrator: Integrator) -> Derivatives:
-    """The Functions for `integrator`."""
+    """Return the Functions for `integrator`."""
     if integrator not in _MADE:
         _MADE[integrator] = Derivatives(
             integrator.system,

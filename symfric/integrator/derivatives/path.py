@@ -1,4 +1,4 @@
-"""A run as its derivatives see it, and by what it is differentiated."""
+"""Steps and jumps of a run for its derivatives, and the names to differentiate by."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """What to differentiate with respect to.
+    """Names to differentiate with respect to.
 
     Attributes:
         names: as the user wrote them: a parameter, or "x0.v" for the start value of a state.
@@ -33,7 +33,7 @@ class Seeds:
     start: Array
 
     def of_data(self, n_d: int) -> Array:
-        """Derivative of the run data d by each name, shape (n_d, names)."""
+        """Return the derivative of the run data d by each name, shape (n_d, names)."""
         selector = np.zeros((n_d, len(self.names)))
         for column, row in enumerate(self.parameters):
             if row >= 0:
@@ -41,7 +41,7 @@ class Seeds:
         return selector
 
     def through(self, by_data: Array) -> Array:
-        """Derivative by each name from that by the run data, shape (names,)."""
+        """Return the derivative by each name from that by the run data, shape (names,)."""
         return np.array([by_data[row] if row >= 0 else 0.0 for row in self.parameters])
 
 
@@ -52,9 +52,9 @@ def seeds(
     p: Mapping[str, float] | None,
     t: float = 0.0,
 ) -> Seeds:
-    """Look the names up; `x0` and `p` as in `simulate`, which starts at `t` [s].
+    """Return the seeds of the names; `x0` and `p` as in `simulate`, which starts at `t` [s].
 
-    A start value that follows from others, as a bristle's in steady sliding does, is differentiated
+    A start value that depends on others, such as a bristle's in steady sliding, is differentiated
     along with them.
 
     Raises:
@@ -80,9 +80,9 @@ class Jump:
     Attributes:
         step: number of accepted steps before.
         t: time [s].
-        size: of the step that they cut [s], in full; 0 where they cut none.
-        at_once: whether another jump led to them, and no motion.
-        before, after: unknowns before and behind them, shape (n,).
+        size: full size of the step that they cut [s]; 0 if they cut none.
+        at_once: True if another jump led to them instead of motion.
+        before, after: unknowns before and after them, shape (n,).
         which: numbers of the events.
     """
 
@@ -112,11 +112,11 @@ class Break:
 @final
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Steps without a jump in between; there are none behind an event that ends a run.
+    """Steps between two jumps; empty after an event that ends a run.
 
     Attributes:
         opening: the jumps before, in their order; None is the start.
-        steps: which.
+        steps: slice of the steps.
     """
 
     opening: tuple[Jump | Break | None, ...]
@@ -131,14 +131,14 @@ class Piece:
 @final
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The accepted steps of a run, and the numbers they were made with.
+    """Accepted steps of a run and the data they were made with.
 
     Attributes:
-        integrator, inputs, p, backend: what was run, and how.
+        integrator, inputs, p, backend: of the run.
         dense: the continuous solution.
-        guess: unknowns from which consistent ones at the start were found.
+        guess: initial guess of the consistent start values.
         happened: events that were carried out.
-        tolerance: how sharply they were located [s].
+        tolerance: of their location [s].
         known: times of the result [s] and unknowns there, shape (n, times).
     """
 
@@ -153,13 +153,13 @@ class Path:
     known: tuple[Array, Array] | None = None
 
     def unknowns(self, times: Array) -> Array:
-        """Unknowns y at times, shape (times, n)."""
+        """Return unknowns y at times, shape (times, n)."""
         if self.known is not None and times is self.known[0]:
             return self.known[1].T
         return self.dense(times).T
 
     def data(self, interval: NDArray[np.intp]) -> Array:
-        """Run data d on input intervals, shape (intervals, n_d)."""
+        """Return run data d on input intervals, shape (intervals, n_d)."""
         if self.inputs.values.shape[1] == 1:
             d = np.concatenate([self.p, self.inputs.values[:, 0]])
             return np.ndarray((interval.size, d.size), float, d, 0, (0, d.itemsize))
@@ -167,7 +167,7 @@ class Path:
         return np.hstack([p, self.inputs.values[:, interval].T])
 
     def data_at(self, times: Array) -> Array:
-        """Run data d at times, shape (times, n_d)."""
+        """Return run data d at times, shape (times, n_d)."""
         return self.data(self._intervals(times))
 
     def _intervals(self, times: Array) -> NDArray[np.intp]:
@@ -199,7 +199,7 @@ class Path:
 
     @cached_property
     def size(self) -> Array:
-        """Size of every step [s], in full where an event cut it."""
+        """Size of every step [s]; the full size if an event cut it."""
         size = self.dense.t1 - self.dense.t0
         for jump in self.jumps:
             if jump.size:
@@ -212,7 +212,9 @@ class Path:
         return [self.dense.y0, self.size, self.data(self.interval)]
 
     def shares(self, theta: Array) -> Array:
-        """Shares of start, end and dense output of a step in its values, a row for each theta."""
+        """Return the weights of start, end and dense output of a step in its values, a row per
+        theta.
+        """
         found = np.empty((theta.size, self.dense.D.shape[1] + 2))
         found[:, 0], found[:, 1] = 1 - theta, theta
         for row in range(2, found.shape[1]):
@@ -220,14 +222,16 @@ class Path:
         return found
 
     def place(self, jump: Jump) -> int:
-        """Input interval in which events happened, at a break the one before unless at once."""
+        """Return the input interval in which events happened, at a break the earlier one unless
+        at once.
+        """
         if jump.size:
             return int(self.interval[jump.step - 1])
         return int(self.inputs.interval(np.array([jump.t]))[0])
 
     @cached_property
     def breaks(self) -> list[Break]:
-        """Jumps of the inputs, where algebraic unknowns follow."""
+        """Jumps of the inputs that algebraic unknowns follow."""
         if not self.integrator.system.algebraic[0]:
             return []
         steps = np.flatnonzero(np.diff(self.interval)) + 1
@@ -235,7 +239,7 @@ class Path:
 
     @property
     def linked(self) -> bool:
-        """Whether something jumps between its steps."""
+        """True if there are jumps between its steps."""
         return bool(self.happened) or len(self.pieces) > 1
 
     @cached_property
@@ -244,7 +248,7 @@ class Path:
         openings: dict[int, list[Jump | Break | None]] = {0: [None]}
         breaks = self.breaks
         for jump in self.jumps:
-            # an event right on a break was before it, unless the break brought it about
+            # an event right on a break was before it, unless the break caused it
             before = [b for b in breaks if b.step <= jump.step and (b.t < jump.t or jump.at_once)]
             breaks = breaks[len(before) :]
             for mark in (*before, jump):

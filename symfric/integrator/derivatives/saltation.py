@@ -1,16 +1,17 @@
-"""What jumps make of derivatives: saltation.
+"""Derivatives across jumps: saltation matrices.
 
-An event g(t, y, d) = 0 that y(t) reaches comes earlier or later with what is differentiated. With S
-the derivatives of y at a fixed time before it, f the rate of y and a reset r,
+The time of an event g(t, y, d) = 0 depends on the parameters. With S the derivatives of y at a
+fixed
+time before it, f the rate of y and a reset r,
 
     t*' = -(g_y S + g_d d') / (g_y f + g_t)
     S   <- S + f t*'                                of y at the event, which moves
-    S   <- C (r_y S + r_t t*' + r_d d') + C_d d'     behind the reset
+    S   <- C (r_y S + r_t t*' + r_d d') + C_d d'     after the reset
 
-where C makes the algebraic unknowns follow, and the next step starts at the event, so that it is
-shorter by t*'. An event to which a jump leads at once shares the time of that jump. Events at one
-instant whose times differ in their derivatives are taken one after another, with f between them;
-where another order leads elsewhere the motion has no derivative.
+where C updates the algebraic unknowns, and the next step starts at the event, so it is shorter by
+t*'. An event caused by another jump shares the time of that jump. Events at one instant whose times
+differ in their derivatives are taken one after another, with f between them; if another order leads
+to another state, the motion has no derivative.
 
 Source: Aizerman and Gantmakher, Quart. J. Mech. Appl. Math., 1958; Leine and Nijmeijer, Dynamics
 and Bifurcations of Non-Smooth Mechanical Systems, 2004 (saltation matrix).
@@ -31,20 +32,22 @@ from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consiste
 
 Array = NDArray[np.float64]
 GRAZING = 1e-6
-"""Rate of an event expression over its mean rate in the step before below which it touches zero and
-does not cross it; its square, of the rate over that of its terms."""
+"""Rate of an event expression over its mean rate in the step before, below which it touches zero
+without crossing it; the square is the limit of the rate over its terms.
+"""
 SAME = 1e-6
-"""How near two orders of events have to come to each other, relative to what they do."""
+"""Relative difference of two orders of events that counts as equal."""
 MOST = 4
-"""Events at one instant of which all orders are tried; of more, those of neighbours exchanged."""
+"""Number of simultaneous events up to which all orders are tried; for more, neighbours are
+exchanged."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """Derivatives behind a jump by those before it: X -> by_state X + by_data d'.
+    """Derivatives after a jump in terms of those before it: X -> by_state X + by_data d'.
 
-    X holds the derivatives of y and, in its last row, of the time at which y is looked at.
+    X holds the derivatives of y and, in its last row, of the time at which y is evaluated.
 
     Attributes:
         by_state: shape (n + 1, n + 1).
@@ -55,25 +58,25 @@ class Passage:
     by_data: Array
 
     def then(self, other: "Passage") -> "Passage":
-        """One passage and `other` after it."""
+        """Return this passage followed by `other`."""
         through = other.by_state @ self.by_data + other.by_data
         return Passage(other.by_state @ self.by_state, through)
 
 
 def at_start(path: Path) -> Passage:
-    """What consistent start values make of derivatives of those given."""
+    """Return the passage from given to consistent start values."""
     d = path.data(np.zeros(1, dtype=np.intp))[0]
     return _followed(path, path.guess, path.dense.y0[0], d)
 
 
 def passage(path: Path, jump: Jump) -> Passage:
-    """What events make of derivatives.
+    """Return the passage of events.
 
-    Those before are of y at the time of the events; where these cut a step, at a fixed time.
+    Derivatives before it are of y at the time of the events; if these cut a step, at a fixed time.
 
     Raises:
         ValueError: an event that only touches zero, events at one instant that do not commute, or
-            one that comes with a jump of the inputs.
+            one that coincides with a jump of the inputs.
     """
     d = path.data(np.array([path.place(jump)]))[0]
     here = _Instant(path, derivatives(path.integrator), jump.t, d)
@@ -87,7 +90,7 @@ def passage(path: Path, jump: Jump) -> Passage:
 
 
 def _followed(path: Path, y: Array, found: Array, d: Array) -> Passage:
-    """What `consistent` makes of derivatives on its way from y to `found`."""
+    """Return the passage of `consistent` from y to `found`."""
     made = derivatives(path.integrator)
     n, free = made.system.n, made.system.free
     by_y, by_d = np.eye(n), np.zeros((n, d.size))
@@ -110,10 +113,10 @@ def _followed(path: Path, y: Array, found: Array, d: Array) -> Passage:
 
 
 def _alone_in_time(path: Path, here: "_Instant", jump: Jump) -> None:
-    """Refuse an event that moves where the inputs jump: before and behind, other rates count.
+    """Check that no event that moves coincides with a jump of the inputs, where rates change.
 
     Raises:
-        ValueError: it is one.
+        ValueError: one does.
     """
     breaks, k = path.inputs.breaks, path.place(jump)
     for edge in (k, k + 1):
@@ -124,20 +127,20 @@ def _alone_in_time(path: Path, here: "_Instant", jump: Jump) -> None:
         if moved and any(here.delay(i, jump.before, here.before(jump)).any() for i in jump.which):
             raise ValueError(
                 f"{here.where(jump.which)}: expected an event apart from the jumps of the inputs, "
-                f"got one at t = {breaks[edge]:.9g} s; what is before and behind has another "
-                "derivative"
+                f"got one at t = {breaks[edge]:.9g} s; the derivatives before and after it "
+                "differ"
             )
 
 
 def _near(one: Array, other: Array) -> bool:
-    """Whether two arrays are the same, relative to their largest entry."""
+    """Return True if two arrays are equal, relative to their largest entry."""
     return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Instant:
-    """Where events happen: the run, its Functions, time and run data."""
+    """Instant at which events happen: the run, its Functions, time and run data."""
 
     path: Path
     made: Derivatives
@@ -145,20 +148,22 @@ class _Instant:
     d: Array
 
     def where(self, which: Sequence[int]) -> str:
-        """For messages."""
+        """Return the location for messages."""
         model = self.path.integrator.model
         names = listed(f"'{model.events[i].name}'" for i in which)
         return f"sensitivities of '{model.name}': event {names} at t = {self.t:.9g} s"
 
     def rate(self, y: Array) -> Array:
-        """Rates y' by the equations."""
+        """Return the rates y' of the equations."""
         matrix, right = (m.full() for m in self.made.rates.call([y, self.d]))
         return np.linalg.solve(matrix, right[:, 0]).astype(float)
 
     def before(self, jump: Jump) -> Array:
-        """Rates just before events, where what they change is as it was.
+        """Return the rates just before events, where modes and inputs are unchanged.
 
-        By the equations: in a step that a jump of the force ended, dense output has a mean rate.
+        They come from the equations: in a step that a jump of the force ended, dense output has a
+        mean
+        rate.
         """
         if not jump.size:
             return self.rate(jump.before)
@@ -168,7 +173,8 @@ class _Instant:
         return self.rate(dense.piece(k, np.maximum(theta, 0.0))[0])
 
     def delay(self, event: int, y: Array, slope: Array) -> Array:
-        """Derivative of the time of an event by y at a fixed time and by d, shape (n + n_d,).
+        """Return the derivative of the time of an event by y at a fixed time and by d, shape (n +
+        n_d,).
 
         Raises:
             ValueError: its expression only touches zero.
@@ -185,18 +191,18 @@ class _Instant:
         return -np.concatenate([by_y, by_d]) / rate
 
     def slopes_of(self, event: int, y: Array) -> tuple[Array, Array, Array]:
-        """Derivatives of an event expression by t, y and d."""
+        """Return derivatives of an event expression by t, y and d."""
         found = self.made.of_events.call([self.t, y, self.d])
         by_t, by_y, by_d = (m.full()[event] for m in found)
         return by_t, by_y, by_d
 
     def speed(self, event: int, y: Array, slope: Array) -> float:
-        """Rate of an event expression."""
+        """Return the rate of an event expression."""
         by_t, by_y, _ = self.slopes_of(event, y)
         return float(by_y @ slope + by_t[0])
 
     def mean_rate(self, event: int) -> float:
-        """Mean rate of an event expression in the step before."""
+        """Return the mean rate of an event expression in the step before."""
         path = self.path
         k = int(np.searchsorted(path.dense.t1, self.t, side="left"))
         if k == path.dense.t0.size or path.dense.t1[k] != self.t:
@@ -205,7 +211,7 @@ class _Instant:
         return abs(float(self.made.events(t0, y0, self.d)[event])) / (self.t - t0)
 
     def reset(self, y: Array, which: Sequence[int], found: Array) -> Passage:
-        """What the resets of events make of derivatives of y at them; `found` is y behind them."""
+        """Return the passage of the resets of events at y; `found` is y after them."""
         n = y.size
         by_state, by_data = np.eye(n + 1), np.zeros((n + 1, self.d.size))
         by_t, by_y, by_d = (m.full() for m in self.made.of_resets.call([self.t, y, self.d]))
@@ -223,7 +229,7 @@ class _Instant:
         return () if crossings is None else crossings.resets
 
     def after(self, y: Array, which: Sequence[int]) -> Array:
-        """Unknowns y behind the resets of events, algebraic ones as before."""
+        """Return unknowns y after the resets of events, algebraic ones as before."""
         fresh = self.made.resets(self.t, y, self.d).full().ravel()
         after = y.copy()
         for value, (event, state) in zip(fresh, self.resets, strict=True):
@@ -231,14 +237,14 @@ class _Instant:
         return after
 
     def to_fixed_time(self, rate: Array) -> Passage:
-        """From derivatives of y at a time that moves to those at a fixed time."""
+        """Return the passage from derivatives of y at a moving time to those at a fixed time."""
         by_state = np.eye(rate.size + 1)
         by_state[:-1, -1] = -rate
         by_state[-1, -1] = 0.0
         return Passage(by_state, np.zeros((rate.size + 1, self.d.size)))
 
     def to_event(self, delay: Array, slope: Array) -> Passage:
-        """From derivatives of y at a fixed time to those at an event."""
+        """Return the passage from derivatives of y at a fixed time to those at an event."""
         n = slope.size
         times = np.vstack([slope[:, None], [[1.0]]]) @ delay[None]
         by_state = np.zeros((n + 1, n + 1))
@@ -247,7 +253,7 @@ class _Instant:
         return Passage(by_state, times[:, n:])
 
     def crossed(self, jump: Jump, slope: Array) -> Passage:
-        """What events that y crossed make of derivatives at a fixed time before them."""
+        """Return the passage of crossed events from derivatives at a fixed time before them."""
         groups: list[tuple[Array, list[int]]] = []
         for i in jump.which:
             delay = self.delay(i, jump.before, slope)
@@ -262,16 +268,16 @@ class _Instant:
         first, *others = (self.one_by_one(jump, order, slope) for order in _orders(groups))
         if first is None or not all(other and _alike(first, other) for other in others):
             raise ValueError(
-                f"{self.where(jump.which)}: expected events at different times or such that their "
-                "order does not matter, got some that lead elsewhere in another order; the motion "
-                "has no derivative there"
+                f"{self.where(jump.which)}: expected events at different times, or independent of "
+                "their order, got some whose order changes the result; the motion has no "
+                "derivative there"
             )
         return first
 
     def one_by_one(
         self, jump: Jump, order: Sequence[tuple[int, ...]], rate: Array
     ) -> Passage | None:
-        """Events at one instant after another; None where one keeps another from happening."""
+        """Return the passage of ordered simultaneous events; None if one prevents another."""
         y, n = jump.before, jump.before.size
         system, where = self.path.integrator.system, self.where(jump.which)
         through = Passage(np.eye(n + 1), np.zeros((n + 1, self.d.size)))
@@ -288,7 +294,7 @@ class _Instant:
 
 
 def _orders(groups: Sequence[tuple[Array, list[int]]]) -> list[list[tuple[int, ...]]]:
-    """Orders in which groups of events are tried."""
+    """Return the orders in which groups of events are tried."""
     every = [tuple(events) for _, events in groups]
     if len(every) <= MOST:
         return [list(order) for order in permutations(every)]
@@ -297,6 +303,6 @@ def _orders(groups: Sequence[tuple[Array, list[int]]]) -> list[list[tuple[int, .
 
 
 def _alike(one: Passage, other: Passage) -> bool:
-    """Whether two passages are the same, each row relative to its largest entry."""
+    """Return True if two passages are equal, each row relative to its largest entry."""
     a, b = (np.hstack([x.by_state, x.by_data]) for x in (one, other))
     return bool((np.abs(a - b) <= SAME * np.abs(a).max(axis=1, keepdims=True)).all())

@@ -1,11 +1,11 @@
-"""Derivatives of a run: forwards, and backwards by one sweep.
+"""Derivatives of a run: forward, and reverse by one sweep.
 
 The accepted steps are differentiated with their sizes held fixed. The step-size controller takes no
 part (internal numerical differentiation), so the derivatives are those of the discrete solution and
-exact to rounding. An event moves with what is differentiated: the step that it cuts ends, and the
-next one begins, where the dense output has the event (`saltation`); all other steps end at fixed
-times. How fast the solution goes there is taken from the equations, from which dense output differs
-by its error, or more over a jump of the force.
+exact to rounding. An event moves with the parameters: the step that it cuts ends, and the next one
+begins, where the dense output has the event (`saltation`); all other steps end at fixed times. The
+rate of the solution there comes from the equations; the rate of the dense output differs from it by
+its error, or more across a jump of the force.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,7 +41,7 @@ class Slopes:
 
 
 def forward(path: Path, which: Seeds) -> Slopes:
-    """Derivatives of the solution; all directions go along in one sweep over the steps."""
+    """Return derivatives of the solution by all names, in one sweep over the steps."""
     n, names, made = path.integrator.system.n, len(which.names), derivatives(path.integrator)
     state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
     state[: which.start.shape[0]] = which.start
@@ -63,7 +63,9 @@ def forward(path: Path, which: Seeds) -> Slopes:
 
 
 def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
-    """Derivatives over all steps, from those of the start and what a sweep gives of each."""
+    """Return derivatives over all steps, from those of the start and the sweep's results per
+    step.
+    """
     steps, size = inner.shape[0], start.size
     parts = inner.reshape(steps, -1, size)
     begin = np.vstack([start.T.reshape(1, -1), behind[:-1].reshape(steps - 1, size)])
@@ -71,10 +73,10 @@ def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
 
 
 def _at_fixed_times(path: Path, found: Dense, states: Array) -> Dense:
-    """Derivatives at fixed times, up to the events that cut steps.
+    """Return derivatives at fixed times, up to the events that cut steps.
 
-    `found` holds them at fixed places in whole steps; `states` those of the starts of steps, those
-    of their times in the last column.
+    `found` holds them at fixed places in full steps; `states` those of the starts of steps, with
+    those of their times in the last column.
     """
     cut = np.array([jump.step - 1 for jump in path.jumps if jump.size], dtype=np.intp)
     theta = (path.dense.t1 - path.dense.t0) / path.size
@@ -89,7 +91,7 @@ def _at_fixed_times(path: Path, found: Dense, states: Array) -> Dense:
 
 
 def _cut(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array]:
-    """End and D of pieces up to theta, the same polynomials (`running.crossings`)."""
+    """Return the end and D of pieces up to theta, the same polynomials (`running.crossings`)."""
     end, D = dense.piece(k, theta), np.empty_like(dense.D[k])
     old, new = np.zeros_like(end), np.zeros_like(end)
     for row in reversed(range(D.shape[1])):
@@ -99,10 +101,10 @@ def _cut(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array]
 
 
 def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array, Array]:
-    """(1 - theta s) y'(s) of pieces in the form of `Dense`, s being the place in them.
+    """Return (1 - theta s) y'(s) of pieces in the form of `Dense`, with the place s in them.
 
-    That is by how much the solution at a fixed time falls behind where a step, of which a piece is
-    the part up to theta, starts later and ends at its time.
+    This is the delay of the solution at a fixed time if a step starts later and ends at its time;
+    the piece is the part of the step up to theta.
     """
     D, h = dense.D[k], (dense.t1 - dense.t0)[k, None]
     rows = D.shape[1]
@@ -121,7 +123,7 @@ def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Arra
 
 
 def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
-    """Derivatives of the times of all jumps, shape (jumps, names)."""
+    """Return derivatives of the times of all jumps, shape (jumps, names)."""
     found, own = list[Array](), iter(every.alone)
     names = of_d.shape[1]
     for piece in path.pieces:
@@ -141,13 +143,13 @@ def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -
 
 
 def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array:
-    """Derivatives of all signals at times, shape (names, signals, times).
+    """Return derivatives of all signals at times, shape (names, signals, times).
 
     Args:
         path: the run.
-        which: what to differentiate with respect to.
+        which: names to differentiate with respect to.
         solution: derivatives of the solution, from `forward`.
-        times: where [s].
+        times: of the result [s].
     """
     rows = [times, path.unknowns(times), path.data_at(times), solution(times).T]
     (found,) = derivatives(path.integrator).of_signals(which)(rows, backend=path.backend)
@@ -158,11 +160,13 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
 def gradient(
     path: Path, which: Seeds, times: Array, weights: Mapping[int, Array]
 ) -> dict[str, float]:
-    """Derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution, exact to rounding.
+    """Return derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution.
+
+    They are exact to rounding.
 
     Args:
         path: the run.
-        which: what to differentiate with respect to.
+        which: names to differentiate with respect to.
         times: t_j [s], increasing, shape (m,).
         weights: number of a signal -> its weights, shape (m,); no others need a derivative.
     """
@@ -179,7 +183,7 @@ def gradient(
 
 
 def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
-    """Adjoints of the start, before it is made consistent, and of d."""
+    """Return adjoints of the start, before it is made consistent, and of d."""
     n, made = path.integrator.system.n, derivatives(path.integrator)
     steps = [a[::-1] for a in (*path.steps, looks.weights)]
     if path.linked:
@@ -197,7 +201,7 @@ def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
 
 @final
 class _Looks:
-    """Weights of the solution at times, carried to the steps.
+    """Weights of the solution at times, distributed to the steps.
 
     Args:
         path: the run.
@@ -223,9 +227,9 @@ class _Looks:
         self.weights = total.reshape(steps, -1)
 
     def ahead(self, every: Links) -> Array:
-        """What a later start of each step adds to the sum through the places of times in it.
+        """Return the derivative of the sum by the start time of each step, from times within it.
 
-        Of steps that jumps come before; others start at fixed times.
+        It is nonzero for steps after jumps only; others start at fixed times.
         """
         path, found = self.path, np.zeros(self.path.dense.t0.size)
         moves = np.append(path.pieces[0].opening != (None,), every.of[:-1] > 0)
@@ -244,8 +248,8 @@ class Differentiated:
     """Derivatives along the steps of a run.
 
     Attributes:
-        make: what was run; made when it is first needed.
-        which: by what it is differentiated.
+        make: returns the run, when it is first needed.
+        which: names to differentiate with respect to.
         names: of the signals.
         t: times of the result [s].
     """
@@ -257,7 +261,7 @@ class Differentiated:
 
     @cached_property
     def path(self) -> Path:
-        """What was run."""
+        """Run to differentiate."""
         return self.make()
 
     @cached_property
@@ -266,7 +270,7 @@ class Differentiated:
         return forward(self.path, self.which)
 
     def at(self, times: Array) -> dict[str, dict[str, Array]]:
-        """Derivatives of all signals: name -> signal -> values, shape (times,)."""
+        """Return derivatives of all signals: name -> signal -> values, shape (times,)."""
         values = of_signals(self.path, self.which, self.solution.dense, times)
         return {
             seed: dict(zip(self.names, rows, strict=True))
@@ -274,12 +278,12 @@ class Differentiated:
         }
 
     def pull_back(self, weights: Mapping[str, Array]) -> dict[str, float]:
-        """Derivatives of a weighted sum of signals at `t`."""
+        """Return derivatives of a weighted sum of signals at `t`."""
         used = {self.names.index(name): w for name, w in weights.items() if w.any()}
         return gradient(self.path, self.which, self.t, used)
 
     def delays(self) -> dict[str, Array]:
-        """Derivatives of the times of events."""
+        """Return derivatives of the times of events."""
         jumps = [len(jump.which) for jump in self.path.jumps]
         times = np.repeat(self.solution.times, jumps, axis=0)
         return dict(zip(self.which.names, times.T, strict=True))

@@ -1,12 +1,12 @@
-"""Passages of events and breaks between the steps of a run, and the links that they make.
+"""Passages of events and breaks between the steps of a run, and the links made from them.
 
-Behind every step of a run with jumps, from the derivatives Z_i of its start, its end and each row
-of its dense output, and T of the time of its start,
+After every step of a run with jumps, from the derivatives Z_i of its start, its end and each row of
+its dense output, and T of the time of its start,
 
     F = sum_i share_i Z_i + fall T,      X = by_state F + by_data d'
 
-X holds those of the start of the next step and of its time. Without a jump F is Z of the end, and X
-the same; an event cuts the step, and F is the dense output there at a fixed time.
+where X holds those of the start of the next step and of its time. Without a jump F is Z of the end,
+and X is the same; an event cuts the step, and F is the dense output there at a fixed time.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 def passages(path: Path) -> list[Passage]:
-    """What every event of a run makes of derivatives.
+    """Return the passage of every event of a run.
 
     Raises:
         ValueError: as `passage`.
@@ -35,7 +35,7 @@ def passages(path: Path) -> list[Passage]:
 
 
 def at_breaks(path: Path, breaks: Sequence[Break]) -> list[Passage]:
-    """What new input data make of derivatives; states stay, algebraic unknowns follow."""
+    """Return the passages of new input data; states stay, algebraic unknowns follow."""
     n, m, k = path.integrator.system.n, len(breaks), np.array([mark.step for mark in breaks])
     y, d = path.dense.y0[k], path.steps[2][k]
     moved = np.zeros((m, n + 1, n + d.shape[1]))
@@ -46,7 +46,7 @@ def at_breaks(path: Path, breaks: Sequence[Break]) -> list[Passage]:
 
 
 def _is_usual(path: Path, jump: Jump) -> bool:
-    """Whether one event alone cut a step, away from the breaks, and no constraint has to be met."""
+    """Return True if a single event cut a step, away from breaks and without constraints."""
     if len(jump.which) > 1 or not jump.size or path.integrator.system.manifold is not None:
         return False
     breaks, k = path.inputs.breaks, path.place(jump)
@@ -54,7 +54,7 @@ def _is_usual(path: Path, jump: Jump) -> bool:
 
 
 def _crossed(path: Path, jumps: Sequence[Jump]) -> list[Passage | None]:
-    """Passages of events that cut a step; None of one that seems to touch zero only."""
+    """Return passages of events that cut a step; None for one that seems to only touch zero."""
     made, dense = derivatives(path.integrator), path.dense
     n, m, place = made.system.n, len(jumps), np.arange(len(jumps))
     t, k = np.array([jump.t for jump in jumps]), np.array([jump.step - 1 for jump in jumps])
@@ -88,7 +88,7 @@ def _crossed(path: Path, jumps: Sequence[Jump]) -> list[Passage | None]:
 
 
 def _resets(path: Path, at: list[Array], which: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Derivatives of y behind the resets of one event each, by y and time there, and by d."""
+    """Return derivatives of y after the resets of one event each, by y and time there, and by d."""
     made, m, n = derivatives(path.integrator), which.size, path.integrator.system.n
     by_state, by_data = np.tile(np.eye(n + 1), (m, 1, 1)), np.zeros((m, n + 1, at[2].shape[1]))
     crossings = path.integrator.crossings
@@ -105,7 +105,7 @@ def _resets(path: Path, at: list[Array], which: NDArray[np.intp]) -> tuple[Array
 
 
 def _follow(path: Path, moved: Array, found: Array, d: Array) -> None:
-    """Let algebraic unknowns follow in place, at `found`; `moved` is by the state and by d."""
+    """Update algebraic unknowns in place, at `found`; `moved` is by the state and by d."""
     made = derivatives(path.integrator)
     n, m, free = made.system.n, d.shape[0], made.system.free
     if not free.size:
@@ -121,11 +121,11 @@ def _follow(path: Path, moved: Array, found: Array, d: Array) -> None:
 @final
 @dataclass(frozen=True, eq=False)
 class Links:
-    """The links of a run; rows of its tables are all that occur, the first one no jump.
+    """Links of a run; its tables have one row per distinct jump, the first one for no jump.
 
     Attributes:
-        start: what is made of the derivatives of the start.
-        of: number of the row behind each step, shape (steps,).
+        start: passage of the start.
+        of: number of the row after each step, shape (steps,).
         share: shape (rows, 2 + rows of the dense output).
         fall: shape (rows, n).
         by_state: shape (rows, n + 1, n).
@@ -143,7 +143,7 @@ class Links:
 
 
 def links(path: Path) -> Links:
-    """The links of a run.
+    """Return the links of a run.
 
     Raises:
         ValueError: a motion without derivative, as `passage`.

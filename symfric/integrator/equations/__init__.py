@@ -1,1 +1,3 @@
-"""A model as the step sees it: unknowns, inputs, constraints, start values, linear algebra."""
+"""Equations of a model in the form that a step needs: unknowns, inputs, constraints, start
+values.
+"""

@@ -1,4 +1,4 @@
-"""The Functions an implicit step is made of: with SX they inline, with MX they stay calls."""
+"""Functions that make up an implicit step: inlined with SX, calls with MX."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ NONE = ca.SX(0, 1)
 @final
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Jacobian of a system, bordered by that of its inner unknowns l where it has some.
+    """Jacobian of a system, bordered by that of its inner unknowns l if there are any.
 
         [ f_y  f_l     ]
         [ g_y  g_l - I ]
 
     Attributes:
-        J: with a symbol for every entry that is more than a number.
+        J: with a symbol for every entry that is not a constant.
         entries: these symbols.
-        values: (y, d) -> what they stand for.
-        pivots: groups of rows as `factorise` takes them.
+        values: (y, d) -> values of these symbols.
+        pivots: groups of rows as in `factorise`.
     """
 
     J: ca.SX
@@ -36,7 +36,7 @@ class Slopes:
     pivots: tuple[tuple[int, ...], ...]
 
     def matrix(self, mass: ca.SX, without: Sequence[int] = ()) -> ca.SX:
-        """`mass` - J, in terms of `entries`; J without the rows `without`."""
+        """Return `mass` - J in terms of `entries`, with the rows `without` of J set to zero."""
         kept, inner = ca.SX(self.J), self.J.shape[0] - mass.shape[0]
         kept[list(without), :] = 0
         return ca.sparsify(ca.diagcat(mass, ca.SX(inner, inner)) - kept)
@@ -44,7 +44,7 @@ class Slopes:
 
 @lru_cache(maxsize=2)
 def slopes(system: System) -> Slopes:
-    """The Jacobian of `system`."""
+    """Return the Jacobian of `system`."""
     y, d, inner = system.y, system.d, system.inner
     slope, pivots, hidden, put = system.J, system.pivots, NONE, NONE
     if inner is not None:
@@ -62,7 +62,7 @@ def slopes(system: System) -> Slopes:
 
 
 def _named(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """`matrix` with symbols for its entries that are no numbers, these symbols, and the entries."""
+    """Return `matrix` with symbols for its non-constant entries, these symbols, and the entries."""
     named = ca.SX(matrix)
     places = [k for k in range(matrix.nnz()) if not ca.SX(matrix.nz[k]).is_constant()]
     entries = ca.SX.sym("J", len(places))
@@ -72,7 +72,7 @@ def _named(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 
 def _places(y: ca.SX, inner: Inner) -> tuple[tuple[int, ...], ...]:
-    """Groups of unknowns as numbers of rows."""
+    """Return groups of unknowns as row numbers."""
     unknowns = ca.vertsplit(ca.vertcat(y, inner.l))
     place = {ca.SX(s).__hash__(): i for i, s in enumerate(unknowns)}
     groups = (ca.vertsplit(group) for group in inner.groups)
@@ -101,18 +101,18 @@ class Blocks:
     factors: Factors
 
     def factor(self, y: Any, h: Any, d: Any) -> Any:
-        """The factors of W = M / (gamma h) - J at a point, ready to solve with."""
+        """Return the factors of W = M / (gamma h) - J at a point, for `solve`."""
         return self.pack(self.slopes(y, d), h)
 
     @property
     def instructions(self) -> int:
-        """Of Jacobian and factors."""
+        """Instructions of the Jacobian and the factorisation."""
         return self.slopes.n_instructions() + self.pack.n_instructions()
 
 
 @lru_cache(maxsize=2)
 def blocks(system: System, gamma: float) -> Blocks:
-    """The blocks of a method with the diagonal coefficient `gamma`."""
+    """Return the blocks of a method with the diagonal coefficient `gamma`."""
     h, own = ca.SX.sym("h"), slopes(system)
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
     W = own.matrix(system.mass * reciprocal(gamma * h))
@@ -133,9 +133,9 @@ def blocks(system: System, gamma: float) -> Blocks:
 
 @lru_cache(maxsize=2)
 def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
-    """Factors of what W is for a tiny step: M, and the derivatives of the rows without rates.
+    """Return the factors of W for a tiny step: M, and the derivatives of the rows without rates.
 
-    It is singular where the algebraic equations do not determine their unknowns.
+    The matrix is singular if the algebraic equations do not determine their unknowns.
     """
     own, (rows, _) = slopes(system), system.algebraic
     matrix = own.matrix(system.mass, [i for i in range(system.n) if i not in rows])
@@ -144,19 +144,19 @@ def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
 
 
 def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
-    """The unknowns of a system, where nothing stands on the right-hand sides of inner ones."""
+    """Return the unknowns of a system whose inner equations have zero right-hand sides."""
     n = right.numel()
     return lu.solve(ca.vertcat(right, ca.SX(len(lu.order) - n, 1)))[:n]
 
 
 @lru_cache(maxsize=2)
 def refinement(system: System) -> ca.Function:
-    """(y, d) -> y of a mechanism on its constraints, with its algebraic unknowns exact.
+    """Return the Function (y, d) -> y of a mechanism on its constraints, algebraic unknowns exact.
 
-    Two steps of Newton's method for accelerations, multipliers and normal forces.
+    It makes two steps of Newton's method for accelerations, multipliers and normal forces.
     """
     (rows, _), right = system.algebraic, ca.SX.sym("right", system.n)
-    lu, factors = at_rest(system)  # whose symbols `slopes` may have forgotten
+    lu, factors = at_rest(system)  # use its symbols: the cache of `slopes` may be newer
     pack = ca.Function("pack", [factors.symbols[0]], [lu.packed])
     solve = ca.Function("solve", [lu.packed_symbol, right], [_solved(lu, right)])
     residual = ca.SX(system.n, 1)
@@ -175,11 +175,11 @@ Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
 
 
 def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
-    """Signs of det W and of the same for a tiny step, which only algebraic rows have.
+    """Return the signs of det W and of the same for a tiny step, which only algebraic rows have.
 
     Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
-    step only damps away. The pivots of the rows `watched`, which are there anyway, say how far the
-    latter is from zero.
+    step wrongly damps. The pivots of the rows `watched`, available without further work, show how
+    far the latter is from zero.
     """
     block, (rows, _) = blocks(system, gamma), system.algebraic
     entries = block.factors.symbols[0]

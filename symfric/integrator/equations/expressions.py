@@ -1,21 +1,22 @@
-"""Expressions rewritten operation by operation, and the pace of expressions in time alone.
+"""Expressions rewritten operation by operation, and discontinuities of expressions in time alone.
 
-Tanh: which way the one of the C library goes depends on its argument, a processor guesses it wrong,
-and a small step spends a third of its time there. Written out in the graph, both engines do the
-same operations, and vectors of members can, too.
+Tanh: the branch that the C library takes depends on the argument, processors mispredict it, and a
+small step spends a third of its time there. Written out in the graph, both engines do the same
+operations, and so can vectors of members.
 
-Quotients by one divisor are products with its reciprocal: a division costs as much as ten others.
-Compilers do so only where they may round otherwise than the virtual machine does.
+Quotients by one divisor become products with its reciprocal: a division costs as much as ten other
+operations. Compilers do so only if they may round differently from the virtual machine.
 
-Numbers as data: another amplitude then means no other equations. Each number becomes a symbol where
-it is read; what is left is the structure. Exponents of constant powers stay, as they are structure:
-x^2 is x x, and x^0.5 has no slope at 0. Limits: what CasADi leaves out is no number any more:
-sin(t) for 1 sin(t), 0 for 0 sin(t).
+Numbers as data: each number becomes a symbol where it is read, so another amplitude gives the same
+equations. Exponents of constant powers stay, since they are structure: x^2 is x x, and x^0.5 has no
+slope at 0. Limits: numbers that CasADi simplifies away are not lifted: sin(t) for 1 sin(t), 0 for
+0 sin(t).
 
-Pace: while a machine rests, steps grow until they are longer than a pulse that is still to come,
-and no stage falls on it. A function of time is known, however, and cheap: it is looked at on a
-grid, and the span cut in halves until each piece is straight. Where pieces become much shorter or
-much longer from one to the next, a step has to end. A sine has one pace and no such times.
+Step limit: at equilibrium steps grow until they are longer than a future pulse, and no stage falls
+on
+it. A function of time is known in advance and cheap, so it is sampled on a grid, and the span is
+halved until each piece is straight. Where the length of pieces changes much from one to the next, a
+step has to end. A sine has pieces of one length and no such times.
 """
 
 from collections import Counter
@@ -32,11 +33,13 @@ from symfric.foundation.numeric import reciprocal
 from symfric.integrator.compiled.columns import Columns
 
 Rule = Callable[[int, list[ca.SX]], ca.SX | None]
-"""(number of an instruction, its operands) -> what stands for it; None for itself."""
+"""(number of an instruction, its operands) -> its replacement; None to keep it."""
 
 
 def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list[ca.SX]:
-    """Results of an SX `function` at `arguments`, columns of symbols, rewritten by `rule`."""
+    """Return the results of an SX `function` at `arguments`, columns of symbols, rewritten by
+    `rule`.
+    """
     symbols = [ca.vertsplit(ca.vec(argument)) for argument in arguments]
     found = [[ca.SX(0)] * function.nnz_out(i) for i in range(function.n_out())]
     work: dict[int, ca.SX] = {}
@@ -62,21 +65,25 @@ def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list
 
 
 MIDDLE = 0.7
-"""Up to here tanh x = x + x^3 U(x^2)/V(x^2), equal to 1e-17; beyond, 1 - 2/(e^2|x| + 1) loses less
-than a bit to cancellation."""
+"""Up to this |x| tanh x = x + x^3 U(x^2)/V(x^2), accurate to 1e-17; beyond it 1 - 2/(e^2|x| + 1)
+loses less than a bit to cancellation.
+"""
 U = (-0.3333333333333333, -0.02049522886753235, -0.00019901990913769401)
 V = (1.0, 0.46148568660258626, 0.023286572463946293, 0.00020636437984939814)
-"""Of the rational function that interpolates (tanh x / x - 1) / x^2 at Chebyshev nodes in x^2."""
+"""Coefficients of the rational function that interpolates (tanh x / x - 1) / x^2 at Chebyshev nodes
+in x^2.
+"""
 
 LARGE = 300
-"""Functions with more instructions stay as they are: tanh is little of them, and reading them takes
-time."""
+"""Functions with more instructions stay unchanged: tanh is a small part of them, and rewriting
+takes time.
+"""
 
 
 def tanh(x: ca.SX) -> ca.SX:
-    """Tanh x to 3.5e-16, relative; odd, NaN for NaN; the same operations for all x.
+    """Return tanh x to 3.5e-16, relative; odd, NaN for NaN; the same operations for all x.
 
-    It has derivatives, right but long: those are better taken of tanh itself, before.
+    Its derivatives are correct but long: differentiate tanh itself first.
     """
     size = ca.fabs(x)
     square = x * x
@@ -93,11 +100,11 @@ def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
 
 
 def branchless(function: ca.Function, most: int = LARGE) -> ca.Function:
-    """The SX `function` with every tanh written out; itself where it has none, or is large.
+    """Return the SX `function` with every tanh written out; itself if it has none or is large.
 
     Args:
         function: of columns, or matrices.
-        most: instructions that it may have.
+        most: largest number of instructions to rewrite.
     """
     count = function.n_instructions()
     if count > most or ca.OP_TANH not in map(function.instruction_id, range(count)):
@@ -112,7 +119,7 @@ def branchless(function: ca.Function, most: int = LARGE) -> ca.Function:
 
 
 def divided_once(expression: ca.SX) -> ca.SX:
-    """`expression` with divisors that are constant, or divide several times, inverted once."""
+    """Return `expression` with constant or repeated divisors inverted once."""
     arguments = ca.symvar(expression)
     function = ca.Function("f", arguments, [expression])
     count = function.n_instructions()
@@ -141,7 +148,7 @@ def divided_once(expression: ca.SX) -> ca.SX:
 def _divisors(
     operations: list[int], operands: list[list[int]], places: list[list[int]]
 ) -> dict[int, int]:
-    """Number of each division -> number of the instruction that made its divisor."""
+    """Return number of each division -> number of the instruction that made its divisor."""
     made: dict[int, int] = {}
     found: dict[int, int] = {}
     for k, operation in enumerate(operations):
@@ -154,18 +161,18 @@ def _divisors(
 
 Array = NDArray[np.float64]
 MOST_NUMBERS = 1000
-"""Expressions with more numbers are tables, and stay as they are."""
+"""Expressions with more numbers are tables, and stay unchanged."""
 
 
 def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Array]:
-    """A scalar expression with symbols for its numbers, these symbols, and the numbers.
+    """Return a scalar expression with symbols for its numbers, these symbols, and the numbers.
 
-    Evaluated there it gives the same bits: the operations are the same, in the same order.
+    Evaluated at these numbers it gives the same bits: same operations, same order.
 
     Args:
         expression: in the symbols `known`.
         known: column of symbols.
-        name: how the new symbols begin.
+        name: prefix of the new symbols.
     """
     as_it_is = expression, ca.SX(0, 1), np.zeros(0)
     function = ca.Function("lift", [known], [expression])
@@ -193,7 +200,7 @@ def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Ar
             work[to[0]] = float(function.instruction_constant(k))
         elif op == ca.OP_CONSTPOW:
             work[to[0]] = _applied(op, read(places[0]), ca.SX(work[places[1]]))
-        elif op == ca.OP_TWICE:  # what CasADi makes of 2 x
+        elif op == ca.OP_TWICE:  # CasADi's form of 2 x
             two, other = number(2.0), read(places[0])
             work[to[0]] = two * other
         elif len(places) in (1, 2) and len(to) == 1:
@@ -206,42 +213,44 @@ def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Ar
 
 
 def _applied(op: int, *arguments: ca.SX) -> ca.SX:
-    """One operation of CasADi's."""
+    """Apply one CasADi operation."""
     SX = cast(Any, ca.SX)
     return ca.SX(SX.unary(op, *arguments) if len(arguments) == 1 else SX.binary(op, *arguments))
 
 
 DEPTH = 13
-"""The grid has 2^13 intervals; what is shorter than one of them may stay unseen."""
+"""The grid has 2^13 intervals; shorter features may be missed."""
 
 STRAIGHT = 1e-3
-"""How far a straight piece may be off, relative to the range of the function."""
+"""Allowed deviation of a straight piece, relative to the range of the function."""
 
 LEVELS = 3
-"""Halvings between neighbours that are a change of pace: error control sees to less."""
+"""Difference in halvings of neighbours that is a discontinuity; error control handles smaller
+ones."""
 
 
 PULSE = 10.0
-"""Height of a pulse within a jump, over that of the jump."""
+"""Least height of a pulse within a jump, relative to that of the jump."""
 BRIEF = 16
-"""Length of a pulse, in intervals of the grid, that may lie between two stages of a step."""
+"""Length of a pulse, in grid intervals, that may lie between two stages of a step."""
 MOST_JUMPS = 64
-"""Jumps of a function above which it is sampled on the grid only."""
+"""Number of jumps of a function above which it is sampled on the grid only."""
 HALVINGS = 60
-"""Halvings of an interval of the grid, down to rounding."""
+"""Halvings of a grid interval, down to rounding."""
 
 HUGE = 1e300
 """Bound of values, so that their differences are finite."""
 
 QUICKEST = 1.0
-"""Percent of the span that set the pace of a function: more than what a few jumps take."""
+"""Percentage of the span with the shortest pieces that is ignored, so that a few jumps do not
+count."""
 
 
 def onsets(function: str, t_start: float, t_end: float) -> tuple[float, ...]:
-    """Times [s] inside the span at which a function of time, a serialised SX, changes its pace.
+    """Return times [s] inside the span at which a step has to end for a function of time.
 
-    A jump between two times of the grid may hide a pulse, as the rate of a ramp of a picosecond
-    does: the middle of such a pulse is one of the times.
+    The function is a serialised SX. A jump between two grid points may hide a pulse, such as the
+    derivative of a ramp of a picosecond: the middle of such a pulse is one of the times.
     """
     look = _looked(function, t_start, t_end)
     if look is None:
@@ -251,9 +260,9 @@ def onsets(function: str, t_start: float, t_end: float) -> tuple[float, ...]:
 
 
 def pace(function: str, t_start: float, t_end: float) -> float:
-    """Length [s] of the straight pieces of a function of time where it is quickest.
+    """Return the length [s] of the shortest straight pieces of a function of time.
 
-    A fiftieth to a hundredth of the period of a sine; inf for a straight line.
+    It is a fiftieth to a hundredth of the period of a sine; inf for a straight line.
     """
     look = _looked(function, t_start, t_end)
     halvings = 0.0
@@ -263,7 +272,7 @@ def pace(function: str, t_start: float, t_end: float) -> float:
 
 
 class _Look(NamedTuple):
-    """A function of time on the grid: `levels`, and the times [s] of short pulses."""
+    """Function of time on the grid: `level` of each interval, and times [s] of short pulses."""
 
     level: NDArray[np.intp]
     pulses: tuple[float, ...]
@@ -271,7 +280,7 @@ class _Look(NamedTuple):
 
 @lru_cache(64)
 def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
-    """Levels and pulses of a function of time; None for a constant."""
+    """Return levels and pulses of a function of time; None for a constant."""
     expression = ca.SX.deserialize(function)
     time = ca.symvar(expression)
     if not time:
@@ -290,10 +299,10 @@ def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
 
 
 def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> tuple[float, ...]:
-    """Times [s] in the middle of pulses within jumps of a function that has `values` on `grid`.
+    """Return times [s] in the middle of pulses within jumps of a function with `values` on `grid`.
 
-    The start and the end of a jump are found by bisection. It hides a pulse if the function is
-    `PULSE` times as far away in the middle as the jump is high.
+    The start and the end of a jump are found by bisection. It hides a pulse if the distance of the
+    function in the middle exceeds `PULSE` times the height of the jump.
     """
     jumps = np.flatnonzero(np.abs(np.diff(values)) > STRAIGHT * np.ptp(values))
     if not 0 < jumps.size <= MOST_JUMPS:
@@ -314,7 +323,9 @@ def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> t
 
 
 def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
-    """Grid points at the peaks of pulses of up to `BRIEF` intervals, which stages may miss."""
+    """Return grid points at the peaks of pulses of up to `BRIEF` intervals, which stages may
+    miss.
+    """
     deepest = np.flatnonzero(level == DEPTH)
     found: list[int] = []
     for run in np.split(deepest, np.flatnonzero(np.diff(deepest) > 1) + 1):
@@ -327,7 +338,9 @@ def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
 
 
 def levels(values: Array) -> NDArray[np.intp]:
-    """How often each interval of a grid of 2^k + 1 values is halved until its piece is straight."""
+    """Return how often each interval of a grid of 2^k + 1 values is halved to get a straight
+    piece.
+    """
     cells = values.size - 1
     depth = cells.bit_length() - 1
     allowed = STRAIGHT * np.ptp(values)
@@ -342,7 +355,7 @@ def levels(values: Array) -> NDArray[np.intp]:
 
 
 def changes(level: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Grid points at which the level has changed by `LEVELS` since the last such point."""
+    """Return grid points at which the level has changed by `LEVELS` since the last such point."""
     found: list[int] = []
     last = level[0]
     for i in np.flatnonzero(np.diff(level)) + 1:

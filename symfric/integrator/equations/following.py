@@ -1,22 +1,24 @@
-"""Algebraic unknowns that follow a jump of inputs, without a search: two corrections a round.
+"""Fast update of algebraic unknowns after a jump of inputs: two corrections per round.
 
-Where input data jump, states and time stay, and algebraic unknowns move to the solution near the
-one before. With W = -dg/dz of the algebraic equations 0 = g(y, d), factorised once a round,
+When input data jump, states and time stay, and algebraic unknowns move to the solution near the
+previous one. With W = -dg/dz of the algebraic equations 0 = g(y, d), factorised once a round,
 
     W s_1 = g(y),        W s_2 = g(y + s_1),        y <- y + s_1 + s_2
 
-is of order 3; equations that are linear in their unknowns, as of a machine without friction, need
-one round. It is done when
+is of order 3; equations that are linear in their unknowns, such as those of a machine without
+friction, need one round. The iteration has converged if
 
     |W| |s_2| <= DONE |W| |z|
 
-in every equation. Unknowns of no mechanism may have many solutions, and have to stay near: there it
-goes on only while s_2 is at most half of s_1 (Deuflhard's monotonicity test with frozen
-derivatives, which neither units of equations nor of unknowns change). Normal forces N = |R(N)| of a
-mechanism are convex and Newton's method finds them from afar; what forbids a solution is the guard.
-Both loops over it, here in Python and `C_FOLLOW` in C, make the same comparisons
-of the same numbers, so that engines agree to the bit. Where it does not end well nothing has
-changed, and the damped search of `symfric.integrator.equations.initial` begins at the same guess.
+in every equation. Without a mechanism there may be many solutions, and the iteration has to stay
+near
+the previous one: it continues only while s_2 is at most half of s_1 (Deuflhard's monotonicity test
+with frozen derivatives, which is invariant to units of equations and of unknowns). Normal forces
+N = |R(N)| of a mechanism are convex and Newton's method converges from far away; the guard rejects
+invalid solutions. The two loops, in Python and in C (`C_FOLLOW`), make the same comparisons of the
+same numbers, so that engines agree bit for bit. On failure the unknowns stay unchanged, and the
+damped
+search of `symfric.integrator.equations.initial` begins at the same guess.
 
 Source: Deuflhard, Newton Methods for Nonlinear Problems, 2004, sections 2.1 and 3.3.
 """
@@ -38,14 +40,16 @@ from symfric.integrator.equations.system import System
 
 Array = NDArray[np.float64]
 DONE = 1e-10
-"""Last correction, relative to what the equations are made of, behind which rounding is left."""
+"""Largest last correction, relative to the terms of the equations; beyond it is rounding."""
 ROUNDS = 6
 """Most rounds; a solution that takes more is not near."""
 FAINT = 1e-3
-"""Equations of a mechanism with terms this small beside the largest are solved to its rounding:
-sideways of its plane, or where loads cancel, there is nothing else."""
+"""Equations of a mechanism with terms this small compared with the largest are solved to the
+rounding
+of the largest: out of its plane, or where loads cancel, all terms are rounding.
+"""
 NEARER, ANY = 0.5, 1e10
-"""Largest s_2 over s_1 behind which it goes on: of a system of any kind, of a mechanism."""
+"""Largest s_2 over s_1 to continue with: for general systems, and for mechanisms."""
 INLINE = 7000
 """Rounds with more instructions are calls of blocks, which compile much faster."""
 
@@ -53,19 +57,21 @@ INLINE = 7000
 @final
 @dataclass(frozen=True, eq=False)
 class Following:
-    """The unknowns after a jump, by a Function and what goes around it.
+    """Update of the unknowns after a jump.
 
     Attributes:
         round: (y, d) -> y after one round, and (sizes of s_1 and s_2, guard). A negative guard
-            forbids what was found: friction has jammed, or a bearing pulls.
-        contraction: largest s_2 over s_1 behind which it goes on.
+            rejects the solution: friction has jammed, or a bearing pulls.
+        contraction: largest s_2 over s_1 to continue with.
     """
 
     round: ca.Function
     contraction: float
 
     def __call__(self, y: Array, d: Array) -> Array | None:
-        """`y` with its algebraic unknowns at run data `d`; None where it takes a search."""
+        """Return `y` with its algebraic unknowns at run data `d`; None if a full search is
+        needed.
+        """
         now, after, look = y.copy(), np.empty(y.size), np.empty(3)
         data = np.ascontiguousarray(d, dtype=float)
         call = bound(self.round, (now, data), (after, look))
@@ -81,9 +87,9 @@ class Following:
 
     @property
     def c_source(self) -> str:
-        """The same as C, `int symfric_follow(double *y, const double *d)`.
+        """C of the update, `int symfric_follow(double *y, const double *d)`.
 
-        It returns 0, or 1 and leaves y as it is. The C of `round` has to stand before it.
+        It returns 0, or 1 and leaves y unchanged. The C of `round` must precede it.
         """
         function = self.round
         return Template(C_FOLLOW).substitute(
@@ -95,7 +101,7 @@ class Following:
 
 
 C_FOLLOW = """
-/* Algebraic unknowns of y follow a jump of d; 1 where it takes a search, and y is as it was. */
+/* Updates algebraic unknowns of y after a jump of d; returns 1, y unchanged, if that fails. */
 int symfric_follow(double *y, const double *d)
 {
   enum { N = $n };
@@ -125,7 +131,7 @@ int symfric_follow(double *y, const double *d)
 
 
 def following(system: System) -> Following | None:
-    """How the algebraic unknowns of `system` follow a jump; None where it has none."""
+    """Return the update of the algebraic unknowns of `system` after a jump; None if it has none."""
     if not system.free.any():
         return None
     blocks = _blocks(system)
@@ -136,7 +142,9 @@ def following(system: System) -> Following | None:
 
 
 def corrected(system: System) -> ca.Function:
-    """(y, d) -> y with its algebraic unknowns after the first correction of a round, in SX."""
+    """Return (y, d) -> y with its algebraic unknowns after the first correction of a round, in
+    SX.
+    """
     y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
     blocks = _blocks(system)
     _, change = blocks.solve(blocks.pack(blocks.entries(y, d)), blocks.residual(y, d))
@@ -146,16 +154,17 @@ def corrected(system: System) -> ca.Function:
 @final
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """What a round is made of.
+    """Functions of a round.
 
     Attributes:
-        residual: (y, d) -> g in the rows of y that it stands in, 0 elsewhere.
+        residual: (y, d) -> g in its rows of y, 0 elsewhere.
         entries: (y, d) -> entries of W.
         inner: (y, d) -> inner unknowns.
         pack: entries -> factors.
         solve: (factors, residual) -> s, and its part in y.
         sizes: (entries, s_1, s_2, y after, inner unknowns) -> their sizes.
-        guard: (factors, y after, d) -> what must not be negative; None where nothing can be.
+        guard: (factors, y after, d) -> least value that must not be negative; None if there is
+        none.
     """
 
     residual: ca.Function
@@ -168,7 +177,7 @@ class _Blocks:
 
 
 def _round(system: System, blocks: _Blocks, kind: Any) -> ca.Function:
-    """One round; SX inlines everything, MX keeps the blocks as calls."""
+    """Return one round; SX inlines everything, MX keeps the blocks as calls."""
     y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
     entries = blocks.entries(y, d)
     lu = blocks.pack(entries)
@@ -185,12 +194,12 @@ def _round(system: System, blocks: _Blocks, kind: Any) -> ca.Function:
 
 
 def _blocks(system: System) -> _Blocks:
-    """The blocks of a system."""
+    """Return the blocks of a system."""
     own, n, rows = slopes(system), system.n, system.algebraic[0]
     full = own.matrix(system.mass, [i for i in range(n) if i not in rows])
     order = system.orders.get("tiny", ())
     kept = list(range(full.size1()))
-    if system.is_semi_explicit and not order:  # equations without rates stand for themselves
+    if system.is_semi_explicit and not order:  # the algebraic equations form a block
         kept = [i for i in kept if i in rows or i >= n]
     place = {row: k for k, row in enumerate(kept)}
     W = ca.sparsify(full[kept, kept])
@@ -216,7 +225,7 @@ def _blocks(system: System) -> _Blocks:
 
 
 def _used(W: ca.SX, own: Slopes) -> tuple[ca.SX, ca.SX]:
-    """Symbols that W is written in, and what they stand for in terms of y and d."""
+    """Return the symbols that W contains, and their values in terms of y and d."""
     used = {s.__hash__() for s in ca.symvar(W)}
     every = range(own.entries.numel())
     kept = [k for k in every if ca.SX(own.entries[k]).__hash__() in used]
@@ -225,7 +234,7 @@ def _used(W: ca.SX, own: Slopes) -> tuple[ca.SX, ca.SX]:
 
 
 def _inner(system: System) -> ca.Function:
-    """Inner unknowns as a Function (y, d)."""
+    """Return inner unknowns as a Function (y, d)."""
     inner = system.inner
     if inner is None:
         return ca.Function("inner", [system.y, system.d], [ca.SX(0, 1)])
@@ -236,14 +245,16 @@ def _inner(system: System) -> ca.Function:
 def _sizes(
     system: System, W: ca.SX, symbols: ca.SX, moved: Sequence[int], rows: Sequence[int]
 ) -> ca.Function:
-    """(entries, s_1, s_2, y, inner unknowns) -> largest |W| |s| / |W| |z| of an equation, twice."""
+    """Return (entries, s_1, s_2, y, inner unknowns) -> largest |W| |s| / |W| |z|, for s_1 and
+    s_2.
+    """
     count, inner = W.size1(), W.size1() - len(moved)
     first, second = ca.SX.sym("s_1", count), ca.SX.sym("s_2", count)
     y, hidden = ca.SX.sym("y", system.n), ca.SX.sym("l", inner)
     size = ca.fabs(W[list(rows), :])
     unknowns = ca.vertcat(y[list(moved)], hidden + (first + second)[len(moved) :, 0])
     scale = size @ ca.fabs(unknowns)
-    # what is zero in a mechanism, sideways of its plane, is rounding of the rest
+    # in a mechanism, values that are zero (out of its plane) are rounding of the others
     scale += 1e-300 if system.manifold is None else FAINT * ca.mmax(scale) + 1e-300
     found = [ca.mmax((size @ ca.fabs(s)) / scale) for s in (first, second)]
     arguments = [symbols, first, second, y, hidden]
@@ -251,10 +262,10 @@ def _sizes(
 
 
 def _guard(system: System, lu: SymbolicLU, place: dict[int, int]) -> ca.Function | None:
-    """(factors, y, d) -> what is negative where friction has jammed, or where a bearing pulls.
+    """Return (factors, y, d) -> a value, negative if friction has jammed or a bearing pulls.
 
-    The loop from normal forces over friction and reactions back to them, I - dN/dN: its determinant
-    has the sign of all others together, and no pivot of it may fall below `SHOCK`.
+    The loop from normal forces over friction and reactions back to them is I - dN/dN: its
+    determinant has the sign of all others together, and no pivot of it may fall below `SHOCK`.
     """
     manifold = system.manifold
     if manifold is None:

@@ -18,32 +18,32 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 ITERATIONS = 50
 ASSEMBLED = 1e-12
-"""What constraints may leave over, relative to the largest state."""
+"""Largest constraint error, relative to the largest state."""
 NEAR, CONVERGED = 1e-4, 1e-10
-"""Relative Newton steps below which no damping is needed, and below which it is done."""
+"""Relative Newton steps below which no damping is needed, and below which it has converged."""
 
 MARQUARDT = 200
-"""Rounds of a descent over corners."""
+"""Iterations of a descent across corners."""
 LAST_DIGITS = 1e-15
-"""Relative change by which numbers are the same to rounding."""
+"""Relative change of numbers that are equal to rounding."""
 FLOOR = 10 * float(np.finfo(float).eps)
 """Smallest step relative to t: a few of the last digits of t itself."""
 SURE = 10 * FLOOR
-"""A step to begin with, relative to t: it may fail and be cut once or twice."""
+"""First step relative to t: it may fail and be cut once or twice."""
 
 
 Follow = Callable[[Array, Array], Array | None]
-"""(y, d) -> y with its algebraic unknowns; None where it takes a search."""
+"""(y, d) -> y with its algebraic unknowns; None if a full search is needed."""
 
 
 class JammedError(ValueError):
-    """Algebraic equations that friction leaves without a solution of the machine."""
+    """Algebraic equations that have no valid solution because of friction."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """The algebraic equations of a system, for a worker that has nothing else of it.
+    """Algebraic equations of a system, for a worker process without the system.
 
     Attributes:
         names: of all unknowns.
@@ -61,11 +61,11 @@ class Equations:
 
 
 def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array:
-    """Unknowns from which consistent ones are sought, shape (..., n).
+    """Return the initial guess of the unknowns, shape (..., n).
 
     Args:
         system: the equations of `model`.
-        model: whose algebraic variables say where they start; all others start at zero.
+        model: gives the start values of its algebraic variables; all other unknowns start at zero.
         x: states, shape (..., nx).
         t: time [s].
     """
@@ -84,13 +84,13 @@ def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array
 def consistent(
     system: System | Equations, where: str, y: Array, d: Array, follow: Follow | None = None
 ) -> Array:
-    """`y` with its algebraic unknowns solved for, by damped Newton from the given guess.
+    """Return `y` with its algebraic unknowns solved for, by damped Newton from the given guess.
 
     Args:
         system: whose algebraic equations.
         where: for messages.
         y, d: guess and run data.
-        follow: a quick way for mechanisms, tried first (`symfric.integrator.equations.following`).
+        follow: fast update for mechanisms, tried first (`symfric.integrator.equations.following`).
 
     Raises:
         ValueError: no solution near the guess.
@@ -108,7 +108,7 @@ def consistent(
 
 
 def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Array:
-    """`y` with its algebraic unknowns solved for, by what it takes."""
+    """Return `y` with its algebraic unknowns solved for, by Newton, then by Levenberg-Marquardt."""
     manifold = system.manifold
     try:
         return _solved(system, where, y, d)
@@ -122,7 +122,7 @@ def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Arr
 
 
 def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
-    """`y` with its algebraic unknowns solved for, by damped Newton."""
+    """Return `y` with its algebraic unknowns solved for, by damped Newton."""
     rows, along = _moved(system)
     if not rows.size:
         return y
@@ -138,7 +138,7 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
             if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
                 return y
         elif np.isfinite(last) and residual <= _rounding(system, y, d):
-            return y  # what is left of an unknown that is zero is rounding
+            return y  # the unknown is zero up to rounding
         elif not _descend(system, y, d, rows, step, residual):
             break
         last = size
@@ -150,10 +150,11 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
 
 
 def _descended(system: System | Equations, y: Array, d: Array) -> Array:
-    """`y` with algebraic unknowns that leave less over, by Levenberg's and Marquardt's method.
+    """Return `y` with algebraic unknowns of smaller residual, by Levenberg's and Marquardt's
+    method.
 
-    Where contacts begin to rest their loads change at once and by much, with corners in between at
-    which damped Newton stays.
+    Where contacts start to stick, their loads change suddenly and by much, with corners in between
+    at which damped Newton stalls.
     """
     (rows, along), y, damping = _moved(system), y.copy(), 1e-3
     g, slope = evaluate_all(system.constraints, y, d)
@@ -174,7 +175,7 @@ def _descended(system: System | Equations, y: Array, d: Array) -> Array:
 
 
 def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:
-    """Unknowns that algebraic equations may change, and `free` of these."""
+    """Return the unknowns that algebraic equations may change, and their rows of `free`."""
     rows = np.flatnonzero(system.free.any(axis=1))
     return rows, system.free[rows]
 
@@ -182,9 +183,10 @@ def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:
 def consistent_many(
     system: System | Equations, together: Columns, where: str, y: Array, d: Array
 ) -> tuple[Array, dict[int, str]]:
-    """Rows of `y` (members, n) with their algebraic unknowns solved for; number -> what failed.
+    """Return rows of `y` (members, n) with algebraic unknowns solved for, and number -> failure.
 
-    Full Newton steps for all at once, while they shrink the residual; the others go alone.
+    Full Newton steps are made for all members at once while they reduce the residual; the others
+    are solved one by one.
 
     Args:
         system: whose algebraic equations.
@@ -197,7 +199,7 @@ def consistent_many(
         return y, failed
     guess, y, alone = y, y.copy(), list[int]()
     if system.manifold is not None:
-        # mechanisms are few and large: each one alone
+        # mechanisms are few and large: solve one by one
         alone = list(range(y.shape[0]))
     todo = np.arange(0 if alone else y.shape[0])
     before, last = np.full((2, y.shape[0]), np.inf)
@@ -222,7 +224,7 @@ def consistent_many(
 
 
 def _newton_steps(g: Array, J: Array) -> Array:
-    """Full steps of members, NaN for all where the derivatives of one are singular."""
+    """Return full steps of members; NaN for all if the derivatives of one are singular."""
     members, n = g.shape
     matrices = J.reshape(members, n, n).transpose(0, 2, 1)  # CasADi stores column by column
     try:
@@ -232,7 +234,7 @@ def _newton_steps(g: Array, J: Array) -> Array:
 
 
 def _charted(manifold: Manifold, y: Array, d: Array) -> Array:
-    """`y` with an orthonormal basis of the tangent space."""
+    """Return `y` with an orthonormal basis of the tangent space."""
     n, m, y = manifold.n, manifold.m, y.copy()
     phi_q = manifold.slope(y, d)[n : n + m, :n].full()
     # the trailing right singular vectors span the null space
@@ -243,10 +245,10 @@ def _charted(manifold: Manifold, y: Array, d: Array) -> Array:
 def _assembled(
     system: System | Equations, manifold: Manifold, where: str, y: Array, d: Array
 ) -> Array:
-    """`y` with positions and velocities on the constraints of a mechanism, the nearest ones.
+    """Return `y` with positions and velocities projected onto the constraints of a mechanism.
 
     Raises:
-        ValueError: none near.
+        ValueError: no such positions near.
     """
     defect = np.inf
     for _ in range(ITERATIONS):
@@ -261,7 +263,7 @@ def _assembled(
 
 
 def _newton_step(system: System | Equations, y: Array, d: Array) -> tuple[Array, float]:
-    """Full step of Newton's method, NaN where the derivatives are singular, and the residual."""
+    """Return a full Newton step, NaN if the derivatives are singular, and the residual."""
     g, J = evaluate_all(system.constraints, y, d)
     residual = float(np.linalg.norm(g))
     try:
@@ -278,7 +280,9 @@ def _descend(
     step: Array,
     before: float,
 ) -> bool:
-    """Move `rows` along `step`, in place, while the residual shrinks; whether it does at all."""
+    """Move `rows` along `step`, in place, until the residual shrinks; return False if it never
+    does.
+    """
     start = y[rows].copy()
     for part in 0.5 ** np.arange(12):
         y[rows] = start - part * step
@@ -292,7 +296,7 @@ def _residual(system: System | Equations, y: Array, d: Array) -> float:
 
 
 def _rounding(system: System | Equations, y: Array, d: Array) -> float:
-    """How far the residual moves when the last digits of states, unknowns and constants do."""
+    """Return the change of the residual when the last digits of its arguments change."""
     here, rng = evaluate(system.constraints, y, d), np.random.default_rng(0)
 
     def touched(a: Array) -> Array:
@@ -303,24 +307,26 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
 
 
 LONGEST_FIRST = 1e-5
-"""A first step [s] that no machine moves much in, however long it is to run; it costs a few."""
+"""Limit of the first step [s], however long the run; no machine moves much within it."""
 
 
 def first_step(span: float, t_start: float = 0.0) -> float:
-    """A first step [s] so small that the controller decides: it grows eightfold per step."""
+    """Return a first step [s] so small that the controller decides: it grows eightfold per step."""
     return max(min(1e-8 * span, LONGEST_FIRST), SURE * abs(t_start))
 
 
 def first_steps(spans: Array, t_start: float = 0.0) -> Array:
-    """`first_step` of many spans, with its bits."""
+    """Return `first_step` of many spans, with the same bits."""
     return np.maximum(np.minimum(1e-8 * spans, LONGEST_FIRST), SURE * abs(t_start))
 
 
 def smallest_step(span: float) -> float:
-    """The step [s] below which a run gives up where t is near 0; elsewhere rounding of t counts."""
+    """Return the step [s] below which a run stops if t is near 0; elsewhere rounding of t
+    limits it.
+    """
     return 1e-15 * first_step(span)
 
 
 def smallest_steps(spans: Array) -> Array:
-    """`smallest_step` of many spans, with its bits."""
+    """Return `smallest_step` of many spans, with the same bits."""
     return 1e-15 * first_steps(spans)

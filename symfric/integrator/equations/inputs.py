@@ -23,21 +23,21 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 REMEMBERED = 16
-"""Structures of inputs kept per model; the oldest goes first."""
+"""Input structures cached per model; the oldest is dropped first."""
 NO_ROWS = ca.SX(0, 1)
-"""Made once: most calls need no more."""
+"""Empty column, made once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """A signal given by samples: polynomial between the sample times, of degree 0 or 1.
+    """Signal given by samples: polynomial between the sample times, of degree 0 or 1.
 
     Attributes:
         t: increasing sample times [s], shape (n,).
-        values: samples, shape (n,); (members, n) for an ensemble whose members have their own.
+        values: samples, shape (n,); (members, n) for an ensemble with different samples per member.
 
-    Both are copied, and the copies cannot be written: what was checked stays as it is. Before the
-    first and after the last sample the end value holds.
+    Both are copied and read-only, so they stay valid. Before the first and after the last sample
+    the end value holds.
     """
 
     t: ArrayLike
@@ -63,21 +63,25 @@ class Sampled:
 
     @property
     def rows(self) -> int | None:
-        """For how many members it has samples; None for one signal."""
+        """Number of members with their own samples; None for one signal."""
         return np.shape(self.values)[0] if np.ndim(self.values) == 2 else None
 
     def coefficients(self, breaks: Array) -> Array:
-        """Value and slope at the start of each interval between `breaks`, shape (2, ..., n - 1)."""
+        """Return value and slope at the start of each interval between `breaks`, shape (2, ...,
+        n - 1).
+        """
         raise NotImplementedError
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Hold(Sampled):
-    """Zero-order hold: `values[k]` from t[k] until t[k+1], as a digital controller puts it out."""
+    """Zero-order hold: `values[k]` from t[k] until t[k+1], like the output of a digital
+    controller.
+    """
 
     def coefficients(self, breaks: Array) -> Array:
-        """Value at the start of each interval; slope 0."""
+        """Return the value at the start of each interval; slope 0."""
         t, values = np.asarray(self.t), np.asarray(self.values)
         middle = (breaks[:-1] + breaks[1:]) / 2
         index = np.clip(np.searchsorted(t, middle, side="right") - 1, 0, t.size - 1)
@@ -91,7 +95,7 @@ class Linear(Sampled):
     """Linear interpolation between the samples, as for a measured signal."""
 
     def coefficients(self, breaks: Array) -> Array:
-        """Value and slope at the start of each interval."""
+        """Return value and slope at the start of each interval."""
         t, values = np.asarray(self.t), np.asarray(self.values)
         ends = np.array([np.interp(breaks, t, row) for row in np.atleast_2d(values)])
         ends = ends if values.ndim == 2 else ends[0]
@@ -101,12 +105,12 @@ class Linear(Sampled):
 KINDS = "an input is a number, Hold or Linear samples, or a function of the symbolic time"
 
 Input = float | Sampled | Callable[[ca.SX], Any]
-"""A constant, samples, or a function of the symbolic time that returns an expression."""
+"""Constant, samples, or a function of the symbolic time that returns an expression."""
 
 
 @dataclass(frozen=True, eq=False)
 class InputData:
-    """How the inputs of one simulation enter its equations.
+    """Inputs of one simulation in terms of time and data.
 
     Attributes:
         expression: SX (nu, 1), the inputs in terms of `t` and `data`.
@@ -114,7 +118,7 @@ class InputData:
         breaks: interval ends in [t_start, t_end], shape (n + 1,).
         values: `data` on each interval, shape (n_data, n).
         key: the structure; two of a model with one key have the same equations.
-        pace: length [s] of straight pieces of functions of time where they are quickest, or inf.
+        pace: length [s] of the shortest straight pieces of functions of time, or inf.
     """
 
     expression: ca.SX
@@ -130,11 +134,11 @@ class InputData:
         return float(self.breaks[0]), float(self.breaks[-1])
 
     def interval(self, times: Array) -> NDArray[np.intp]:
-        """Number of the interval that holds each time; at a break the later one."""
+        """Return the index of the interval of each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
     def stopping_at(self, times: ArrayLike) -> InputData:
-        """The same inputs, with breaks at `times` [s], too; those outside the span are left out."""
+        """Return the same inputs with additional breaks at `times` [s] inside the span."""
         at = np.asarray(times, dtype=float)
         at = at[(at > self.breaks[0]) & (at < self.breaks[-1])]
         if not at.size:
@@ -149,10 +153,10 @@ def input_data(
     """Collect the inputs `given` by name; the others keep their start value.
 
     Numbers and samples become data, expressions go into the equations with their numbers as data.
-    There are breaks at all samples, and where a function of time changes its pace.
+    There are breaks at all samples, and at discontinuities of functions of time.
 
     Raises:
-        ValueError: unknown name or a value of another kind.
+        ValueError: unknown name or a value of another type.
     """
     if not model.u and not given:
         return _undriven(t_start, t_end)
@@ -179,8 +183,9 @@ def input_data(
 
 
 def paced(inputs: InputData, model: Model) -> InputData:
-    """The same inputs, with breaks where a function of time in the model's own equations, the ramp
-    of a road, changes its pace: with states at zero, and parameters at their start values.
+    """Return the same inputs with breaks at discontinuities of the model's own functions of time.
+
+    An example is the ramp of a road. States are zero and parameters at their start values.
     """
     if (rows := model.memory.get("rows of time")) is None:
         of_time = np.flatnonzero(ca.which_depends(model.residual, model.t, 1, True)).tolist()
@@ -195,7 +200,7 @@ def paced(inputs: InputData, model: Model) -> InputData:
 
 
 def _written(model: Model, parts: list[_Part]) -> tuple[ca.SX, ca.SX]:
-    """Expression and data of inputs of this structure, written once and kept with the model."""
+    """Return expression and data of inputs of this structure, cached with the model."""
     known: dict[Hashable, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
     key = tuple(part.key for part in parts)
     found = known.get(key)
@@ -212,21 +217,21 @@ def _written(model: Model, parts: list[_Part]) -> tuple[ca.SX, ca.SX]:
 
 @lru_cache
 def _undriven(t_start: float, t_end: float) -> InputData:
-    """What a model without inputs takes."""
+    """Return the inputs of a model without any."""
     return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
 Written = tuple[ca.SX, tuple[ca.SX, ...]]
-"""An input in terms of time and data, and these data."""
+"""Input in terms of time and data, and these data."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One input: how it is written, the values of its data on the intervals, its structure.
+    """One input: its expression, the values of its data on the intervals, its structure.
 
-    `write` takes the symbol for the start of an interval, from which `ramps` count their time.
-    `onsets` are times at which a step has to end, or it could leap over a pulse; `pace` is the
-    length [s] of its straight pieces.
+    `write` takes the symbol for the start of an interval, from which `ramps` measure time. `onsets`
+    are times at which a step has to end, so as not to miss a pulse; `pace` is the length [s] of its
+    shortest straight pieces.
     """
 
     write: Callable[[ca.SX], Written]
@@ -238,7 +243,7 @@ class _Part:
 
 
 def _part(model: Model, variable: Variable, signal: Any, breaks: Array) -> _Part:
-    """The input `variable`."""
+    """Build the input `variable`."""
     where, name = f"input '{variable.name}'", variable.name
 
     def held(_: ca.SX) -> Written:
@@ -252,36 +257,38 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array) -> _Part
     if isinstance(signal, Sampled):
         if signal.rows is not None:
             raise ValueError(
-                f"{where}: expected samples of one signal, got those of {signal.rows} members, "
-                "which are for simulate_many"
+                f"{where}: expected samples of one signal, got samples of {signal.rows} members, "
+                "use these with simulate_many"
             )
         value, rise = signal.coefficients(breaks)
         if rise.any():
             return _Part(ramp, "linear", (value, rise), ramps=True)
         return _Part(held, "hold", (value,))
     if not callable(signal):
-        # a number is data too: another value must not mean another integrator
+        # a number is data too: a new value must not need a new integrator
         number = checks.number(where, signal, hint=KINDS)
         return _Part(held, "hold", (np.full(breaks.size - 1, number),))
     expression = _evaluated(where, signal, model)
     look = _of_time(expression, model), float(breaks[0]), float(breaks[-1])
     own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
     made, data, numbers = lifted(expression, own, name)
-    # the structure of the expression and not the function that wrote it: what that refers to may
-    # have changed since, and its numbers are data
+    # key by the structure of the expression, not by the function that wrote it: variables that it
+    # refers to may have changed since, and its numbers are data
     key = sha256(ca.SX.serialize(made).encode()).hexdigest()
     values = tuple(np.full(breaks.size - 1, number) for number in numbers)
     return _Part(lambda _: (made, (data,)), key, values, onsets=onsets(*look), pace=pace(*look))
 
 
 def _of_time(expression: ca.SX, model: Model) -> str:
-    """`expression` with states and parameters at zero, serialised: what time alone does to it."""
+    """Return `expression` with states and parameters at zero, serialised: its dependence on
+    time.
+    """
     others = stacked(model.vector(letter) for letter in "xzp")
     return ca.SX.serialize(ca.substitute(expression, others, ca.SX.zeros(others.numel())))
 
 
 def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.SX:
-    """What the function `signal` makes of the symbolic time, in the symbols of the model."""
+    """Return the expression that the function `signal` returns for the symbolic time."""
     what = "a function of the symbolic time that returns one expression"
     hint = (
         "write casadi.sin(t) for math.sin(t), casadi.if_else(t > 1, a, b) for a Python if, "
@@ -308,13 +315,13 @@ def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.S
 
 
 def rate_of(signal: Input) -> Input:
-    """The derivative of an input in time, exactly that of what is between its samples.
+    """Return the derivative of an input in time, exact for the interpolated signal.
 
     A number has the rate 0, a function its derivative, and `Linear` samples the slopes between them
     as `Hold`, 0 before the first and after the last sample.
 
     Raises:
-        ValueError: `Hold` samples, which jump, or what is no input.
+        ValueError: `Hold` samples, which jump, or not an input.
     """
     if isinstance(signal, Linear):
         t, values = np.asarray(signal.t), np.asarray(signal.values)
@@ -326,8 +333,8 @@ def rate_of(signal: Input) -> Input:
         return Hold(np.r_[before, t], np.concatenate([still, slopes, still], axis=-1))
     if isinstance(signal, Sampled):
         raise ValueError(
-            "rate_of: expected a signal without jumps, got Hold samples; Linear(t, values) goes "
-            "straight from one to the next"
+            "rate_of: expected a signal without jumps, got Hold samples; Linear(t, values) is "
+            "linear between samples"
         )
     if is_number(signal):
         return 0.0

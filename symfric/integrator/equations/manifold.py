@@ -1,7 +1,7 @@
-"""Constraints of a mechanism kept on all levels.
+"""Constraints of a mechanism, enforced on positions, velocities and accelerations.
 
-A holonomic model is integrated with its accelerations as unknowns beside multipliers and normal
-forces, so that no mass matrix is inverted and no derivative goes through a factorisation:
+A holonomic model is integrated with its accelerations as unknowns in addition to multipliers and
+normal forces, so no mass matrix is inverted and no derivative goes through a factorisation:
 
     x' = (q', a, ...),   M a + phi_q' lam = Q,   phi_q a + gamma = 0,   normal forces
 
@@ -10,10 +10,13 @@ Every accepted step ends on the constraints:
     q  <- q  - phi_q' (phi_q phi_q')^-1 phi(q)       repeated with one factorisation
     q' <- q' - phi_q' (phi_q phi_q')^-1 (phi_q q' + phi_t)
 
-Limits: impacts are excluded, and with them tangential shocks, in which friction lets the reactions
-grow a thousandfold (`SHOCK`, Painleve): both end a run. A step over a position in which phi_q loses
-rank is not accepted: what lies beyond is not determined, and det(phi_q(q1) phi_q(q0)') has turned
-its sign. Not seen are two such positions within one step, and a step that ends on another branch.
+Limits: impacts are excluded, and so are tangential shocks, in which friction makes the reactions
+grow a thousandfold (`SHOCK`, Painleve): both end a run. A step across a position in which phi_q
+loses
+rank is rejected, because the motion beyond is not determined; there det(phi_q(q1) phi_q(q0)')
+changes
+its sign. Two such positions within one step, and a step that ends on another branch, are not
+detected.
 """
 
 from dataclasses import dataclass
@@ -30,41 +33,45 @@ from symfric.model.holonomic import Holonomic
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-4
-"""Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular: at
-tight tolerances rounding stops it that far ahead."""
+"""Ratio of singular values of phi_q below which a mechanism that cannot continue is called
+singular: at tight tolerances rounding stops it that far ahead.
+"""
 PULLING = 1e-3
-"""Negative normal forces up to this times their typical size are errors of a step."""
+"""Negative normal forces up to this fraction of their typical size are integration errors."""
 SHOCK = 1e-3
-"""Smallest pivot of I - dN/dN that is accepted; without friction it is 1. Its inverse is by how
-much friction multiplies a load on a bearing. On its way to 0 that load stops the sliding within
-microseconds, through a pivot that falls exponentially with the sliding velocity before: some runs
-would pass and others not, by their tolerance. Machines that move stay above 0.4, near jamming above
-0.02 (`tests/symfric/stress/test_jamming.py`)."""
+"""Smallest pivot of I - dN/dN that is accepted; without friction it is 1. Its inverse is the factor
+by which friction multiplies a load on a bearing. As it approaches 0 that load stops the sliding
+within
+microseconds, while the pivot falls exponentially with the sliding velocity: without this limit the
+tolerance would decide which runs pass. Moving machines stay above 0.4, near jamming above 0.02
+(`tests/symfric/stress/test_jamming.py`).
+"""
 ITERATIONS, NEARBY = (4, 3), (2, 2)
-"""Of Newton's method with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
-from 1e-5."""
+"""Newton iterations with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
+from 1e-5.
+"""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Manifold:
-    """Functions that put a column of unknowns onto the constraints of a holonomic model.
+    """Functions that project a column of unknowns onto the constraints of a holonomic model.
 
     Attributes:
-        project: (y, d) -> y with positions and velocities on the constraints; the same y where
-            there are none.
+        project: (y, d) -> y with positions and velocities on the constraints; y itself without
+            constraints.
         polish: the same from nearby.
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
-            are accelerations, multipliers, forces that rest must carry, normal forces, in this
-            order after the states.
-        applied: number of the forces that rest must carry.
-        basis: where y holds V, a basis of the tangent space, column by column.
+            are accelerations, multipliers, forces carried in stick, normal forces, in this order
+            after the states.
+        applied: number of the forces carried in stick.
+        basis: rows of y that hold V, a basis of the tangent space, column by column.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
-        branch: (y0, y1, d) -> sign of det(phi_q(q1) phi_q(q0)'), which turns where a step leads
-            over a position in which constraints depend on each other.
+        branch: (y0, y1, d) -> sign of det(phi_q(q1) phi_q(q0)'), which changes if a step crosses a
+            position in which constraints depend on each other.
         pressing: (y, d) -> normal forces over their typical size, which must not be negative.
-        pressed: what they are, in words.
+        pressed: names of these normal forces.
     """
 
     project: ca.Function
@@ -82,20 +89,20 @@ class Manifold:
 
     @property
     def loop(self) -> int:
-        """Where the normal forces begin among the algebraic unknowns."""
+        """Index of the first normal force among the algebraic unknowns."""
         return self.n + self.m + self.applied
 
     @property
     def charted(self) -> bool:
-        """Whether it is integrated in charts of the tangent space."""
+        """True if it is integrated in charts of the tangent space."""
         return len(self.basis) > 0
 
 
 def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
-    """Unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
+    """Return unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
 
-    V is a basis of the tangent space of the constraints, column by column, at the start of the step
-    before; it has no rates. Without constraints it has no rows.
+    V is a basis of the tangent space of the constraints, column by column, at the start of the
+    previous step; it has no rates. Without constraints it has no rows.
     """
     mechanics, x = model.holonomic, model.vector("x")
     if mechanics is None:
@@ -115,13 +122,13 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
 
 
 def _of_basis(mechanics: Holonomic) -> int:
-    """Length of V: a column of n for each degree of freedom, where there is a chart at all."""
+    """Return the length of V: a column of n for each degree of freedom, 0 without a chart."""
     n, m = mechanics.n, mechanics.phi.numel()
     return n * (n - m) if m and mechanics.index == 0 else 0
 
 
 def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
-    """The constraints of a holonomic model as Functions of the unknowns of its system.
+    """Return the constraints of a holonomic model as Functions of the unknowns of its system.
 
     Args:
         model: its equations.
@@ -172,7 +179,7 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
 def _projected(
     at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX, iterations: tuple[int, int]
 ) -> tuple[ca.SX, ca.SX]:
-    """Positions and velocities on the constraints near q and qd."""
+    """Return positions and velocities on the constraints near q and qd."""
     _, J, _ = at(q, qd, d)
     lu = factorise(ca.sparsify(J @ J.T), [range(J.size1())])
 
@@ -187,12 +194,15 @@ def _projected(
 
 
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
-    """What jams or pulls at y, in words; empty where det(I - dN/dN) > SHOCK and N > 0."""
+    """Return a message if friction jams or a bearing pulls at y; empty otherwise.
+
+    The motion is valid where det(I - dN/dN) > SHOCK and N > 0.
+    """
     return grows(manifold, names, y, d, SHOCK) or pulls(manifold, y, d, 0.0)
 
 
 def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
-    """Normal forces that are negative; with a margin those that have almost vanished, too."""
+    """Return a message if normal forces are negative or, with a margin, almost zero."""
     if not manifold.pressed:
         return ""
     limit = PULLING if margin > 0.0 else -PULLING
@@ -211,7 +221,7 @@ def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
 
 
 def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
-    """Normal forces that grow with the friction that they cause."""
+    """Return a message if normal forces grow with the friction that they cause."""
     k = manifold.loop
     if manifold.slope.size1_out(0) == k:
         return ""
@@ -236,7 +246,7 @@ def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin
 
 
 def singular(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
-    """Which constraints lose their independence at y, in words; empty where none do."""
+    """Return a message naming constraints that become dependent at y; empty if there are none."""
     n, m = manifold.n, manifold.m
     phi_q = manifold.slope(y, d).full()[n : n + m, :n]
     if not m or not np.isfinite(phi_q).all():

@@ -1,16 +1,16 @@
-"""Linear algebra of small matrices: symbolic factors, sound orders of pivots, rank.
+"""Linear algebra of small matrices: symbolic factors, stable pivot orders, rank.
 
 Sparse LU factors are written out as expressions: no pivot search and no index at run time.
 
-The order of pivots is part of the written-out factors (`factorise`), chosen by fill alone where
-nothing is known. Here it is judged by numbers: eliminate in that order, solve, and look what the
-solution leaves over,
+The order of pivots is part of the written-out factors (`factorise`), chosen by fill alone if no
+numbers are known. Here it is checked with numbers: eliminate in that order, solve, and compute the
+backward error
 
     omega = max_i |b - A x|_i / (|A| |x| + |b|)_i        (Oettli and Prager, 1964)
 
-which neither units of equations nor of unknowns change. A zero or a tiny pivot shows in it, and so
-does growth, where it harms. Where an order fails, threshold pivoting finds one that is good in all
-samples of the matrix at once, from any row and column, with least fill (Markowitz).
+which is invariant to units of equations and of unknowns. It detects zero and tiny pivots, and
+harmful growth. If an order fails, threshold pivoting finds one that is good in all samples of the
+matrix at once, from any row and column, with least fill (Markowitz).
 """
 
 from collections.abc import Container, Sequence
@@ -48,10 +48,11 @@ class SymbolicLU:
     packed_symbol: ca.SX
 
     def sign(self, leading: int | None = None) -> ca.SX:
-        """Sign of the determinant, in terms of `packed_symbol`.
+        """Return the sign of the determinant, in terms of `packed_symbol`.
 
         Args:
-            leading: only of the block that the first pivots eliminate, whose rows and columns are
+            leading: only of the block that this many first pivots eliminate, whose rows and columns
+            are
                 the same; all by default.
         """
         order = self.order[:leading]
@@ -62,7 +63,7 @@ class SymbolicLU:
         return sign
 
     def pivots(self, rows: Container[int]) -> ca.SX:
-        """Pivots of `rows` in elimination order, in terms of `packed_symbol`."""
+        """Return the pivots of `rows` in elimination order, in terms of `packed_symbol`."""
         found, at = [ca.SX(0, 1)], 0
         for (row, _), others, below in zip(self.order, self.rows, self.columns, strict=True):
             if row in rows:
@@ -71,7 +72,7 @@ class SymbolicLU:
         return ca.vertcat(*found)
 
     def solve(self, right: ca.SX) -> ca.SX:
-        """X with A x = right, in terms of `packed_symbol` in place of the factors."""
+        """Return x with A x = right, in terms of `packed_symbol` in place of the factors."""
         packed = self.packed_symbol
         b = [right[i] for i in range(len(self.order))]
         rows: list[tuple[ca.SX, list[tuple[int, ca.SX]]]] = []
@@ -95,12 +96,12 @@ class SymbolicLU:
 def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order = ()) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
-    Pivots are chosen once, at build time: those of `order`, where it is given. Else the rows of
-    each group pivot on the diagonal, group by group, those of a group by least fill (Markowitz):
-    differential equations, whose pivot 1/(gamma h) dominates for small steps; a mass matrix;
-    constraints, whose pivot is the definite Schur complement of the mass matrix before. Rows in no
-    group come last and pivot anywhere; whether that is sound, numbers say
-    (`symfric.integrator.methods.method`).
+    Pivots are chosen once, at build time: those of `order`, if given. Otherwise the rows of each
+    group
+    pivot on the diagonal, group by group, within a group by least fill (Markowitz): differential
+    equations, whose pivot 1/(gamma h) dominates for small steps; a mass matrix; constraints, whose
+    pivot is the definite Schur complement of the mass matrix before. Rows in no group come last and
+    pivot anywhere; `symfric.integrator.methods.method` checks numerically if that is stable.
 
     Raises:
         ValueError: structurally singular.
@@ -145,12 +146,12 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order 
 def _pivot(
     rows: list[dict[int, ca.SX]], holders: list[set[int]], grouped: list[set[int]]
 ) -> tuple[int, int]:
-    """The entry whose elimination fills least, in the first group that has one.
+    """Return the entry whose elimination causes least fill, in the first group that has one.
 
     Args:
-        rows, holders: entries that are left, by row, and rows that hold them, by column.
-        grouped: rows that are left; those of the last group may pivot off the diagonal. The row
-            found is taken out.
+        rows, holders: remaining entries by row, and rows that hold them, by column.
+        grouped: remaining rows; those of the last group may pivot off the diagonal. The row found
+            is removed.
     """
     for group in grouped:
         candidates = (
@@ -170,7 +171,7 @@ def _pivot(
 
 
 def _parity(columns: dict[int, int]) -> int:
-    """Sign of the permutation row -> column."""
+    """Return the sign of the permutation row -> column."""
     sign, left = 1, dict(columns)
     while left:
         start, row = left.popitem()
@@ -181,15 +182,15 @@ def _parity(columns: dict[int, int]) -> int:
 
 Array = NDArray[np.float64]
 VANISHES = 1e-11
-"""What is left of an entry, with rows and columns near 1, that counts as zero."""
+"""Remaining size of an entry, with rows and columns scaled near 1, that counts as zero."""
 ROUNDS = 4
-"""Of scaling rows and columns in turn."""
+"""Rounds of scaling rows and columns in turn."""
 
 
 def echelon(A: Array) -> tuple[list[int], Array]:
-    """Columns that span those of A, and B with A = A[:, columns] B, so that B[:, columns] = I.
+    """Return columns that span those of A, and B with A = A[:, columns] B, B[:, columns] = I.
 
-    By elimination with complete pivoting, rows and columns in units of their own.
+    Uses elimination with complete pivoting of scaled rows and columns.
     """
     left, unit = equilibrated(A)
     pivots: list[int] = []
@@ -214,7 +215,7 @@ def echelon(A: Array) -> tuple[list[int], Array]:
 
 
 def null_space(A: Array) -> Array:
-    """A basis of the vectors x with A x = 0, a column each; unit vectors where A allows it."""
+    """Return a basis of the vectors x with A x = 0, as columns; unit vectors if possible."""
     n = A.shape[1]
     entries = A != 0.0
     if (entries.sum(axis=0) <= 1).all() and (entries.sum(axis=1) <= 1).all():
@@ -228,9 +229,9 @@ def null_space(A: Array) -> Array:
 
 
 def equilibrated(A: Array) -> tuple[Array, Array]:
-    """Matrices (..., m, n) with largest entries of rows and columns near 1, and units of columns.
+    """Return matrices (..., m, n) with largest row and column entries near 1, and column scales.
 
-    The unit of a column is what it was multiplied with.
+    Each column was multiplied by its scale.
     """
     scaled, unit = A.copy(), np.ones(A.shape[-1])
     for _ in range(ROUNDS):
@@ -244,21 +245,21 @@ def equilibrated(A: Array) -> tuple[Array, Array]:
 
 
 SOUND = 1e-9
-"""Largest omega of a sound order; steps at the tightest tolerances need no more digits."""
+"""Largest omega of a stable order; steps at the tightest tolerances need no more digits."""
 REGULAR = 1e-13
-"""Smallest singular value over the largest, of a matrix in its own units, that is regular."""
+"""Smallest ratio of singular values of a scaled matrix that is regular."""
 THRESHOLD = 0.1
-"""A pivot is at least this large in its column."""
+"""Least size of a pivot, relative to its column."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """A matrix that a step solves with, and the order of pivots in which its factors are written.
+    """Matrix that a step solves with, and the pivot order of its factors.
 
     Attributes:
-        name: which of the matrices of a method it is.
-        entries: (y, d) -> what it is written in.
+        name: of the matrix, among those of a method.
+        entries: (y, d) -> values of its symbols.
         symbols: these and h, as SX.
         matrix: SX, A.
         order: (row, column) of each pivot.
@@ -275,19 +276,19 @@ class Factors:
         return ca.Function("matrix", list(self.symbols), [ca.densify(self.matrix)])
 
     def at(self, y: Array, h: float, d: Array) -> Array:
-        """A as numbers."""
+        """Return A as numbers."""
         return ca.DM(self._numbers(self.entries(y, d), h)).full()
 
     @cached_property
     def pattern(self) -> NDArray[np.bool_]:
-        """Where A has entries."""
+        """Mask of the entries of A."""
         return ca.DM(self.matrix.sparsity(), 1).full() != 0
 
 
 def backward_error(A: Array, order: Order) -> float:
-    """Omega of two solutions by elimination in this order, infinite where a pivot is zero.
+    """Return omega of two solutions by elimination in this order, infinite for a zero pivot.
 
-    Of several matrices (..., n, n) that of the worst.
+    For several matrices (..., n, n) it is the largest omega.
     """
     n = len(order)
     rows, columns = np.array(order, dtype=np.intp).reshape(n, 2).T
@@ -304,7 +305,7 @@ def backward_error(A: Array, order: Order) -> float:
 
 
 def regular(A: Array) -> bool:
-    """Whether A, with rows and columns of one size, can be told from a singular matrix."""
+    """Return True if A, with scaled rows and columns, is numerically nonsingular."""
     if not A.size:
         return True
     scaled, _ = equilibrated(A)
@@ -313,10 +314,10 @@ def regular(A: Array) -> bool:
 
 
 def best_order(pattern: NDArray[np.bool_], samples: Array) -> Order:
-    """The order of threshold pivoting in all samples (s, n, n) at once.
+    """Return the order of threshold pivoting in all samples (s, n, n) at once.
 
-    Each pivot is at least `THRESHOLD` of what is left of its column, in every sample; among those
-    the one that fills least; where there is none, the one that is largest in its worst sample.
+    Each pivot is at least `THRESHOLD` of the rest of its column, in every sample; among those the
+    one with least fill; if there is none, the one that is largest in its worst sample.
 
     Raises:
         ValueError: structurally singular.
@@ -351,7 +352,7 @@ def best_order(pattern: NDArray[np.bool_], samples: Array) -> Order:
 
 
 def _eliminated(A: Array, right: Array) -> Array:
-    """X with A x = right, by elimination down the diagonal."""
+    """Return x with A x = right, by elimination down the diagonal."""
     n, left = A.shape[-1], np.concatenate([A, right], axis=-1)
     for k in range(n):
         left[..., k, k + 1 :] /= left[..., k, k, None]

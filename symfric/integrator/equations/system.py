@@ -1,23 +1,24 @@
-"""The equations of a model in the form M y' = f(y, d), which the step takes.
+"""Equations of a model in the form M y' = f(y, d), which a step takes.
 
-One column of unknowns, one right-hand side, a constant mass pattern. Fully implicit models have it,
-too, whatever the rank of their mass matrix. A constant matrix dF/dx' stays the mass matrix,
-singular or not: nothing is inverted. Only rows that follow from others are replaced by what is left
-over without rates,
+There is one column of unknowns, one right-hand side and a constant mass matrix, also for fully
+implicit models, whatever the rank of their mass matrix. A constant matrix dF/dx' stays the mass
+matrix, singular or not: nothing is inverted. Only rows that depend on others are replaced by their
+combination without rates,
 
     M_i = sum_k c_k M_k   =>   0 = f_i - sum_k c_k f_k,
 
-because in M / (gamma h) - J these equations, as small as J, would drown in the rounding of M / h.
+because in M / (gamma h) - J these equations, as small as J, would be lost in the rounding of M / h.
 (A capacitor between two nodes of a circuit: its current leaves one and enters the other.)
 
-Where dF/dx' is not constant, the rates v = B x' that the equations depend on are unknowns,
+If dF/dx' is not constant, the rates v = B x' that the equations depend on are unknowns,
 
     B x' = v,   0 = F(v, x, z),
 
 with the same combination of equations that never depend on rates.
 
-Limits: the directions that a matrix maps to zero must not turn with states or parameters. Write
-such a charge q(x) as a state of its own, q' = i, 0 = q - q(x).
+Limits: the null space of the matrix must not turn with states or parameters. Write such a charge
+q(x)
+as a state of its own, q' = i, 0 = q - q(x).
 """
 
 from collections.abc import Mapping
@@ -40,13 +41,13 @@ from symfric.model.holonomic import Inner
 
 
 def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -> None:
-    """Refuse M y' = f(y) whose equations without rates leave unknowns undetermined.
+    """Check that in M y' = f(y) the equations without rates determine their unknowns.
 
-    Rates determine what M sees of y; the rest has to follow from the equations without rates.
-    Constraints on positions alone, for example, do not say what their multipliers are (index 3).
+    Rates determine M y; the rest has to follow from the equations without rates. Constraints on
+    positions alone, for example, do not determine their multipliers (index 3).
 
     Raises:
-        ValueError: structurally so, whatever the numbers.
+        ValueError: structurally undetermined, whatever the numbers.
     """
     pattern = ca.DM(mass.sparsity(), 1)
     still = [i for i in range(f.numel()) if not pattern[i, :].nnz()]
@@ -61,8 +62,8 @@ def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -
     loose = [names[i] for i in every if ca.sprank(pattern[:, [k for k in every if k != i]]) == rank]
     raise ValueError(
         f"{where}: expected algebraic equations that determine {listed(loose)} at given states "
-        "(index 1), got some that do not depend on them; differentiate these by time, or make what "
-        "changes (a charge, a momentum) a state of its own"
+        "(index 1), got some that do not depend on them; differentiate these by time, or make the "
+        "changing quantity (a charge, a momentum) a state of its own"
     )
 
 
@@ -70,11 +71,11 @@ Array = NDArray[np.float64]
 Equations = tuple[ca.SX, ca.SX, ca.SX, list[str]]
 """Unknowns without time, right-hand side, mass matrix and names."""
 SAMPLES = 4
-"""Random points at which a matrix that is not constant is looked at."""
+"""Random points at which a non-constant matrix is evaluated."""
 
 
 def implicit_columns(model: Model) -> Equations:
-    """Unknowns, right-hand side, mass matrix and names of a model with a residual."""
+    """Return unknowns, right-hand side, mass matrix and names of a model with a residual."""
     x, z, F = model.vector("x"), model.vector("z"), model.residual
     nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
     matrix = ca.jacobian(F, model.xdot)
@@ -97,12 +98,12 @@ def implicit_columns(model: Model) -> Equations:
 
 
 def _padded(M: Array, columns: int) -> ca.SX:
-    """M as a sparse matrix with that many columns."""
+    """Return M as a sparse matrix with this number of columns."""
     return ca.sparsify(ca.horzcat(ca.SX(ca.DM(M)), ca.SX(M.shape[0], columns - M.shape[1])))
 
 
 def _dependent(M: Array) -> dict[int, dict[int, float]]:
-    """Rows of M that follow from others: row -> coefficients of these; rows of zeros have none."""
+    """Return dependent rows of M: row -> coefficients of the others; empty for rows of zeros."""
     rows, B = echelon(M.T)
     return {
         i: {rows[k]: float(B[k, i]) for k in np.flatnonzero(B[:, i])}
@@ -112,7 +113,7 @@ def _dependent(M: Array) -> dict[int, dict[int, float]]:
 
 
 def _combined(F: ca.SX, at_rest: ca.SX, dependent: dict[int, dict[int, float]]) -> ca.SX:
-    """F, with dependent equations freed of rates; `at_rest` is F without any."""
+    """Return F, with dependent equations freed of rates; `at_rest` is F without rates."""
     found = ca.SX(F)
     for i, coefficients in dependent.items():
         found[i] = at_rest[i] - sum(c * at_rest[k] for k, c in coefficients.items())
@@ -120,7 +121,7 @@ def _combined(F: ca.SX, at_rest: ca.SX, dependent: dict[int, dict[int, float]]) 
 
 
 def _samples(model: Model, matrix: ca.SX) -> list[Array]:
-    """The matrix at random points near the start; with random entries where it is not finite."""
+    """Return the matrix at random points near the start; random entries if it is not finite."""
     rng = np.random.default_rng(0)
     columns = {"x": model.vector("x"), "z": model.vector("z")}
     columns |= {"u": model.vector("u"), "p": model.vector("p")}
@@ -144,10 +145,10 @@ def _samples(model: Model, matrix: ca.SX) -> list[Array]:
 @final
 @dataclass(frozen=True, eq=False)
 class System:
-    """M y' = f(y, d) with y = (x, z, t): states, algebraic variables, time.
+    """System M y' = f(y, d) with y = (x, z, t): states, algebraic variables, time.
 
-    Time is an unknown with rate 1, and only where the equations depend on it, so that no method
-    needs terms for explicit time.
+    Time is an unknown with rate 1, only if the equations depend on it, so that no method needs
+    terms for explicit time.
 
     Attributes:
         y: SX symbols (n, 1).
@@ -155,22 +156,22 @@ class System:
         f: SX (n, 1).
         mass: SX (n, n), constant.
         nx: number of differential states, the first rows of y.
-        timed: whether y ends with time.
+        timed: True if y ends with time.
         names: of the unknowns, for messages.
         nominal: typical magnitude of each differential state, shape (nx,).
         monitors: SX (m, 1), expressions whose relative error is controlled too: those of the model
             and its algebraic variables.
         monitor_nominal: SX (m, 1), their typical magnitudes, in terms of d.
-        manifold: where the solution of a holonomic model lies.
+        manifold: constraint manifold of a holonomic model.
         pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
             eliminated: rates of their own unknown and mass matrices, constraints, normal forces.
-        slips: how many of the monitors, the first ones, are those of the model.
-        inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
-            groups take the place of `pivots`.
-        orders: pivots of the factors of each matrix by its name, where those that fill least are
-            not sound (`symfric.integrator.equations.matrices`).
-        slope: Jacobian of f where it is not to be derived from f.
-        branchless: whether its steps write tanh out (`symfric.integrator.equations.expressions`).
+        slips: number of monitors from the model, which come first.
+        inner: f with inner unknowns, whose derivatives are sparse; None if f is used directly. Its
+            groups replace `pivots`.
+        orders: pivots of the factors of each matrix by its name, where those with least fill are
+            unstable (`symfric.integrator.equations.matrices`).
+        slope: Jacobian of f if it is not to be derived from f.
+        branchless: True if its steps write tanh out (`symfric.integrator.equations.expressions`).
     """
 
     y: ca.SX
@@ -198,7 +199,7 @@ class System:
 
     @property
     def rubs(self) -> bool:
-        """Whether something slides in it that its model names, or may rest in it."""
+        """True if the model has sliding velocities, or contacts that may stick."""
         return self.slips > 0 or (self.manifold is not None and self.manifold.applied > 0)
 
     @cached_property
@@ -208,21 +209,21 @@ class System:
 
     @cached_property
     def plain(self) -> "System":
-        """The same with tanh as it is, for steps of which derivatives are taken."""
+        """Same system with tanh unchanged, for steps that are differentiated."""
         return replace(self, slope=self.J, branchless=False)
 
     def in_steps(self, function: ca.Function) -> ca.Function:
-        """A `function` of the equations as its steps call it."""
+        """Return a `function` of the equations as its steps call it."""
         return branchless(function) if self.branchless else function
 
     @cached_property
     def is_ode(self) -> bool:
-        """Whether the mass matrix is the identity."""
+        """True if the mass matrix is the identity."""
         return bool((ca.DM(self.mass).full() == np.eye(self.n)).all())
 
     @cached_property
     def is_semi_explicit(self) -> bool:
-        """Whether the mass matrix is the identity but for zeros on its diagonal."""
+        """True if the mass matrix is the identity except for zeros on its diagonal."""
         M = ca.DM(self.mass).full()
         return bool((np.diag(np.diag(M)) == M).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
 
@@ -236,9 +237,10 @@ class System:
 
     @cached_property
     def free(self) -> NDArray[np.float64]:
-        """What the algebraic equations may change of y, a column each: M times it is zero.
+        """Directions of y that the algebraic equations may change, as columns: M times it is zero.
 
-        Unit vectors of unknowns without rates, where the mass matrix is no wider than its rank.
+        They are unit vectors of unknowns without rates if the mass matrix is no wider than its
+        rank.
         """
         return null_space(ca.DM(self.mass).full())
 
@@ -254,11 +256,11 @@ class System:
 
 
 def system(model: Model, inputs: InputData) -> System:
-    """Put the inputs into the model and bring it into the form M y' = f(y, d).
+    """Insert the inputs into the model and convert it to M y' = f(y, d).
 
-    An implicit model that is linear in x' with a constant matrix keeps that matrix as mass, be it
-    singular; any other one gets its rates as additional algebraic unknowns
-    (`symfric.integrator.equations.system`), a holonomic one its accelerations.
+    An implicit model that is linear in x' with a constant matrix keeps that matrix as mass, even if
+    singular; any other one gets its rates as additional algebraic unknowns, a holonomic one its
+    accelerations.
 
     Raises:
         ValueError: a model without unknowns, or of an index above 1.
@@ -280,7 +282,7 @@ def system(model: Model, inputs: InputData) -> System:
         unknowns, f = ca.vertcat(unknowns, model.t), ca.vertcat(f, 1)
         mass = ca.diagcat(mass, 1)
         names.append("t")
-    # an algebraic unknown without influence on the states would be free to be anything
+    # error control also for algebraic unknowns without influence on the states, or they would drift
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
     n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     idle = range(m - mechanics.norms, m) if mechanics else ()
@@ -308,7 +310,7 @@ def system(model: Model, inputs: InputData) -> System:
 
 
 def _with_inputs(model: Model, inputs: InputData, f: ca.SX) -> Inner | None:
-    """Right-hand sides of a holonomic model with inner unknowns, in the order of `f`."""
+    """Return right-hand sides of a holonomic model with inner unknowns, in the order of `f`."""
     mechanics = model.holonomic
     if mechanics is None or mechanics.inner is None:
         return None
@@ -319,7 +321,7 @@ def _with_inputs(model: Model, inputs: InputData, f: ca.SX) -> Inner | None:
 
 
 def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
-    """Unknowns without time, right-hand side, mass matrix and names."""
+    """Return unknowns without time, right-hand side, mass matrix and names."""
     x, z = model.vector("x"), model.vector("z")
     nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
     if model.holonomic is not None:

@@ -1,1 +1,1 @@
-"""Many runs of one model: members, chunks, workers, stores."""
+"""Ensembles of runs of one model: members, chunks, workers, stores."""

@@ -1,4 +1,4 @@
-"""A part of an ensemble: its data, how it is solved, and by whom."""
+"""Chunk of an ensemble: its data, its solution, and the executor that solves it."""
 
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import (
@@ -37,14 +37,14 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 BEFORE = -1
-"""In front of the first input interval."""
+"""Index before the first input interval."""
 WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMALL}
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """What members of their own have.
+    """Data of the members of a chunk.
 
     Attributes:
         S: start columns (members, rows).
@@ -66,15 +66,15 @@ class Chunk:
 @final
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What became of the members of a chunk.
+    """Results of the members of a chunk.
 
     Attributes:
-        signals: shape (members, times, signals), NaN where a member did not get.
+        signals: shape (members, times, signals), NaN after the end of a member.
         attempts: shape (members,).
         reached: time [s] that each member reached.
-        failed: number in the chunk -> sentence.
+        failed: number in the chunk -> message.
         reach: least and greatest states over the start and all accepted steps, shape
-            (members, 2, nx); NaN of a member that did not start.
+            (members, 2, nx); NaN for a member that did not start.
     """
 
     signals: Array
@@ -85,19 +85,21 @@ class Solved:
 
     @property
     def size(self) -> Array:
-        """Largest magnitudes of the states, shape (members, nx); 0 without a start."""
+        """Largest magnitudes of the states, shape (members, nx); 0 for members that did not
+        start.
+        """
         return np.nan_to_num(np.abs(self.reach).max(axis=1))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What all chunks of an ensemble share; picklable.
+    """Data shared by all chunks of an ensemble; picklable.
 
     Attributes:
         program: the equations.
         breaks: ends of the input intervals [s].
-        times: times of the results [s]; none for the end of each member alone.
+        times: times of the results [s]; empty for the end of each member only.
         max_steps: attempts allowed for a member.
     """
 
@@ -110,17 +112,17 @@ class Job:
     def of(
         cls, integrator: Integrator, breaks: Array, times: Array, backend: str, max_steps: int
     ) -> "Job":
-        """The job of an integrator; "auto" is compiled where there is a compiler."""
+        """Return the job of an integrator; "auto" is compiled if there is a compiler."""
         compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
         return cls(program(integrator, compiled), breaks, times, max_steps)
 
     def digest(self) -> str:
-        """Hash of everything in it."""
+        """Return a hash of all its data."""
         own = (self.breaks, self.times, self.max_steps)
         return digest(*(getattr(self.program, f.name) for f in fields(self.program)), *own)
 
     def stretch(self, chunk: Chunk, first: int, follow: bool) -> tuple[Stretch, Indices]:
-        """All input intervals from `first` on, and which of the times belong to them."""
+        """Return all input intervals from `first` on, and the result times in them."""
         breaks, h_min = self.breaks[first:], smallest_steps(chunk.ends - self.breaks[0])
         times = self.times[None] if self.times.size else chunk.ends[:, None]
         inside = np.flatnonzero((times >= breaks[0]).any(axis=0))
@@ -129,7 +131,7 @@ class Job:
 
 
 def digest(*parts: object) -> str:
-    """Hash of plain data; arrays count with every digit."""
+    """Return a hash of plain data; arrays count with every digit."""
     total = sha256()
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -143,9 +145,9 @@ def digest(*parts: object) -> str:
 
 
 def solve_chunk(job: Job, chunk: Chunk, runner: Members | None = None) -> Solved:
-    """Integrate the members of a chunk, those that hardly move again on their own scale.
+    """Integrate the members of a chunk; repeat those with tiny motion on their own scale.
 
-    What runs them is `runner`, else the program of the job.
+    The members run in `runner`, by default in the program of the job.
     """
     runner = runner or job.program.load()
     found = _solved(job, chunk, runner)
@@ -170,11 +172,11 @@ def solve_chunk(job: Job, chunk: Chunk, runner: Members | None = None) -> Solved
 
 
 def _solved(job: Job, chunk: Chunk, runner: Members) -> Solved:
-    """The members of a chunk.
+    """Integrate the members of a chunk once.
 
-    They run through all their input intervals; where algebraic unknowns have to be searched for at
-    the beginning of one, they stop, and go on from there. Those of a mechanism that is put together
-    follow the first data as they follow others.
+    They run through all their input intervals; if algebraic unknowns need a full search at the
+    start of one, they stop there and continue afterwards. In mechanisms with the fast update,
+    algebraic unknowns are also updated with it at the start.
     """
     S, count = chunk.S.copy(), chunk.S.shape[0]
     signals = np.full((count, max(1, job.times.size), job.program.n_signals), np.nan)
@@ -201,7 +203,9 @@ def _solved(job: Job, chunk: Chunk, runner: Members) -> Solved:
         signals[np.ix_(here, inside)] = found
         for k in np.flatnonzero(np.isin(reason, list(WHY))).tolist():
             why = WHY[Stop(int(reason[k]))].value
-            failed[int(here[k])] = f"{why} It stands at t = {t[k]:g} s; simulate it alone for more."
+            failed[int(here[k])] = (
+                f"{why} Stopped at t = {t[k]:g} s; run it with simulate for details."
+            )
         stuck = reason == Stop.SEARCH
         interval = np.searchsorted(job.breaks, t[stuck])
         for k in np.unique(interval).tolist():
@@ -212,7 +216,7 @@ def _solved(job: Job, chunk: Chunk, runner: Members) -> Solved:
 def _consistent(
     job: Job, chunk: Chunk, S: Array, members: Indices, interval: int, failed: dict[int, str]
 ) -> Indices:
-    """Let algebraic unknowns follow the input data of an interval; the members that can."""
+    """Update algebraic unknowns to the input data of an interval; return the successful members."""
     if not job.program.constraints:
         return members
     equations, together = job.program.equations()
@@ -225,7 +229,7 @@ def _consistent(
 
 
 def _data(job: Job, chunk: Chunk, members: Indices, interval: int) -> Array:
-    """Run data of members on an input interval."""
+    """Return the run data of members on an input interval."""
     d = chunk.R[members, Given.d(job.program.nx)]
     data = chunk[members].data[:, :, interval]
     d[:, d.shape[1] - data.shape[1] :] = data
@@ -238,10 +242,10 @@ Points = Sequence[tuple[Array, Array]]
 @final
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """How another process builds the integrator of an ensemble; `packed.dumps` takes it.
+    """Data from which another process builds the integrator of an ensemble, for `packed.dumps`.
 
     Attributes:
-        model, inputs: what is integrated.
+        model, inputs: equations and inputs to integrate.
         method: a key of `METHODS`.
         points: see `suited`.
         tolerances, backend, times: see `solve_one_by_one`.
@@ -256,17 +260,17 @@ class Recipe:
     times: Array
 
     def integrator(self) -> Integrator:
-        """Build the integrator, with the pivots that the calling process has."""
+        """Build the integrator, with the same pivots as the calling process."""
         plain, _ = built(self.model, self.inputs, METHODS[self.method])
         return suited(plain, self.points, self.inputs)
 
 
 def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integrator:
-    """Return the integrator with pivots that are sound where members start, at (y, d) each."""
+    """Return the integrator with pivots that are stable where members start, at (y, d) each."""
     begin, end = inputs.span
     known = list[tuple[Array, Array]]()
     for y, d in points:
-        with suppress(ValueError):  # no consistent start: that member is reported by its number
+        with suppress(ValueError):  # no consistent start: the run of that member reports it
             known.append((integrator.start(y, d), d))
             integrator = integrator.suited(known, end - begin)
     return integrator
@@ -274,13 +278,13 @@ def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integra
 
 @lru_cache(4)
 def _followed(recipe: bytes) -> tuple[Recipe, Integrator]:
-    """The recipe and its integrator; built once in a process."""
+    """Return the recipe and its integrator; built once in a process."""
     loaded: Recipe = packed.loads(recipe)
     return loaded, loaded.integrator()
 
 
 def solve_elsewhere(recipe: bytes, given: tuple[Array, Array, Array, Array]) -> Solved:
-    """Integrate members as `solve_one_by_one`, from the pack of a `Recipe` alone."""
+    """Integrate members like `solve_one_by_one`, from a packed `Recipe`."""
     known, integrator = _followed(recipe)
     return solve_one_by_one(
         integrator, known.inputs, known.tolerances, known.backend, known.times, given
@@ -295,11 +299,11 @@ def solve_one_by_one(
     times: Array,
     given: tuple[Array, Array, Array, Array],
 ) -> Solved:
-    """Integrate members as `simulate` does; signals are NaN after a terminal event.
+    """Integrate members like `simulate`; signals are NaN after a terminal event.
 
     Args:
-        integrator, inputs, tolerances, backend: common to all members, but for their input data.
-        times: of the results [s]; none for the end of each member alone.
+        integrator, inputs, tolerances, backend: common to all members, except for their input data.
+        times: of the results [s]; empty for the end of each member only.
         given: start values of the unknowns (members, n), parameters (members, n_p), input data
             (members or 1, n_data, intervals) and ends (members,).
 
@@ -342,7 +346,7 @@ def solved(
     prepare: Callable[[slice], Any],
     todo: dict[int, slice],
 ) -> Generator[tuple[int, Solved]]:
-    """Results as they come; never more than a few chunks are under way at once."""
+    """Yield results as they are completed; only a few chunks are in progress at once."""
     if pool is None:
         for first, pick in todo.items():
             yield first, solve(prepare(pick))
@@ -364,7 +368,7 @@ def solved(
 
 @contextmanager
 def pool_of(executor: str | Executor, workers: int | None) -> Generator[Executor | None]:
-    """The executor of this name; None for "serial". Those of others are not shut down."""
+    """Yield the executor of this name, None for "serial"; a given executor is not shut down."""
     if isinstance(executor, Executor):
         yield executor
     elif executor == "serial":

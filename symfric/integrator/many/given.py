@@ -1,4 +1,4 @@
-"""What each member of an ensemble is given: start values, parameters, inputs and its end."""
+"""Data of the members of an ensemble: start values, parameters, inputs and end."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,26 +16,26 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Values = dict[str, Array]
 MemberInput = Input | ArrayLike
-"""An input as `simulate` takes it, or an array of numbers or samples (members, n), a row each."""
+"""Input as in `simulate`, or an array of numbers or samples (members, n), one row per member."""
 WHERE = "simulate_many"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Members:
-    """All members of an ensemble, and what a few of them are given.
+    """All members of an ensemble and their data.
 
     Attributes:
         model: their equations.
-        count: how many they are.
+        count: number of members.
         x0, p: start values and parameters by name, shape (count,).
         inputs: the inputs of all; those that differ are in `own`.
         own: input -> signals of the members, shape (count, n).
         sampled: ends of the intervals between samples [s].
         ends: end of each member [s], shape (count,).
-        varied: what members were given arrays of, by name: a parameter, "x0.v", "u.force", "t_end";
-            shape (count,). Samples of an input are not among them.
-        fixed: numbers that all were given, likewise.
+        varied: values given as arrays, by name: a parameter, "x0.v", "u.force", "t_end"; shape
+            (count,). Samples of an input are not included.
+        fixed: values given as one number for all, likewise.
     """
 
     model: Model
@@ -50,7 +50,9 @@ class Members:
     fixed: dict[str, float]
 
     def starts(self, system: System, pick: slice) -> tuple[Array, Array]:
-        """Start values of the unknowns (members, n), algebraic ones guessed, and parameters."""
+        """Return start values of the unknowns (members, n), algebraic ones guessed, and
+        parameters.
+        """
         x, values = self.model.initial_states(
             {name: v[pick] for name, v in self.x0.items()},
             {name: v[pick] for name, v in self.p.items()},
@@ -60,7 +62,7 @@ class Members:
         return first_guess(system, self.model, x, begin), values
 
     def data(self, pick: slice) -> Array:
-        """Input data (members, n_data, intervals); one row where they are common to all."""
+        """Return input data (members, n_data, intervals); one row if they are common to all."""
         common = self.inputs.values[None]
         if not self.own:
             return common
@@ -84,7 +86,7 @@ def members_of(
     u: Mapping[str, MemberInput] | None,
     p: Mapping[str, ArrayLike] | None,
 ) -> Members:
-    """The members of an ensemble.
+    """Collect the members of an ensemble.
 
     Args:
         model: their equations.
@@ -92,7 +94,7 @@ def members_of(
         x0, u, p: start values, inputs and parameters by name, numbers or an entry for each member.
 
     Raises:
-        ValueError: unknown names, no numbers, arrays of different lengths.
+        ValueError: unknown names, not numbers, arrays of different lengths.
     """
     t_start, ends = span[0], np.asarray(span[1])
     given = {
@@ -131,7 +133,7 @@ def members_of(
 
 
 def _numbers(given: Mapping[str, Array], u: Mapping[str, Any]) -> Values:
-    """All numbers that were given: parameters by name, then "x0.v" and "u.force"."""
+    """Return all numbers that were given: parameters by name, then "x0.v" and "u.force"."""
     plain = {n: np.asarray(v, float) for n, v in u.items() if not callable(v) and _is_plain(v)}
     found = {n.removeprefix("p."): v for n, v in given.items() if n.startswith("p.")}
     found |= {name: value for name, value in given.items() if name.startswith("x0.")}
@@ -143,10 +145,10 @@ def _is_plain(value: Any) -> bool:
 
 
 def _count(lengths: Mapping[str, tuple[int, ...]]) -> int:
-    """How many members arrays of these shapes are for.
+    """Return the number of members from the shapes of the given arrays.
 
     Raises:
-        ValueError: none, or not one number of them.
+        ValueError: no members, or different lengths.
     """
     wrong = (len(s) > 1 for name, s in lengths.items() if not name.startswith("u."))
     if len({shape[0] for shape in lengths.values()}) > 1 or any(wrong):
@@ -159,7 +161,7 @@ def _count(lengths: Mapping[str, tuple[int, ...]]) -> int:
 
 
 def _signal(name: str, value: Any, t_start: float) -> Any:
-    """An input as `input_data` takes it; numbers of members as held samples of each."""
+    """Return an input for `input_data`; numbers per member become held samples."""
     if isinstance(value, Sampled) or callable(value) or checks.as_number(value) is not None:
         return value
     numbers = checks.array(f"{WHERE}: u.{name}", value)
@@ -167,32 +169,32 @@ def _signal(name: str, value: Any, t_start: float) -> Any:
 
 
 def _one(signal: Sampled, t_start: float, t_end: float) -> Sampled:
-    """A signal of one member that changes, if that of any does, to stand for all."""
+    """Return the signal of one member as representative, one that changes if any does."""
     rises = signal.coefficients(_between([np.asarray(signal.t)], t_start, t_end))[1]
     row = int(np.argmax(rises.any(axis=-1)))
     return type(signal)(signal.t, np.asarray(signal.values)[row])
 
 
 def _between(times: list[Array], t_start: float, t_end: float) -> Array:
-    """Start and end, and the times between them."""
+    """Return start and end, and the times between them."""
     inner = np.concatenate([np.zeros(0), *times])
     inner = inner[(inner > t_start) & (inner < t_end)]
     return np.unique(np.concatenate([[t_start], inner, [t_end]]))
 
 
 def input_of(inputs: InputData, data: Array, end: float) -> InputData:
-    """The inputs of one member: its own data (n_data, intervals), up to its end."""
+    """Return the inputs of one member: its own data (n_data, intervals), up to its end."""
     last = int(np.searchsorted(inputs.breaks, end)) - 1
     breaks = np.append(inputs.breaks[: last + 1], end)
     return replace(inputs, breaks=breaks, values=np.ascontiguousarray(data[:, : last + 1]))
 
 
 def ends_of(t_end: float | ArrayLike) -> float | Array:
-    """The end of all members, or of each one [s]."""
+    """Return the end of all members, or of each one [s]."""
     number = checks.as_number(t_end)
     if number is not None or isinstance(t_end, str | type):
         return checks.number("simulate_many: t_end", t_end, unit="s")
-    what = "a number of seconds, or a sequence with that of each member"
+    what = "a number of seconds, or a sequence with one for each member"
     ends = checks.array("simulate_many: t_end", t_end, what=what)
     if not ends.size:
         raise ValueError("simulate_many: expected at least one member, got empty arrays")
@@ -200,7 +202,7 @@ def ends_of(t_end: float | ArrayLike) -> float | Array:
 
 
 def all_later(ends: float | Array, t_start: float) -> None:
-    """Refuse ends that are not behind the start."""
+    """Check that all ends are after the start."""
     if np.min(ends) <= t_start:
         raise ValueError(
             f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
@@ -209,7 +211,7 @@ def all_later(ends: float | Array, t_start: float) -> None:
 
 
 def units_of(model: Model) -> dict[str, str]:
-    """Units of what may be given."""
+    """Return the units of all values that may be given."""
     found = {v.name: v.unit for v in model.p} | {"t_end": "s"}
     for what, group in (("x0", model.x), ("u", model.u)):
         found |= {f"{what}.{v.name}": v.unit for v in group}

@@ -1,16 +1,17 @@
-/* Arithmetic of members side by side: vectors of LANES numbers, one member in each lane.
+/* Vector arithmetic of members: vectors of LANES numbers, one member per lane.
 
-   Every lane gets the same operations in the same order however many lanes there are, nothing is
-   contracted or reordered, and where an argument is beyond a formula that lane alone asks libm. So
-   the bits of a member do not depend on the number of lanes, nor on who is beside it. + - * / and
-   sqrt are IEEE's; the functions are within a few units of the last place (tests/.../test_lanes.py).
+   Every lane gets the same operations in the same order for any number of lanes, nothing is
+   contracted or reordered, and if an argument is outside the range of a formula, libm is called for
+   that lane only. The bits of a member therefore depend neither on the number of lanes nor on the
+   other members. + - * / and sqrt are IEEE's; the functions are accurate to a few units of the last
+   place (tests/.../test_lanes.py).
 
    Comparisons are masks: all bits of a lane set or none. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #if defined(__clang__) && defined(__SSE2__)
-#include <immintrin.h> /* gcc takes a tenth of a second to read it, and knows these anyway */
+#include <immintrin.h> /* slow to read for gcc, which does not need it */
 #endif
 
 #ifndef LANES
@@ -30,14 +31,14 @@ typedef unsigned long long U __attribute__((vector_size(8 * LANES)));
 #define ALL(x) ((x) - (V){})      /* a number in all lanes; the sign of zero stays */
 #define LOW 0x000fffffffffffffLL  /* fraction of a double */
 #define SIGN_BIT (-0x7fffffffffffffffLL - 1)
-#define MAGIC 0x1.8p52            /* added and taken away again, it rounds to an integer */
+#define MAGIC 0x1.8p52            /* adding and subtracting it rounds to an integer */
 
 static inline V pick(I m, V yes, V no) { return (V)((m & (I)yes) | (~m & (I)no)); }
 static inline V where(I m, V yes) { return (V)(m & (I)yes); }
 static inline V as_number(I m) { return (V)(m & (I)ALL(1.)); }
 static inline I as_mask(V x) { return (I)(x != 0.); }
 
-/* What a processor does to all lanes at once, and a compiler does not find by itself. */
+/* Vector instructions that compilers do not generate by themselves. */
 #if LANES == 8 && defined(__AVX512DQ__) && defined(__clang__)
 #define BITS(m) _mm512_movepi64_mask((__m512i)(m))
 #define ROOT(x) _mm512_sqrt_pd((__m512d)(x))
@@ -83,7 +84,7 @@ static inline V v_sqrt(V x)
 static inline V v_fabs(V x) { return (V)((I)x & ~SIGN_BIT); }
 static inline V v_copysign(V x, V s) { return (V)(((I)x & ~SIGN_BIT) | ((I)s & SIGN_BIT)); }
 static inline V v_sign(V x) { return pick((I)(x < 0.), ALL(-1.), pick((I)(x > 0.), ALL(1.), x)); }
-/* As C has them: a NaN is no number to compare with. */
+/* As in C: a NaN is ignored. */
 static inline V v_fmin(V x, V y) { return pick((I)(x < y) | (I)(y != y), x, y); }
 static inline V v_fmax(V x, V y) { return pick((I)(x > y) | (I)(y != y), x, y); }
 /* Clipped from above or below; NaN stays NaN. */
@@ -93,17 +94,17 @@ static inline V above(V x, double least) { return pick((I)(x < least), ALL(least
 static inline V nearest(V x) { return (x + MAGIC) - MAGIC; }
 static inline I integer(V whole) { return (I)(whole + MAGIC) - (I)ALL(MAGIC); }
 static inline V number(I whole) { return (V)(whole + (I)ALL(MAGIC)) - MAGIC; }
-/* 2^k for whole k from -1022 to 1023. */
+/* 2^k for integer k from -1022 to 1023. */
 static inline V power_of_two(V k) { return (V)((I)(k + (MAGIC + 1023.)) << 52); }
 
-/* Functions that ask libm lane by lane. */
+/* Functions that call libm lane by lane. */
 #define EACH(name) \
   static __attribute__((noinline, unused)) V v_##name(V x) \
   { for (int l = 0; l < LANES; ++l) x[l] = name(x[l]); return x; }
 #define EACH_PAIR(name) \
   static __attribute__((noinline, unused)) V v_##name(V x, V y) \
   { for (int l = 0; l < LANES; ++l) x[l] = name(x[l], y[l]); return x; }
-/* `found`, but what libm says in the lanes of `far`. */
+/* `found`, replaced by libm in the lanes of `far`. */
 #define FAR(name) \
   static __attribute__((noinline, cold)) V far_##name(V x, V found, unsigned far) \
   { for (int l = 0; l < LANES; ++l) if (far >> l & 1) found[l] = name(x[l]); return found; }
@@ -114,7 +115,7 @@ FAR(exp) FAR(expm1) FAR(log) FAR(sin) FAR(cos) FAR_PAIR(pow) FAR_PAIR(atan2)
 EACH(floor) EACH(ceil) EACH(log1p) EACH(sinh) EACH(cosh) EACH(asinh) EACH(acosh)
 EACH(atanh) EACH(erf) EACH_PAIR(fmod) EACH_PAIR(hypot) EACH_PAIR(remainder)
 
-/* e^(r + c) - 1 for |r| <= ln(2)/2 and what rounding left of r, c: its Taylor series. */
+/* e^(r + c) - 1 for |r| <= ln(2)/2 with the rounding error c of r, by its Taylor series. */
 static inline V grown(V r, V c)
 {
   const V r2 = r * r, r4 = r2 * r2;
@@ -213,7 +214,7 @@ static inline V product(V a, V b, V *error)
   return p;
 }
 
-/* x^y by the logarithm in twice the digits. */
+/* x^y by the logarithm in double-double precision. */
 static V v_pow(V x, V y)
 {
   V e, error, low;

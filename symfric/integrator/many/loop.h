@@ -1,15 +1,16 @@
-/* Runs of many members, LANES at a time: as soon as one is done, the next takes its lane.
+/* Runs many members, LANES at a time: as soon as one is done, the next takes its lane.
 
-   Before this: `lanes.h`, `symfric_step` (S, R -> S_next, D) and `symfric_values` (t, y, d ->
-   signals) on vectors, WORK vectors for what they keep meanwhile, and the sizes of everything:
-   N unknowns, MEMORY rows of S before them, T and H among these, SIZE_R rows of R, T_END among
-   them, N_D its last ones that are run data, ROWS of dense output, SIGNALS, FLOOR. Where FOLLOWS is 2, algebraic unknowns follow a jump of inputs by
-   `symfric_follow`; where that fails, or FOLLOWS is 1, the member stops there. */
+   Required before this: `lanes.h`, `symfric_step` (S, R -> S_next, D) and `symfric_values` (t, y,
+   d -> signals) on vectors, with WORK work vectors, and all sizes: N unknowns, MEMORY rows of S
+   before them, with T and H among these, SIZE_R rows of R, with T_END among them, N_D its last ones
+   that are run data, ROWS of dense output, SIGNALS, FLOOR. If FOLLOWS is 2, `symfric_follow`
+   updates algebraic unknowns after a jump of inputs; if that fails, or FOLLOWS is 1, the member
+   stops there. */
 
 enum { S_ROWS = MEMORY + N };
 enum { ENDED = 0, OUT_OF_ATTEMPTS = 2, TOO_SMALL = 3, SEARCH = 7 };
 
-/* What all members share, and where those of each one lie: member m's begin at m times _step. */
+/* Data of all members; those of member m begin at m times _step. */
 typedef struct {
   double *S;             /* start columns, advanced in place */
   const double *R;       /* run data, whose last n_data entries the input intervals fill */
@@ -20,15 +21,15 @@ typedef struct {
   long long n_data, data_step;
   const double *ends;    /* end time of each member */
   const double *h_min;   /* smallest step of each member */
-  const double *times;   /* of results; one at which an interval begins belongs to that interval */
+  const double *times;   /* of results; at a break it belongs to the later interval */
   long long n_times, times_step, max_attempts;
-  long long follow;      /* whether algebraic unknowns follow the data at the start, too */
-  double *out;           /* signals, NaN from where a member stopped */
+  long long follow;      /* 1 if algebraic unknowns follow the data at the start, too */
+  double *out;           /* signals, NaN after a member stopped */
   long long *reason, *made;
-  double *reach;         /* least and greatest unknowns at the ends of steps, of the start given */
+  double *reach;         /* least and greatest unknowns; on entry those of the start */
 } Many;
 
-/* What all lanes share: the next member, how many lanes run one, and results that wait: they are
+/* Data of all lanes: the next member, the number of busy lanes, and pending results, which are
    computed when there are as many as lanes. */
 typedef struct {
   long long waiting, running, ready;
@@ -37,12 +38,12 @@ typedef struct {
   V *work;
 } Common;
 
-/* A group of lanes: each runs a member, or none (-1) and whatever another lane does. */
+/* Group of lanes: each runs a member, or none (-1) and repeats another lane. */
 typedef struct {
   Common *common;
   V S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], least[N], most[N];
   V h_min, due;          /* smallest step; time of the next result */
-  I left;                /* attempts that are allowed still */
+  I left;                /* attempts still allowed */
   long long member[LANES], interval[LANES], next[LANES];
 } Lanes;
 
@@ -61,7 +62,7 @@ static const double *times_of(const Many *all, const Lanes *x, int l)
   return all->times + x->member[l] * all->times_step;
 }
 
-/* The next result of lane l is that at the fraction s of the step just made, or at its start. */
+/* Requests the next result of lane l, at the fraction s of the step just made. */
 static void ask(const Many *all, Lanes *x, int l, double s)
 {
   Common *to = x->common;
@@ -88,7 +89,7 @@ static int is_last(const Many *all, const Lanes *x, int l)
   return k >= all->intervals || all->breaks[k] >= all->ends[x->member[l]];
 }
 
-/* Whether lane l has a result to give up to time t. */
+/* Returns 1 if lane l has a result due up to time t. */
 static int has_due(const Many *all, const Lanes *x, int l, double t)
 {
   if (x->next[l] >= all->n_times) return 0;
@@ -101,7 +102,7 @@ static void note_due(const Many *all, Lanes *x, int l)
   x->due[l] = x->next[l] < all->n_times ? times_of(all, x, l)[x->next[l]] : INFINITY;
 }
 
-/* Let the algebraic unknowns of lane l follow the run data; whether they could. */
+/* Updates the algebraic unknowns of lane l to the run data; returns 0 on failure. */
 static int follow(Lanes *x, int l)
 {
 #if FOLLOWS == 2
@@ -115,7 +116,7 @@ static int follow(Lanes *x, int l)
   return FOLLOWS != 1;
 }
 
-/* Begin the input interval of lane l; whether it can. */
+/* Begins the input interval of lane l; returns 0 on failure. */
 static int enter(const Many *all, Lanes *x, int l)
 {
   const long long m = x->member[l], k = x->interval[l];
@@ -145,7 +146,7 @@ static void finish(const Many *all, Lanes *x, int l, int reason)
   --x->common->running;
 }
 
-/* Give lane l to the next member, or let it do what another lane does. */
+/* Gives lane l to the next member, or lets it repeat another lane. */
 static void fill(const Many *all, Lanes *x, int l)
 {
   int other = 0;
@@ -178,7 +179,7 @@ static int is_small(const Lanes *x, int l)
   return !(x->S[H][l] >= x->h_min[l] && x->S[H][l] >= FLOOR * fabs(x->S[T][l]));
 }
 
-/* Lane l has stopped: its next interval, or the next member; until something runs in it. */
+/* Gives the stopped lane l its next interval or the next member, until one runs in it. */
 static void settle(const Many *all, Lanes *x, int l)
 {
   for (;;) {
@@ -205,7 +206,7 @@ static void settle(const Many *all, Lanes *x, int l)
   }
 }
 
-/* Take over what an attempt made of the lanes. */
+/* Stores the results of an attempt of the lanes. */
 static void take(const Many *all, Lanes *x)
 {
   x->left -= 1;
@@ -229,10 +230,10 @@ static void take(const Many *all, Lanes *x)
     if (stopped & 1) settle(all, x, l);
 }
 
-/* How many members run at once. */
+/* Returns the number of members that run at once. */
 int symfric_lanes(void) { return GROUPS * LANES; }
 
-/* Run all members; whether there was memory for it. */
+/* Runs all members; returns 0 without enough memory. */
 int symfric_many(const Many *all)
 {
   const size_t size = sizeof(Common) + GROUPS * (sizeof(Lanes) + (WORK + 1) * sizeof(V));

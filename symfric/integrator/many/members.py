@@ -27,27 +27,28 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 ROWS, ATTEMPTS = 2048, 2000
 PAIRED = 2500
-"""Steps of fewer instructions run in two groups of lanes at once; those of more keep the processor
-busy alone."""
+"""Steps with fewer instructions run in two groups of lanes at once; larger ones use the processor
+fully with one.
+"""
 LEAST_PLANTS = 8
-"""Plants from which lanes pay."""
+"""Least number of plants for which lanes are faster."""
 MOST_INSTRUCTIONS = 10_000
-"""Steps of more instructions take compilers too long as vectors."""
+"""Steps with more instructions take compilers too long as vectors."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """What members go through; an array of one row is common to all of them.
+    """Intervals and times of a run of members; an array of one row is common to all of them.
 
     Attributes:
         breaks: ends of input intervals [s], shape (k + 1,).
         data: input data on them, shape (members or 1, n_data, k).
-        ends: where each member ends [s], from breaks[0] to breaks[-1], shape (members,).
+        ends: end of each member [s], from breaks[0] to breaks[-1], shape (members,).
         h_min: smallest step of each member [s], shape (members,).
-        times: times of the results [s], shape (members or 1, n); NaN comes out behind the end.
-        max_steps: attempts allowed, counting those made before.
-        follow: whether algebraic unknowns have to follow the data at the start, too.
+        times: times of the results [s], shape (members or 1, n); NaN is returned after the end.
+        max_steps: attempts allowed, counting earlier ones.
+        follow: True if algebraic unknowns have to follow the data at the start, too.
     """
 
     breaks: Array
@@ -64,19 +65,20 @@ Advanced = tuple[Array, Counts, Array]
 
 
 class Members(Protocol):
-    """Runs members one after another."""
+    """Runner of members."""
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch.
 
         Args:
-            S: start columns S, one a row, advanced in place.
-            R: run data R, one a row.
-            made: attempts of each member, added to in place.
+            S: start columns S, one per row, advanced in place.
+            R: run data R, one per row.
+            made: attempts of each member, updated in place.
             stretch: intervals and times.
 
         Returns:
-            Signals (members, times, signals), NaN from where a member stopped; why (members,);
+            Signals (members, times, signals), NaN after a member stopped; reasons to stop
+            (members,);
             least and greatest unknowns at the start and the ends of steps (members, 2, n).
         """
         ...
@@ -93,7 +95,9 @@ class VmMembers:
 
     @classmethod
     def of(cls, step: str, signals: str, follow: Follow) -> "VmMembers":
-        """From the serialised Functions of the step, of the signals and of what follows jumps."""
+        """Build from the serialised Functions of the step, the signals and the update after
+        jumps.
+        """
         engine = VmEngine.of(ca.Function.deserialize(step), follows=bool(follow))
         how = None
         if follow and follow[0]:
@@ -127,7 +131,7 @@ class VmMembers:
         """Advance a member.
 
         Returns:
-            Times that it reached, unknowns there, attempts made, why it stopped.
+            Times that it reached, unknowns there, attempts made, reason to stop.
         """
         breaks, end = stretch.breaks, stretch.ends[m]
         breaks = np.concatenate([breaks[:1], breaks[1:][breaks[1:] < end], [end]])
@@ -152,7 +156,7 @@ class VmMembers:
         return outputs.times[: outputs.found], outputs.reached.T, made, stop
 
     def _follows(self, work: Work) -> bool:
-        """Whether the algebraic unknowns could follow the data that jumped."""
+        """Update the algebraic unknowns after a jump of data; return False if that fails."""
         if self.follow is None:
             return not self.engine.follows
         y, n_d = work.S[State.Y], self.signals.function.numel_in(2)
@@ -166,7 +170,7 @@ _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_longlong
 
 
 class _Many(ctypes.Structure):
-    """`Many` of loop.h."""
+    """Struct `Many` of loop.h."""
 
     _fields_ = (
         ("S", _POINTER), ("R", _POINTER), ("members", _COUNT),
@@ -182,28 +186,28 @@ class _Many(ctypes.Structure):
 @final
 @dataclass(frozen=True, eq=False)
 class CompiledMembers:
-    """Members side by side in the lanes of compiled vector code; releases the GIL."""
+    """Members in the lanes of compiled vector code; releases the GIL."""
 
     library: ctypes.CDLL
     signals: int
 
     @classmethod
     def of(cls, source: str, signals: int) -> "CompiledMembers":
-        """From the C of `many_source`; compiles, or loads from the cache."""
+        """Build from the C of `many_source`; compiles, or loads from the cache."""
         library = load(source, "symfric_many", "symfric_lanes")
         library.symfric_many.argtypes = [ctypes.c_void_p]
         return cls(library, signals)
 
     @property
     def lanes(self) -> int:
-        """Members that run at once."""
+        """Number of members that run at once."""
         return int(self.library.symfric_lanes())
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch.
 
         Raises:
-            MemoryError: a megabyte or so is missing.
+            MemoryError: about a megabyte is missing.
         """
         members, times, data = S.shape[0], stretch.times, stretch.data
         found = np.empty((members, times.shape[1], self.signals))
@@ -235,13 +239,13 @@ def many_source(
     follow: Following | None = None,
     lanes: int = 0,
 ) -> str:
-    """C of the step and of the signals on vectors, with the loop over members.
+    """Return the C of the step and of the signals on vectors, with the loop over members.
 
     Args:
-        step, signals: as an `Integrator` has them.
-        follows: whether there are algebraic unknowns, which follow jumps of inputs.
-        follow: how; where it is left out, members stop at each jump.
-        lanes: of the vectors; as many as the processor takes, else. The bits are the same.
+        step, signals: of an `Integrator`.
+        follows: True if there are algebraic unknowns, which follow jumps of inputs.
+        follow: update of these unknowns; without it members stop at each jump.
+        lanes: of the vectors; by default as many as the processor supports. The bits are the same.
     """
     n = step.numel_in(0) - State.MEMORY
     step = step if step.is_a("SXFunction") else step.expand()
@@ -267,25 +271,27 @@ def many_source(
 
 
 def pays(integrator: Integrator, plants: Plants) -> bool:
-    """Whether plants go faster side by side."""
+    """Return True if plants run faster in lanes."""
     return plants.S.shape[0] >= LEAST_PLANTS and integrator.instructions <= MOST_INSTRUCTIONS
 
 
 def side_by_side(integrator: Integrator, plants: Plants) -> Advance:
-    """Plants in the lanes of vectors, from sample to sample.
+    """Return the loop for plants in the lanes of vectors, from sample to sample.
 
-    A lane does what `symfric.integrator.running.plants` does, but for functions like exp, which are
-    within a few units of the last place of those there (`lanes.h`). The bits of a plant depend
-    neither on the number of lanes nor on the other plants.
+    A lane repeats `symfric.integrator.running.plants`, except that functions like exp differ by a
+    few units of the last place (`lanes.h`). The bits of a plant depend neither on the number of
+    lanes nor on the other plants.
 
     Raises:
-        CompileError: there is no compiler, or it failed.
+        CompileError: no compiler was found, or it failed.
     """
     return loaded(integrator, plants, "lanes", plants_source)
 
 
 def plants_source(integrator: Integrator) -> str:
-    """C of the step on vectors, of what follows a jump, and of the loop around them."""
+    """Return the C of the step on vectors, of the update after a jump, and of the loop around
+    them.
+    """
     s = integrator.system
     nothing = ca.Function("nothing", [ca.SX.sym("t"), s.y, s.d], [ca.SX(0, 1)])
     every = many_source(integrator.step, nothing, integrator.follows, integrator.follow)

@@ -1,4 +1,4 @@
-/* New inputs and the time of the next sample; whether algebraic unknowns could follow. */
+/* Sets new inputs and the next sample time; returns 0 if algebraic unknowns could not follow. */
 static int symfric_takes_over(const symfric_members *m, long long b)
 {
   double *S = m->S + b * S_ROWS, *R = m->R + b * SIZE_R;
@@ -13,7 +13,7 @@ static int symfric_takes_over(const symfric_members *m, long long b)
 #endif
 }
 
-/* All plants go to their next sample; how many did not get there. */
+/* Advances all plants to their next sample; returns how many did not get there. */
 long long symfric_plants(const symfric_members *m, int begin)
 {
   const long long members = m->members;
@@ -28,7 +28,7 @@ long long symfric_plants(const symfric_members *m, int begin)
   for (b = 0; b < members; ++b) {
     const double *now = m->S + b * S_ROWS + T;
     if (begin) m->why[b] = symfric_takes_over(m, b) ? AGAIN : SEARCHED;
-    ends[b] = m->why[b] == AGAIN ? m->R[b * SIZE_R + T_END] : *now; /* others stay */
+    ends[b] = m->why[b] == AGAIN ? m->R[b * SIZE_R + T_END] : *now; /* others do not move */
     h_min[b] = m->h_min;
   }
   const Many all = {

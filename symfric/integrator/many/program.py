@@ -1,4 +1,4 @@
-"""The equations of an ensemble as plain data, and start values put onto constraints."""
+"""Equations of an ensemble as plain data, and projection of start values onto constraints."""
 
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
@@ -22,8 +22,9 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What `symfric.integrator.equations.initial.consistent` does before it solves for algebraic
-    unknowns, for the rows of matrices.
+    """Projection of start values onto constraints, for the rows of matrices.
+
+    It corresponds to the first part of `symfric.integrator.equations.initial.consistent`.
     """
 
     manifold: Manifold
@@ -34,14 +35,15 @@ class Assembly:
 
     @classmethod
     def of(cls, manifold: Manifold, nx: int) -> "Assembly":
-        """Of a mechanism with `nx` states."""
+        """Build from a mechanism with `nx` states."""
         functions = (manifold.defect, manifold.project, manifold.slope)
         return cls(manifold, nx, *(Columns(function) for function in functions))
 
     def __call__(self, y: Array, d: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Rows of y (members, n) with positions and velocities on the constraints, and which are.
+        """Project positions and velocities in rows of y (members, n); return y and a mask of
+        successes.
 
-        Where there are charts, each has an orthonormal basis of its tangent space.
+        With charts, each row gets an orthonormal basis of its tangent space.
         """
         y, closed = y.copy(), np.full(y.shape[0], self.manifold.m == 0)
         todo = np.flatnonzero(~closed)
@@ -61,7 +63,7 @@ class Assembly:
         return y, closed
 
     def _bases(self, y: Array, d: Array) -> Array:
-        """Bases of the tangent spaces, columns below each other."""
+        """Return bases of the tangent spaces, columns below each other."""
         n, m = self.manifold.n, self.manifold.m
         (entries,) = self.slope([y, d], backend="auto")
         rows, columns = self.manifold.slope.size_out(0)
@@ -78,21 +80,22 @@ Packed = tuple[tuple[str, str | int], ...]
 @final
 @dataclass(frozen=True, eq=False)
 class Program:
-    """What an integrator does, for workers that have nothing else of it; picklable.
+    """Equations of an integrator for workers without the model; picklable.
 
     Attributes:
         where: for messages.
         code: C of steps, signals and their loop, or the serialised step for the virtual machine.
-        compiled: which of the two.
+        compiled: True for C.
         signals: the serialised Function of the signals.
-        n_signals: how many there are.
-        constraints: the serialised algebraic equations, "" where there are none.
+        n_signals: number of signals.
+        constraints: the serialised algebraic equations, "" if there are none.
         free: as `System.free`, row by row.
-        manifold: the constraints of a mechanism, Functions serialised; () where it is none.
+        manifold: the constraints of a mechanism, Functions serialised; () for other models.
         names: of the unknowns.
         nominal: typical magnitudes of the differential states.
-        follow: how algebraic unknowns follow jumps of inputs in the virtual machine: the serialised
-            round and its contraction; ("", 0) where each is searched for, () where there are none.
+        follow: update of algebraic unknowns after jumps of inputs in the virtual machine: the
+            serialised round and its contraction; ("", 0) for a full search, () without such
+            unknowns.
     """
 
     where: str
@@ -113,17 +116,19 @@ class Program:
         return self.nominal.size
 
     def load(self) -> Members:
-        """What runs the members; compiled once in a process."""
+        """Return the runner of the members; compiled once in a process."""
         if self.compiled:
             return _compiled(self.code, self.n_signals)
         return _vm(self.code, self.signals, self.follow)
 
     def equations(self) -> tuple[Equations, Columns]:
-        """The algebraic equations, and their constraints for many columns."""
+        """Return the algebraic equations, and their constraints for many columns."""
         return _equations(self.names, self.nx, self.free, self.constraints, self.manifold)
 
     def assembly(self) -> Assembly | None:
-        """What puts a mechanism together whose algebraic unknowns follow; None where none do."""
+        """Return the projection of a mechanism with a fast update of algebraic unknowns, else
+        None.
+        """
         if not self.manifold or not self.follow or not self.follow[0]:
             return None
         return _assembly(self.manifold, self.nx)
@@ -134,7 +139,7 @@ _LOCK = Lock()
 
 
 def program(integrator: Integrator, compiled: bool) -> Program:
-    """The program of an integrator, written once and kept for as long as that lives."""
+    """Return the program of an integrator, written once and cached during its lifetime."""
     with _LOCK:
         known = _KNOWN.setdefault(integrator, {})
         if compiled not in known:
@@ -166,7 +171,7 @@ def _written(integrator: Integrator, compiled: bool) -> Program:
 
 
 def _packed(manifold: Manifold | None) -> Packed:
-    """A mechanism's constraints as plain data, () where there are none."""
+    """Return a mechanism's constraints as plain data, () if there are none."""
     if manifold is None:
         return ()
     values = ((f.name, getattr(manifold, f.name)) for f in fields(manifold))

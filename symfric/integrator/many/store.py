@@ -1,4 +1,4 @@
-"""Results of an ensemble, in memory or in a folder that fills chunk by chunk."""
+"""Results of an ensemble, in memory or in a folder that is filled chunk by chunk."""
 
 import os
 import stat
@@ -21,28 +21,28 @@ from symfric.integrator.many.chunk import Solved
 
 Array = NDArray[np.float64]
 BLOCK = 2**20
-"""Bytes written at once when a file is made."""
+"""Bytes written at once when a file is created."""
 
 
 @final
 class Store:
-    """Signals of all members and what became of them.
+    """Signals of all members and the outcome of their runs.
 
-    In a folder every signal is an array file, memory-mapped for reading, and a small file marks
-    every chunk that is complete, with the checksum of its results; a later call goes on from there.
-    What is missing, cut short, damaged or written by somebody else since is computed again. The
-    folder's own folder is named by a hash of everything that the results depend on, so results of
-    other arguments are never taken.
+    In a folder every signal is an array file, memory-mapped for reading, and a small file with a
+    checksum marks every complete chunk; a later call continues from there. Chunks that are missing,
+    truncated, damaged or changed by another program are computed again. The name of the subfolder
+    is a hash of everything that the results depend on, so results of other arguments are never
+    used.
 
     Attributes:
         signals: name -> values (members, times).
         attempts, reached: attempts of each member, and the time [s] it reached.
         reach: least and greatest value of each state over the steps, shape (members, 2, nx).
-        failed: number of a member -> sentence.
-        damaged: first members of chunks whose results are no longer what they were.
+        failed: number of a member -> message.
+        damaged: first members of chunks whose stored results have changed.
 
     Raises:
-        ValueError: the folder cannot be written, or has no room for all results.
+        ValueError: the folder is not writable or too small for all results.
     """
 
     def __init__(
@@ -68,16 +68,16 @@ class Store:
         return None if self._folder is None else self._folder / f"chunk-{first}.npz"
 
     def left(self, firsts: Collection[int]) -> list[int]:
-        """Which of the chunks that start at `firsts` are not complete.
+        """Return those of the chunks starting at `firsts` that are not complete.
 
         Warns:
-            UserWarning: some were, and their results are no longer what they were.
+            UserWarning: stored results of some chunks have changed.
         """
         found = [first for first in firsts if not self.has(first)]
         if self.damaged:
             warnings.warn(
                 f"simulate_many: out: {len(self.damaged)} of {len(firsts)} chunks in "
-                f"'{self._folder}' are not what was written (deleted, cut short, changed); they "
+                f"'{self._folder}' have been deleted, truncated or changed since; they "
                 "are computed again",
                 UserWarning,
                 stacklevel=3,
@@ -85,7 +85,9 @@ class Store:
         return found
 
     def has(self, first: int) -> bool:
-        """Whether the chunk that starts at `first` was complete before; takes it over if so."""
+        """Return True if the chunk that starts at `first` is complete, after loading its
+        results.
+        """
         mark = self._mark(first)
         if mark is None or not mark.exists():
             return False
@@ -98,15 +100,15 @@ class Store:
                 self._note(first, attempts, reached, reach, failed)
                 return True
         except (OSError, ValueError, KeyError):
-            pass  # the mark itself is damaged
+            pass  # the marker file is damaged
         self.damaged.append(first)
         return False
 
     def put(self, first: int, result: Solved) -> None:
-        """Take the results of the chunk that starts at `first`.
+        """Store the results of the chunk that starts at `first`.
 
         Raises:
-            ValueError: they cannot be written; what is complete stays.
+            ValueError: they cannot be written; complete chunks stay.
         """
         size, mark = result.attempts.size, self._mark(first)
         self._note(first, result.attempts, result.reached, result.reach, result.failed)
@@ -129,13 +131,13 @@ class Store:
                 )
         except (OSError, ValueError) as error:
             raise ValueError(
-                f"simulate_many: out: expected room for members from {first} on in "
-                f"'{self._folder}', got {_reason(error)}; what is complete stays, call again to go "
-                "on"
+                f"simulate_many: out: expected disk space for members from {first} on in "
+                f"'{self._folder}', got {_reason(error)}; complete chunks are kept, call again to "
+                "continue"
             ) from None
 
     def _checksum(self, first: int, size: int) -> str:
-        """Hash of the results of members, as they are read back."""
+        """Return the hash of the results of members, as they are read back."""
         total = sha256()
         for values in self.signals.values():
             total.update(np.ascontiguousarray(values[first : first + size]).tobytes())
@@ -152,40 +154,40 @@ class Store:
 
 
 def _reason(error: OSError | ValueError) -> str:
-    """Why a file cannot be written, in the words of the system."""
+    """Return the reason why a file cannot be written, in the words of the system."""
     cause = error if isinstance(error, OSError) else error.__cause__
     return cause.strerror if isinstance(cause, OSError) and cause.strerror else str(error)
 
 
 def _claim(temporary: Path, path: Path) -> None:
-    """Give a file its name, unless there is one of that name.
+    """Rename a temporary file to `path`, unless that exists.
 
     Raises:
-        FileExistsError: there is.
+        FileExistsError: it exists.
     """
     try:
         os.link(temporary, path)
     except FileExistsError:
         raise
-    except OSError:  # no links here: the last one to come has its name
+    except OSError:  # no hard links: the last writer wins
         pass
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _ArrayFile:
-    """An array file (`numpy.save`), written by rows and read by a map of it.
+    """Array file (`numpy.save`), written by rows and read by a memory map.
 
-    Writing through the map would end the process by a signal where the disk is full.
+    Writing through the map would kill the process by a signal if the disk is full.
     """
 
     path: Path
     shape: tuple[int, int]
 
     def make(self) -> None:
-        """A file full of NaN, its room taken at once, unless there is one that is whole.
+        """Create a file of NaN, with its disk space allocated, unless a valid one exists.
 
-        Where another call makes it at the same time, both go on with the file of one of them.
+        If another call creates it at the same time, both use the file of one of them.
         """
         missing = not os.path.lexists(self.path)
         if not missing and self._is_whole():
@@ -202,7 +204,7 @@ class _ArrayFile:
                     _claim(temporary, self.path)
         except (OSError, ValueError) as error:
             raise ValueError(
-                f"simulate_many: out: expected {8e-6 * prod(self.shape):.3g} MB of room for "
+                f"simulate_many: out: expected {8e-6 * prod(self.shape):.3g} MB of disk space for "
                 f"'{self.path}', got {_reason(error)}"
             ) from None
 
@@ -211,7 +213,7 @@ class _ArrayFile:
         return {"descr": "<f8", "fortran_order": False, "shape": self.shape}
 
     def _is_whole(self) -> bool:
-        """Whether the file has the header and the size that it must have."""
+        """Return True if the file has the required header and size."""
         try:
             status = self.path.lstat()
             if not stat.S_ISREG(status.st_mode):
@@ -226,11 +228,11 @@ class _ArrayFile:
 
     @cached_property
     def array(self) -> Array:
-        """The values, mapped; they cannot be changed by this."""
+        """Values as a read-only memory map."""
         return np.lib.format.open_memmap(self.path, mode="r")
 
     def write(self, first: int, rows: Array) -> None:
-        """Put `rows` in place of those from `first` on."""
+        """Write `rows` over those from `first` on."""
         end = self.path.stat().st_size
         with self.path.open("r+b") as file:
             file.seek(end - 8 * prod(self.shape) + 8 * first * self.shape[1])

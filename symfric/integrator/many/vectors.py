@@ -1,6 +1,6 @@
-"""CasADi Functions as C on vectors: the members of an ensemble side by side, one in each lane.
+"""CasADi Functions as C on vectors: members of an ensemble in parallel, one per lane.
 
-The operations are those of the Function, in its order; what functions like exp are is in `lanes.h`.
+The operations are those of the Function, in its order; `lanes.h` defines functions like exp.
 """
 
 from collections import deque
@@ -15,7 +15,8 @@ from symfric.foundation.graph import LEAVES, SELECT, Graph, Node, graph
 
 PART = 1000
 """Operations of one C function; compilers take more than twice as long for twice as many, and keep
-less of them in registers."""
+fewer values in registers.
+"""
 
 MASKS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 LOGIC = {ca.OP_AND: "{} & {}", ca.OP_OR: "{} | {}", ca.OP_NOT: "~{}"}
@@ -36,23 +37,25 @@ CALLS = {
 
 
 def c_text(name: str) -> str:
-    """A file of C that lies beside this one."""
+    """Return a C file of this folder."""
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def lanes_header(lanes: int = 0) -> str:
-    """The vector types and functions; as many lanes as the processor takes, or `lanes`."""
+    """Return the vector types and functions, for `lanes` lanes or as many as the processor
+    supports.
+    """
     text = c_text("lanes.h")
     return f"#define LANES {lanes}\n{text}" if lanes else text
 
 
 def vector_source(name: str, function: ca.Function, groups: int = 1) -> tuple[str, int]:
-    """C called `name` of a Function of dense columns on vectors, and what it keeps meanwhile.
+    """Return the C called `name` of a Function of dense columns on vectors, and its work size.
 
     It is `static void name(const V *const *arg, V *const *res, V *w)` with a pointer for every
-    argument and every result, and room for the returned number of vectors; results are no
-    arguments. With several groups these three are there for each of them: operations wait for
-    their operands, and in the meantime those of another group are done.
+    argument and every result, and w for the returned number of vectors; results must not overlap
+    arguments. With several groups each has its own three parameters: while operations of one group
+    wait for their operands, those of another are executed.
     """
     whole = graph(function if function.is_a("SXFunction") else function.expand())
     parts = _Parts(whole, name, range(groups))
@@ -70,7 +73,7 @@ def _head(name: str, groups: range) -> str:
 
 @final
 class _Parts:
-    """A graph cut into C functions; values that a later one needs stay in slots of w."""
+    """Graph divided into C functions; values needed by a later one are stored in slots of w."""
 
     def __init__(self, whole: Graph, name: str, groups: range) -> None:
         self.whole, self.name, self.groups = whole, name, groups
@@ -116,7 +119,9 @@ class _Parts:
 
 @final
 class _Body:
-    """Lines of one C function. Values are vectors v or, of comparisons, masks m; @ is the group."""
+    """Lines of one C function. Values are vectors v or, for comparisons, masks m; @ is the
+    group.
+    """
 
     def __init__(self, nodes: tuple[Node, ...], slot: dict[int, int], own: set[int]) -> None:
         self.nodes, self.slot, self.own = nodes, dict(slot), own
@@ -125,7 +130,7 @@ class _Body:
         self.angles: set[int] = set()
 
     def number(self, i: int) -> str:
-        """The node i as a vector."""
+        """Return the node i as a vector."""
         node = self.nodes[i]
         if node.op == ca.OP_CONST:
             return f"ALL({_literal(node.value)})"
@@ -142,13 +147,13 @@ class _Body:
         return f"v{i}_@"
 
     def mask(self, i: int) -> str:
-        """The node i as a mask: whether it is other than zero."""
+        """Return the node i as a mask, true if nonzero."""
         if i in self.own and _is_mask(self.nodes[i]):
             return f"m{i}_@"
         return f"as_mask({self.number(i)})"
 
     def add(self, i: int) -> None:
-        """Compute the node i."""
+        """Add the lines that compute the node i."""
         node = self.nodes[i]
         if node.op in MASKS:
             a, b = (self.number(j) for j in node.args)
@@ -165,7 +170,7 @@ class _Body:
     def value(self, node: Node) -> str:
         if node.op == SELECT:
             condition, yes, no = node.args
-            # CasADi adds zero to the half that is chosen, which takes its sign away
+            # CasADi adds zero to the selected half, which removes the sign of a zero
             return f"pick({self.mask(condition)}, {self.number(yes)}, {self.number(no)}) + 0."
         if node.op == ca.OP_IF_ELSE_ZERO:
             return f"where({self.mask(node.args[0])}, {self.number(node.args[1])})"
@@ -174,13 +179,13 @@ class _Body:
             return PLAIN[node.op].format(*operands)
         if node.op not in CALLS:
             raise ValueError(
-                f"vectors: expected operations that C knows, got number {node.op} of CasADi; use "
+                f"vectors: expected operations that C has, got CasADi operation {node.op}; use "
                 "backend='vm'"
             )
         return f"v_{CALLS[node.op]}({', '.join(operands)})"
 
     def angle(self, j: int) -> None:
-        """Sine and cosine of the node j, computed together once."""
+        """Add sine and cosine of the node j, computed together once."""
         if j not in self.angles:
             self.angles.add(j)
             self.lines.append(f"V c{j}_@;")

@@ -1,1 +1,1 @@
-"""The methods: coefficients with their source, and what each family makes of one step."""
+"""Integration methods: coefficients with their source, and the steps of each family."""

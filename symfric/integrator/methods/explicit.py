@@ -1,10 +1,10 @@
 """Methods without an iteration matrix: explicit Runge-Kutta pairs, and exponential Euler.
 
-Accelerations and multipliers of a mechanism without friction from its reactions obey
+Accelerations and multipliers of a mechanism without friction from its reactions satisfy
 
     0 = g(x, z) = G(x) z + g(x, 0),        z = -G(x)^-1 g(x, 0)
 
-so that an explicit method may evaluate x' as if there were none of them.
+so an explicit method can eliminate them and evaluate x' directly.
 """
 
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ from symfric.integrator.methods.method import Array, Method, Trial, Trials, comb
 @final
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """A system with its algebraic unknowns solved for.
+    """System with its algebraic unknowns solved for.
 
     Attributes:
-        settle: (y, d) -> y with the algebraic unknowns that belong to its states.
+        settle: (y, d) -> y with the algebraic unknowns of its states.
         rates: (y, d) -> f, zero in the algebraic rows.
     """
 
@@ -35,9 +35,9 @@ class Eliminated:
 
 @lru_cache(maxsize=2)
 def eliminated(system: System) -> Eliminated | None:
-    """`system` without algebraic unknowns; None where they are not linear, or pivots not known.
+    """Return `system` without algebraic unknowns; None if they are not linear or lack known pivots.
 
-    A singular G gives numbers that are not finite, which no step accepts.
+    A singular G gives numbers that are not finite, and the step is rejected.
     """
     rows, columns = system.algebraic
     groups = [[rows.index(i) for i in group if i in rows] for group in system.pivots]
@@ -61,7 +61,7 @@ def eliminated(system: System) -> Eliminated | None:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Explicit(Method):
-    """An explicit Runge-Kutta pair.
+    """Explicit Runge-Kutta pair.
 
         k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
 
@@ -85,14 +85,14 @@ class Explicit(Method):
 
     @property
     def diagonal(self) -> None:
-        """No gamma: an explicit method has no iteration matrix."""
+        """Always None: an explicit method has no iteration matrix."""
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Right-hand sides, Jacobians and factorisations of a step."""
+        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
         return self.stages, 0, 0 if system.is_ode else self.stages
 
     def trials(self, system: System) -> Trials:
-        """Its steps on a system.
+        """Return its steps on a system.
 
         Raises:
             ValueError: algebraic unknowns other than those of a mechanism in which they are
@@ -116,7 +116,7 @@ class Explicit(Method):
         return trial
 
     def _eliminating(self, linear: Eliminated) -> Trials:
-        """Its steps on states, with algebraic unknowns solved for at each stage."""
+        """Return its steps on states, with algebraic unknowns solved for at each stage."""
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
             k: list[Any] = []
@@ -131,7 +131,7 @@ class Explicit(Method):
 
 
 def shampine(b: Array, D: Array) -> Array:
-    """Coefficients H of the quartic with the slopes k_1 and k_s at its ends.
+    """Return the coefficients H of the quartic with the slopes k_1 and k_s at its ends.
 
     With the increment r = sum_j b_j k_j and the free term q = sum_j D_j k_j it is
 
@@ -146,11 +146,11 @@ SMALL = 1e-2
 
 
 def phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
+    """Return phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
 
-    Value and derivatives are right at zero, too.
+    Value and derivatives are correct at zero, too.
 
-    They are the weights of rate and of its effect in the end value and in the mean of a solution of
+    They are the weights of the rate in the end value and in the mean of a solution of
     dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
     One series serves both: phi1 = 1 + x phi2.
     """
@@ -159,9 +159,9 @@ def phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Exp and the functions of `phi1_phi2` with one call for all; exp is 0 far below zero.
+    """Return exp and the functions of `phi1_phi2` with one call of expm1; exp is 0 far below zero.
 
-    Its error is one unit in the last place of 1, not of itself.
+    The error of exp is one unit in the last place of 1, not of exp itself.
     """
     near = ca.fabs(x) < SMALL
     divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
@@ -179,22 +179,24 @@ class Exponential(Method):
 
         y_i+ = y_i + h phi1(h df_i/dy_i) f_i(y)
 
-    Exact where an equation is linear in its unknown and nothing else changes, however fast it is
-    (the bristles of LuGre at a given velocity); what couples the unknowns is explicit.
+    It is exact if an equation is linear in its unknown and nothing else changes, however fast it is
+    (the bristles of LuGre at a given velocity); the coupling of unknowns is explicit.
     """
 
     dae: ClassVar[bool] = False
 
     @property
     def diagonal(self) -> None:
-        """No gamma: the exponential of h J takes the place of W."""
+        """Always None: the exponential of h J takes the place of W."""
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Right-hand sides, Jacobians (their diagonals) and factorisations of a step."""
+        """Return the number of right-hand sides, Jacobians (their diagonals) and factorisations
+        of a step.
+        """
         return 1, 1, 0
 
     def trials(self, system: System) -> Trials:
-        """Its steps on a system.
+        """Return its steps on a system.
 
         Raises:
             ValueError: algebraic unknowns, or a mass matrix other than the identity.

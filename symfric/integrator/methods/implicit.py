@@ -22,7 +22,7 @@ from symfric.integrator.methods.method import Array, Method, Trial, Trials, comb
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rosenbrock(Method):
-    """A stiffly accurate Rosenbrock method in the transformed form of Hairer and Wanner (IV.7).
+    """Stiffly accurate Rosenbrock method in the transformed form of Hairer and Wanner (IV.7).
 
     With W = M / (gamma h) - J at the start of the step,
 
@@ -41,7 +41,7 @@ class Rosenbrock(Method):
 
     @property
     def diagonal(self) -> float:
-        """gamma, the same for all stages, so that one factorisation serves them."""
+        """Coefficient gamma, the same for all stages, so that one factorisation serves them."""
         return self.gamma
 
     @property
@@ -50,15 +50,15 @@ class Rosenbrock(Method):
         return self.A.shape[0]
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Right-hand sides, Jacobians and factorisations of a step."""
+        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
         return self.stages, 1, 1
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Of the iteration matrix, and for a tiny step."""
+        """Return the factors of the iteration matrix, and for a tiny step."""
         return blocks(system, self.gamma).factors, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Its steps on a system."""
+        """Return its steps on a system."""
         block, A, C = blocks(system, self.gamma), self.A, self.C
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -110,32 +110,35 @@ class Radau(Method):
 
     @property
     def diagonal(self) -> float:
-        """That of its real block."""
+        """Coefficient gamma of its real block."""
         return 1 / eigenbasis(self.A).gamma
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Right-hand sides, Jacobians and factorisations (a real and a complex one) of a step."""
+        """Return the number of right-hand sides, Jacobians and factorisations (real, complex)
+        of a step.
+        """
         return 3 * self._iterations(system) - 2, 1, 2
 
     def _iterations(self, system: System) -> int:
         return self.iterations + bool(system.algebraic[0])
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Of the real and the complex iteration matrix, and for a tiny step."""
+        """Return the factors of the real and the complex iteration matrix, and for a tiny step."""
         basis = eigenbasis(self.A)
         own = blocks(system, self.diagonal).factors, pair(system, basis.alpha, basis.beta).factors
         return *own, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Its steps on a system.
+        """Return its steps on a system.
 
-        The increments z = T w are iterated from 0 with the Jacobian at y_0; of a linear system the
-        first iteration is the solution.
+        The increments z = T w are iterated from 0 with the Jacobian at y_0; for a linear system the
+        first
+        iteration is the solution.
         """
         basis = eigenbasis(self.A)
         block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
-        # what algebraic equations leave over where a step begins is no error of the step
+        # the residual of algebraic equations at the start of a step is not an error of the step
         rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -167,7 +170,7 @@ class Radau(Method):
 @final
 @dataclass(frozen=True, eq=False)
 class Eigenbasis:
-    """T^-1 A^-1 T = [[gamma, 0, 0], [0, alpha, beta], [0, -beta, alpha]]."""
+    """Real block form T^-1 A^-1 T = [[gamma, 0, 0], [0, alpha, beta], [0, -beta, alpha]]."""
 
     gamma: float
     alpha: float
@@ -176,7 +179,7 @@ class Eigenbasis:
 
 
 def eigenbasis(A: Array) -> Eigenbasis:
-    """Real eigenbasis of the inverse of A, which has one real eigenvalue."""
+    """Return the real eigenbasis of the inverse of A, which has one real eigenvalue."""
     values, vectors = np.linalg.eig(np.linalg.inv(A))
     heights = np.imag(values)
     real, upper = int(np.argmin(np.abs(heights))), int(np.argmax(heights))
@@ -192,7 +195,7 @@ def eigenbasis(A: Array) -> Eigenbasis:
 @final
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """The complex iteration matrix (alpha - i beta) M/h - J as a real one of twice the size.
+    """Complex iteration matrix (alpha - i beta) M/h - J as a real one of twice the size.
 
     Attributes:
         factor: (y, h, d) -> its factors.
@@ -207,7 +210,7 @@ class Pair:
 
 @lru_cache(maxsize=2)
 def pair(system: System, alpha: float, beta: float) -> Pair:
-    """The complex iteration matrix of `system`."""
+    """Return the complex iteration matrix of `system`."""
     h, n, J, M = ca.SX.sym("h"), system.n, system.J, system.mass
     entries, per_h = ca.SX.sym("J", J.sparsity()), reciprocal(h)
 
@@ -231,7 +234,9 @@ def pair(system: System, alpha: float, beta: float) -> Pair:
 
 
 def through(c: Array) -> Array:
-    """Coefficients H of the cubic through 0 and the increments at the nodes, the last one 1."""
+    """Return coefficients H of the cubic through 0 and the increments at the nodes, the last
+    one 1.
+    """
     inner, rows = c[:-1], np.eye(c.size)
     values = (rows[:-1] - inner[:, None] * rows[-1]) / (inner * (1 - inner))[:, None]
     vandermonde: Array = np.vander(inner, increasing=True)
@@ -241,28 +246,28 @@ def through(c: Array) -> Array:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BackwardEuler(Method):
-    """M (y_1 - y_0) = h f(y_1), by a fixed number of Newton iterations from y_0.
+    """Backward Euler, M (y_1 - y_0) = h f(y_1), by a fixed number of Newton iterations from y_0.
 
-    The Jacobian is new in every iteration: where a contact changes between sticking and sliding,
-    that of the start says nothing about the end.
+    The Jacobian is new in every iteration: if a contact changes between sticking and sliding, the
+    Jacobian at the start does not describe the end.
     """
 
     iterations: int
 
     @property
     def diagonal(self) -> None:
-        """No gamma: W of the fixed step is M / h - J."""
+        """Always None: W of the fixed step is M / h - J."""
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Right-hand sides, Jacobians and factorisations of a step."""
+        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
         return self.iterations, self.iterations, self.iterations
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Of the iteration matrix."""
+        """Return the factors of the iteration matrix."""
         return (blocks(system, 1.0).factors,)
 
     def trials(self, system: System) -> Trials:
-        """Its steps on a system."""
+        """Return its steps on a system."""
         block = blocks(system, 1.0)
 
         def trial(y: Any, h: Any, d: Any) -> Trial:

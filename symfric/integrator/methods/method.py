@@ -1,4 +1,4 @@
-"""A method of integration, whatever its family, and pivots that are sound for its matrices."""
+"""Base class of integration methods, and numerically stable pivots for their matrices."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
@@ -32,10 +32,10 @@ class Trial:
 
     Attributes:
         end: the solution after the step.
-        error: estimate of its error; None from a method of fixed steps.
+        error: estimate of its error; None for a method of fixed steps.
         dense: coefficients d_1, d_2, ... of the dense output (see `Dense`).
-        corrections: the last two Newton corrections of `end`; empty where nothing is iterated.
-        shift: what `end` was moved by to lie on the constraints of a mechanism; None without any.
+        corrections: the last two Newton corrections of `end`; empty without iterations.
+        shift: displacement of `end` onto the constraints of a mechanism; None without any.
     """
 
     end: Any
@@ -46,23 +46,24 @@ class Trial:
 
 
 Trials = Callable[[Any, Any, Any], Trial]
-"""(y, h, d) -> what a method makes of it, for one system; with SX its blocks are inlined, with MX
-they stay calls."""
+"""(y, h, d) -> the step of a method on one system; with SX its blocks are inlined, with MX they
+stay calls.
+"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Method(ABC):
-    """A method of integration: coefficients, what is known of them, and its steps.
+    """Integration method: coefficients, known properties, and its steps.
 
     Attributes:
         name: as papers write it.
         order: of the solution, for ODEs and (`dae`) index-1 DAEs.
         embedded: order of the solution behind the error estimate; 0 for methods of fixed steps.
-        dense: order of the dense output for ODEs; 0 where there is none.
+        dense: order of the dense output for ODEs; 0 if there is none.
         dense_dae: order of the dense output for index-1 DAEs.
         H: dense output from the stages, shape (r, s).
-        finer: how many times shorter than usual the ways are that a sliding velocity may go near
-            rest in one step (`step.attempt`).
+        finer: factor by which the change of a sliding velocity near zero in one step is limited
+            more than usual (`step.attempt`).
         source: where the coefficients are from.
     """
 
@@ -78,44 +79,46 @@ class Method(ABC):
     @property
     @abstractmethod
     def diagonal(self) -> float | None:
-        """The coefficient gamma of its iteration matrix W = M / (gamma h) - J.
+        """Coefficient gamma of its iteration matrix W = M / (gamma h) - J.
 
-        None of a method without one, and of methods of fixed steps.
+        None for a method without one, and for methods of fixed steps.
         """
 
     dae: ClassVar[bool] = True
-    """Whether algebraic unknowns and mass matrices are allowed."""
+    """True if algebraic unknowns and mass matrices are allowed."""
 
     @property
     def adaptive(self) -> bool:
-        """Whether it estimates its error, as `simulate` needs it."""
+        """True if it estimates its error, as `simulate` needs it."""
         return self.embedded > 0
 
     @abstractmethod
     def work(self, system: System) -> tuple[int, int, int]:
-        """Right-hand sides, Jacobians and factorisations of a step."""
+        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Of all matrices that its steps on a system solve with; none of an explicit method."""
+        """Return the factors of all matrices that its steps on a system use; none for an
+        explicit method.
+        """
         return ()
 
     @abstractmethod
     def trials(self, system: System) -> Trials:
-        """Its steps on a system.
+        """Return its steps on a system.
 
         Raises:
-            ValueError: the system has algebraic unknowns or a mass matrix, and not `dae`.
+            ValueError: the system has algebraic unknowns or a mass matrix, and `dae` is False.
         """
 
 
 def combination(weights: Iterable[float], columns: Iterable[Any], kind: Any) -> Any:
-    """Weighted sum of columns of the given kind, without the terms of weight zero."""
+    """Return the weighted sum of columns of the given type, without the terms of weight zero."""
     terms = (float(w) * c for w, c in zip(weights, columns, strict=True) if w != 0.0)
     return sum(terms, start=kind(0))
 
 
 def need_ode(system: System, method: str) -> None:
-    """Refuse what a method without iteration matrix cannot integrate.
+    """Check that a method without iteration matrix can integrate `system`.
 
     Raises:
         ValueError: algebraic unknowns, or a mass matrix other than the identity.
@@ -134,22 +137,23 @@ Point = tuple[Array, Array]
 """Unknowns y and run data d."""
 
 STEPS = (1e-8, 1e-5, 1e-2)
-"""Steps relative to the span at which matrices are looked at: the first one, and usual ones."""
+"""Steps relative to the span at which matrices are evaluated: the first one, and usual ones."""
 ASIDE = 1e-2
-"""How far from a point its samples lie: what vanishes there alone is no reason for an order."""
+"""Relative distance of samples from a point, so that entries that vanish only there are not
+ignored."""
 
 
 def suited(system: System, method: Method, points: Sequence[Point], span: float) -> System:
-    """`system`, with other pivots where its own are not sound at the last of `points`.
+    """Return `system` with other pivots if its own are unstable at the last of `points`.
 
-    Orders that are sound stay: they fill least. Those of differential equations alone (1/(gamma h)
-    dominates for small steps) and of mechanisms (definite matrices) need no numbers.
+    Stable orders stay: they have least fill. Those of differential equations alone (1/(gamma h)
+    dominates for small steps) and of mechanisms (definite matrices) need no check.
 
     Args:
-        system: what is integrated.
-        method: how; it says which matrices its steps solve with.
-        points: where a run has to get through, the newest last.
-        span: its length [s].
+        system: the system to integrate.
+        method: gives the matrices that its steps solve with.
+        points: that a run has to pass, the newest last.
+        span: duration of the run [s].
     """
     if system.manifold is not None or system.is_ode:
         return system
@@ -167,12 +171,12 @@ def suited(system: System, method: Method, points: Sequence[Point], span: float)
 
 
 def suited_to_start(system: System, method: Method, model: Model) -> System:
-    """`system` with pivots that are sound at the model's own start, for fixed steps.
+    """Return `system` with stable pivots at the model's own start, for fixed steps.
 
     Args:
         system: whose run data are parameters and inputs.
         method: as in `suited`.
-        model: its equations and start values; where these are not consistent nothing changes.
+        model: its equations and start values; if these are not consistent nothing changes.
     """
     if system.manifold is not None or system.is_ode:
         return system
@@ -184,13 +188,13 @@ def suited_to_start(system: System, method: Method, model: Model) -> System:
 
 
 def _samples(factors: Factors, points: Sequence[Point], span: float) -> Array:
-    """The matrix at points and steps (samples, n, n), where it is finite."""
+    """Return the matrix at points and steps (samples, n, n), where it is finite."""
     every = np.stack([factors.at(y, step * span, d) for y, d in points for step in STEPS])
     return every[np.isfinite(every).all(axis=(1, 2))]
 
 
 def _aside(system: System, y: Array, sign: float) -> Array:
-    """`y` with every unknown but time a little changed, each by another share."""
+    """Return `y` with every unknown but time perturbed, by different relative amounts."""
     share = sign * ASIDE * np.sin(1.0 + np.arange(system.n))
     size = np.abs(y)
     size[: system.nx] = np.maximum(size[: system.nx], system.nominal)

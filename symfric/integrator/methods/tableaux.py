@@ -1,6 +1,6 @@
 """Coefficients of the methods, with order and source.
 
-Dense output of all of them, 0 <= theta <= 1, with d_r = sum_j H_rj k_j:
+All of them have the dense output, 0 <= theta <= 1, with d_r = sum_j H_rj k_j:
 
     y(theta) = (1 - theta) y_0 + theta [y_1 + (1 - theta) (d_1 + theta (d_2 + theta d_3))]
 """
@@ -15,7 +15,7 @@ from symfric.integrator.methods.method import Array, Method
 
 
 def _lower(rows: list[list[float]]) -> Array:
-    """Strictly lower triangular matrix from its rows."""
+    """Return a strictly lower triangular matrix from its rows."""
     matrix = np.zeros((len(rows), len(rows)))
     for i, row in enumerate(rows):
         matrix[i, : len(row)] = row
@@ -180,8 +180,9 @@ RODAS3 = Rosenbrock(
     gamma=0.5,
     A=_lower([[], [0.0], [2.0, 0.0], [2.0, 0.0, 1.0]]),
     C=_lower([[], [4.0], [1.0, -1.0], [1.0, -1.0, -8.0 / 3.0]]),
-    # ours: the cubic in theta that meets the order conditions up to 2, that of f''(f, f), and that
-    # of order 2 of the algebraic variables
+    # derived here: the cubic in theta that meets the order conditions up to 2, that of f''(f, f),
+    # and
+    # that of order 2 of the algebraic variables
     H=np.array([[3.0, -1.0, -1.0, -1.0], [0.0, 0.0, 0.0, 2.0]]),
     order=3,
     embedded=2,
@@ -246,10 +247,11 @@ RADAU5 = Radau(
 )
 
 FOR_DERIVATIVES = replace(RADAU5, finer=8.0)
-"""What derivatives of runs are taken of. A step that crosses the steep part of a law at once has
-the motion right, and its own derivative wrong: with steps of half the width of that part, a quarter
-more of them, derivatives of a pump err by 1.5e-4 instead of 6e-3 at rtol 1e-6. Those of Rodas5P err
-twenty times as much as its own."""
+"""Method for derivatives of runs. A step that crosses the steep part of a law at once gives the
+right motion, but a wrong derivative. With steps of half the width of that part, a quarter more of
+them, derivatives of a pump err by 1.5e-4 instead of 6e-3 at rtol 1e-6. Derivatives of Rodas5P have
+twenty times the error of Rodas5P itself.
+"""
 
 BACKWARD_EULER = BackwardEuler(
     name="backward Euler",
@@ -273,12 +275,12 @@ METHODS: dict[str, Method] = {
     "backward_euler": BACKWARD_EULER,
     "exponential": EXPONENTIAL,
 }
-"""All methods by the name that a user writes; the order test runs over them."""
+"""All methods by their public names; the order test covers each of them."""
 
 ADAPTIVE: dict[str, Method] = {name: m for name, m in METHODS.items() if m.adaptive}
-"""Those that control their step size, for `simulate`."""
+"""Methods with step size control, for `simulate`."""
 
 
 def key_of(method: Method) -> str:
-    """Return the name by which a user writes `method`."""
+    """Return the public name of `method`."""
     return next(key for key, known in METHODS.items() if known.name == method.name)

@@ -1,1 +1,1 @@
-"""From start to end: attempts in a loop, events, dense output, and why a run stopped."""
+"""Runs of an integrator: attempts in a loop, events, dense output, and failure diagnosis."""

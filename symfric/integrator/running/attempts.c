@@ -1,4 +1,4 @@
-/* Attempts from S towards R[T_END]; a row (t0, t1, y0, y1, D) per accepted step, if there are rows. */
+/* Makes attempts from S towards R[T_END]; writes a row (t0, t1, y0, y1, D) per accepted step. */
 enum { N = $n, MEM = $memory, T = $t, H = $h, T_END = $t_end, GIVEN = $given };
 enum { WIDTH = $width, DENSE = $dense, DENSE_ROWS = $dense_rows, JUMP = $jump };
 #define SEARCHES $searches

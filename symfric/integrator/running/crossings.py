@@ -1,13 +1,13 @@
 """Zero crossings within an accepted step: the Functions of both engines, and roots in Python.
 
-Everything that takes arithmetic on many numbers is a Function, so that virtual machine and compiled
-code agree to the bit. What is left, signs and the Illinois method, is written twice, in the same
-operations: in Python (`Isolation` and `events`) and in C (`.search`).
+All arithmetic on many numbers is in Functions, so that virtual machine and compiled code agree bit
+for bit. Only the signs and the Illinois method are written twice, in the same operations: in Python
+(`Isolation` and `events`) and in C (`search.c`).
 
-Roots are isolated. Values at five places bound what the expression does between them if it is a
-polynomial of degree 4, as one that is linear in the states is on the dense output of all methods,
-or has one corner. Where a piece may have more roots than the signs at its ends say, it is cut in
-quarters of its own, down to the event tolerance.
+Roots are isolated. Values at five places bound the expression between them if it is a polynomial of
+degree 4 or has one corner (an expression linear in the states is such a polynomial on the dense
+output of all methods). A piece that may have more roots than its end signs show is divided into
+quarters, down to the event tolerance.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,59 +27,67 @@ from symfric.model.parts import Event
 
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where each step, and each piece in doubt, is looked at."""
+"""Relative places at which each step, and each doubtful piece, is evaluated."""
 FINER = 64
-"""Pieces of a step that are cut, at most: more than two crossings an event tolerance apart take."""
+"""Maximum number of subdivisions per step: needed only for crossings close to the event
+tolerance."""
 AT_ONCE = 8
-"""Steps that one call of `Crossings.possible` looks at."""
+"""Steps that one call of `Crossings.possible` tests."""
 ROUNDING = 64 * float(np.finfo(float).eps)
-"""Bends of an expression below this part of its terms are rounding: no sign there is a crossing."""
+"""Bends of an expression below this fraction of its terms are rounding: no sign there is a
+crossing."""
 STRAIGHT = 3.01
-"""Values above so many times all bends at five places leave no doubt: 3 by the formulas, and some
-for rounding. Compiled code tests that first."""
+"""If all values exceed this multiple of all bends at five places, there is no doubt: 3 by the
+formulas, and a margin for rounding. Compiled code makes this test first.
+"""
 SHARPER = 1e-3
-"""Events are located to this part of the tolerance: a ball whose impacts are all late gains by it,
-and where it loses little by them it would bounce for ever."""
+"""Events are located to this fraction of the tolerance. A ball whose impacts are all late gains
+energy, and might bounce for ever if its impacts lose little.
+"""
 KEPT = 100
-"""Times of events that are remembered, to notice a storm."""
+"""Event times that are stored to detect a storm."""
 ALIKE = 4
-"""Events of one kind in a row whose distances are looked at."""
+"""Number of consecutive equal events whose intervals are examined for a storm."""
 SOON = 2.0
-"""Event tolerances after a jump at which the signs behind it are taken."""
+"""Delay after a jump, in event tolerances, at which the new signs are evaluated."""
 RESTART, LEAST = 1e3, 1e-3
-"""The step after an event: so many event tolerances, and at least this part of the step cut. It
-tells the signs behind the event; the next one is as long as the step cut, if error control agrees:
-what follows an event of friction is mostly as smooth as what was before it."""
+"""Step after an event, in event tolerances, and its least fraction of the step that was cut. It
+only determines the signs after the event; the next one is as long as the step cut, if error control
+allows: motion after a friction event is usually as smooth as before.
+"""
 
 
 @final
 class Memory:
-    """What is remembered of events between steps, a column of numbers that both engines share.
+    """Event data kept between steps, a column of numbers that both engines share.
 
-    phase, tolerance [s], number of jumps, how many of the last ones were of one kind, the step [s]
-    to go on with behind a jump, times of the last jumps, then for each event: its value before the
-    step to come, and whether it took part in the last jump.
+    Layout: phase, tolerance [s], number of jumps, how many of the last ones were of one kind, the
+    step
+    [s] to resume after a jump, times of the last jumps, then for each event its value before the
+    next
+    step, and its part in the last jump (0 or 1).
     """
 
     PHASE, TOLERANCE, COUNT, ALIKE, RESUME = range(5)
     TIMES = slice(5, 5 + KEPT)
     FRESH, JUMPED, ON = 0.0, 1.0, 2.0
-    """Phases: the values are those at the start of the step; before a jump there, NaN for events
-    that took part in it; or at the end of the step before."""
+    """Phases: event values are those at the start of the step; before a jump there, NaN for events
+    that took part in it; or at the end of the step before.
+    """
 
     @staticmethod
     def before(count: int) -> slice:
-        """Values of `count` events."""
+        """Slice of the values of `count` events."""
         return slice(5 + KEPT, 5 + KEPT + count)
 
     @staticmethod
     def last(count: int) -> slice:
-        """Which of `count` events took part in the last jump."""
+        """Slice of the flags of `count` events that took part in the last jump."""
         return slice(5 + KEPT + count, 5 + KEPT + 2 * count)
 
     @staticmethod
     def new(count: int, tolerance: float) -> Array:
-        """Nothing has happened yet; `tolerance` [s] of event times."""
+        """Return the initial memory for the `tolerance` [s] of event times."""
         memory = np.zeros(5 + KEPT + 2 * count)
         memory[Memory.TOLERANCE] = tolerance
         return memory
@@ -88,23 +96,24 @@ class Memory:
 @final
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """The events of a model on one accepted step, a record row (t0, t1, y0, y1, D).
+    """Events of a model on one accepted step, a record row (t0, t1, y0, y1, D).
 
     Attributes:
-        looks: (low, row, d) -> their values at `LOOKS` between low and 1, but for the first, one
-            look after the other.
-        noise: (row, d) -> what rounding leaves of each in the step.
-        doubts: (values at five places, one place after the other, noise) -> of each piece between
-            them, whether it is in doubt.
-        doubt: the same of one event.
-        values: (theta, row, d) -> their values within the step.
+        looks: (low, row, d) -> event values at all `LOOKS` but the first, between low and 1, place
+        by
+            place.
+        noise: (row, d) -> rounding level of each event in the step.
+        doubts: (values at five places, place by place, noise) -> for each piece, nonzero if it may
+            have further roots.
+        doubt: the same for one event.
+        values: (theta, row, d) -> event values within the step.
         cut: (theta, row) -> the row up to there, the same polynomial.
-        jump: (row, d) -> their values at its end, and all resets from there.
-        record: where things stand in a row.
+        jump: (row, d) -> event values at its end, and all resets from there.
+        record: layout of a row.
         directions, terminal: of each event.
         resets: of each reset, in order: number of the event and of the state that it sets.
-        follows: whether algebraic unknowns follow a reset.
-        closes: whether loops have to be closed again behind it.
+        follows: True if algebraic unknowns follow a reset.
+        closes: True if loops have to be closed again after a reset.
     """
 
     looks: ca.Function
@@ -156,7 +165,7 @@ class Crossings:
 
     @property
     def functions(self) -> tuple[ca.Function, ...]:
-        """What the compiled search calls."""
+        """Functions that the compiled search calls."""
         return self.looks, self.noise, self.doubt, self.values, self.cut, self.jump
 
 
@@ -170,13 +179,14 @@ def crossings(
     follows: bool,
     closes: bool,
 ) -> Crossings:
-    """Build the Functions.
+    """Build the Functions of `Crossings`.
 
     Args:
         events: of the model.
         states: names, in the order of y.
         expressions: (t, y, d) -> value of each event.
-        sizes: (t, y, d) -> of each event, the sum of what t and y contribute, in magnitude.
+        sizes: (t, y, d) -> for each event, the sum of the magnitudes of the contributions of t and
+        y.
         resets: (t, y, d) -> value of each reset, event after event.
         rows: of the dense output.
         follows, closes: as in `Crossings`.
@@ -212,13 +222,13 @@ def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Fun
 
 
 def _doubtful(name: str, count: int) -> ca.Function:
-    """Of each piece between five values, whether events may have more roots than their signs say.
+    """Return a Function that tests each piece between five values for hidden roots.
 
     An expression is off its chord by at most S x (1 - x), 0 <= x <= 1, on inner pieces, and by
     S (1 - x) from an outer end, if it is a polynomial of degree 4, or a line with one corner. On
     inner pieces S is the sum of the second differences at their ends and an eighth of the third
-    one, on outer ones it bounds half the second derivative. Where it is above that, it has one
-    sign, or rises or falls throughout. A bend below the noise is rounding.
+    one, on outer ones it bounds half the second derivative. An expression above that bound has one
+    sign, or is monotonic. A bend below the noise is rounding.
     """
     five, noise = ca.SX.sym("values", len(LOOKS) * count), ca.SX.sym("noise", count)
     values = ca.vertsplit(five, count)
@@ -236,7 +246,7 @@ def _doubtful(name: str, count: int) -> ca.Function:
 
 
 def _place(at: Record, row: ca.SX, theta: Any) -> tuple[ca.SX, ca.SX]:
-    """Time and unknowns within a step, as in `Dense`."""
+    """Return time and unknowns within a step, as in `Dense`."""
     bend: Any = 0.0
     for k in reversed(range(at.rows)):
         bend = row[at.bend(k)] + theta * bend
@@ -245,15 +255,15 @@ def _place(at: Record, row: ca.SX, theta: Any) -> tuple[ca.SX, ca.SX]:
 
 
 def _inside(at: Record, row: ca.SX, theta: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The same, with a time that rounding does not carry beyond the end."""
+    """Return the same as `_place`, with the time limited to the end of the step."""
     t, y = _place(at, row, theta)
     return ca.if_else(theta < 1, ca.fmin(t, row[at.T1]), row[at.T1]), y
 
 
 def cutting(at: Record) -> ca.Function:
-    """(theta, row) -> the row up to theta, the same polynomial.
+    """Return the Function (theta, row) -> the row up to theta, the same polynomial.
 
-    Its coefficients are those with d'_k - d'_(k+1) = theta^(k+1) [d_k - d_(k+1)], d_(r+1) = 0.
+    Its coefficients satisfy d'_k - d'_(k+1) = theta^(k+1) [d_k - d_(k+1)], d_(r+1) = 0.
     """
     row, theta = ca.SX.sym("row", at.width), ca.SX.sym("theta")
     t, y = _inside(at, row, theta)
@@ -270,22 +280,22 @@ def cutting(at: Record) -> ca.Function:
 
 
 LEAST_PART = 1e-15
-"""Shortest part of a step that rounding leaves."""
+"""Shortest fraction of a step that rounding resolves."""
 
 
 @final
 @dataclass(eq=False)
 class Isolation:
-    """The search in one step.
+    """Search for the first roots in one step.
 
     Attributes:
         values: theta -> value of each event.
-        doubts: (values at five places) -> of the pieces between them and each event, whether it
-            may have more roots there than the signs say.
+        doubts: (values at five places) -> for each piece and event, nonzero if it may have more
+            roots than the signs show.
         directions: of the events.
-        tolerance: of event times, as a part of the step.
-        roots: the first one of each event that was found, inf elsewhere.
-        left: pieces that may still be cut.
+        tolerance: of event times, as a fraction of the step.
+        roots: first root found of each event, inf if there is none.
+        left: subdivisions still allowed.
     """
 
     values: Callable[[float], Array]
@@ -299,10 +309,11 @@ class Isolation:
         self.roots = np.full(self.directions.size, np.inf)
 
     def first(self, at: Sequence[float], g: Array, doubts: Array) -> float:
-        """The first of all roots between the places `at` with values g, or one behind them.
+        """Return the first root between the places `at` with values g, or a value beyond them.
 
-        What is in doubt is looked at again before the first sure root, since what jumps with that
-        event does not do so before it, or piece by piece where there is none, or it is its own.
+        If there is a certain root, doubtful events are searched once more before it, because those
+        that jump with its event do not jump earlier. Otherwise, or if the root is their own, they
+        are searched piece by piece.
         """
         hits = passed(g[:-1], g[1:], self.directions) & (self.roots > at[0])
         suspects, sure = doubts != 0, float(self.roots.min())
@@ -334,7 +345,7 @@ class Isolation:
         return max(SHARPER * self.tolerance, LEAST_PART)
 
     def _sure(self, ends: tuple[float, float], g: Array, hits: NDArray[np.bool_]) -> float:
-        """The first of all roots once those of some events in a piece are located."""
+        """Locate the roots of the events `hits` in a piece; return the first root known."""
         for i in np.flatnonzero(hits).tolist():
 
             def value(theta: float, i: int = i) -> float:
@@ -345,7 +356,7 @@ class Isolation:
         return float(self.roots.min())
 
     def _again(self, a: float, b: float, before: Array, suspects: NDArray[np.bool_]) -> float:
-        """As `first`, from a with the values there to b, where these events are in doubt."""
+        """Repeat `first` from a, with the values there, to b, for the doubtful events only."""
         self.left -= 1
         b = max(a, b)
         at = [a, *(a + s * (b - a) for s in LOOKS[1:])]
@@ -354,7 +365,7 @@ class Isolation:
 
 
 def passed(before: Any, after: Any, directions: Any) -> Any:
-    """Return where events pass through zero in their directions; of arrays, or of SX and DM."""
+    """Return where events pass through zero in their directions; for arrays, SX and DM."""
     rising = (before < 0) * (after >= 0) * (directions >= 0)
     return rising + (before > 0) * (after <= 0) * (directions <= 0)
 
@@ -362,9 +373,9 @@ def passed(before: Any, after: Any, directions: Any) -> Any:
 def locate(
     value: Callable[[float], float], a: float, b: float, ends: tuple[float, float], tolerance: float
 ) -> float:
-    """Root in [a, b] of a function with values of two signs at the `ends`; the side after it.
+    """Return the root in [a, b] of a function with values of two signs at the `ends`, rounded up.
 
-    By the Illinois method.
+    Uses the Illinois method.
     """
     fa, fb = ends
     if fb == 0.0:

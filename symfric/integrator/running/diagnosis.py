@@ -1,4 +1,4 @@
-"""Why an integration could not go on, in one sentence."""
+"""Diagnosis of a failed integration, in one sentence."""
 
 import casadi as ca
 import numpy as np
@@ -16,15 +16,15 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 NEARLY = 0.1
-"""A step that shrinks to nothing with this little left of det(I - dN/dN) has jammed."""
+"""If a step shrinks to nothing with det(I - dN/dN) below this, the mechanism has jammed."""
 
 
 COARSE = 1e-10
-"""Where rounding of t allows no steps [s] shorter than this, that may be why one fails."""
+"""Time resolution [s] above which rounding of t may be the cause of a failed step."""
 
 
 def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
-    """Status and sentence for a step that shrank to nothing at time `t`."""
+    """Return status and message for a step that shrank to nothing at time `t`."""
     system, name = integrator.system, integrator.model.name
     where = f"simulate '{name}': stopped at t = {t:.9g} s"
     f = integrator.f(y, d).full().ravel()
@@ -51,9 +51,10 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
 
 
 def chattering(model: Model) -> str:
-    """What to do about equations of one's own with a sign, at which steps never end; else nothing.
+    """Return advice for user equations with a sign, in which steps never end; else an empty text.
 
-    At rest a sign changes from step to step: what holds there is between -1 and 1.
+    During sticking a sign changes from step to step, although the true friction is between -1 and
+    1.
     """
     if model.contacts or model.holonomic is not None:
         return ""
@@ -61,30 +62,33 @@ def chattering(model: Model) -> str:
     written = ca.Function("equations", symbols, [model.residual])
     if ca.OP_SIGN not in {written.instruction_id(k) for k in range(written.n_instructions())}:
         return ""
-    return " The equations hold sign(...): write friction with contact(...) and a law, which rests."
+    return " The equations contain sign(...): use contact(...) and a law, which can stick."
 
 
 def _coarse(t: float) -> str:
-    """Where t itself has too few digits for short steps."""
+    """Return a message if t has too few digits for short steps."""
     if FLOOR * abs(t) < COARSE:
         return ""
-    return f"; so far from t = 0 no step below {FLOOR * abs(t):.1e} s can be told: begin nearer"
+    return (
+        f"; at this t, steps below {FLOOR * abs(t):.1e} s are lost to rounding; "
+        "shift the time origin"
+    )
 
 
 def _advice(integrator: Integrator) -> str:
-    """What a mechanism says about friction without a solution."""
+    """Return the advice of a mechanism about friction without a solution."""
     mechanics = integrator.model.holonomic
     return "" if mechanics is None else mechanics.advice
 
 
 def _dead_centre(system: System, y: Array, d: Array) -> str:
-    """Constraints of a mechanism that depend on each other here."""
+    """Return a message if constraints of a mechanism are dependent here."""
     manifold = system.manifold
     return "" if manifold is None else singular(manifold, system.names, y, d)
 
 
 def _jammed(integrator: Integrator, y: Array, d: Array) -> str:
-    """Contacts whose normal forces grow with their own friction; with joint and law."""
+    """Return a message if normal forces grow with their own friction; names joint and law."""
     manifold = integrator.system.manifold
     if manifold is None:
         return ""
@@ -95,12 +99,12 @@ def _jammed(integrator: Integrator, y: Array, d: Array) -> str:
 
 
 def _pulled(system: System, y: Array, d: Array) -> str:
-    """Normal forces that are about to be negative."""
+    """Return a message if normal forces are about to become negative."""
     return "" if system.manifold is None else pulls(system.manifold, y, d, NEARLY)
 
 
 def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
-    """States that are huge, or large and growing ever faster."""
+    """Return a message if states are huge, or large and growing ever faster."""
     x, rate = y[: system.nx], np.nan_to_num(f[: system.nx], posinf=0.0, neginf=0.0)
     huge = np.abs(x) > 1e10 * system.nominal
     runaway = (
@@ -111,7 +115,7 @@ def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
 
 
 def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
-    """Equations that are not finite here, or along the slope a few of the last steps ahead."""
+    """Return a message if equations are not finite here, or a few steps ahead along the slope."""
     system = integrator.system
     f = integrator.f(y, d).full().ravel()
     rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f, posinf=0.0, neginf=0.0)
@@ -132,7 +136,7 @@ def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
 
 
 def _steep(system: System, y: Array, d: Array) -> str:
-    """Derivatives of equations that are not finite."""
+    """Return a message if derivatives of equations are not finite."""
     J = ca.Function("J", [system.y, system.d], [ca.jacobian(system.f, system.y)])(y, d).full()
     rows, columns = np.nonzero(~np.isfinite(J))
     if not rows.size:
@@ -145,7 +149,9 @@ def _steep(system: System, y: Array, d: Array) -> str:
 
 
 def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
-    """Algebraic equations that cannot be solved, or do not determine their unknowns."""
+    """Return a message if algebraic equations have no solution or do not determine their
+    unknowns.
+    """
     system = integrator.system
     names = _named(system, np.array(system.algebraic[1], dtype=int))
     matrix = blocks(system, 1.0).factors.at(y, max(h, 1e-12), d)

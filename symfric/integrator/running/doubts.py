@@ -1,27 +1,31 @@
-"""Doubts about a run that ended well: friction above its level, and friction that gains energy.
+"""Warnings about successful runs: friction above its static level, and friction that adds energy.
 
-Energy: a law whose force has the wrong sign adds it to the motion.
+Energy: a law whose force has the wrong sign adds energy to the motion.
 
     F(v, N, z_ss(v, N)) v < 0  at a slip v of the run,  and  integral F v dt < 0
 
-A look at the steady force over decades of speed and load, once for each set of its parameters,
-finds nothing against most laws, and then no run is looked at. Bristles give back what they stored,
-and laws with an offset push within their smoothing velocity, so that one of the two conditions
-alone is no doubt. The integral is the trapezoidal rule over steps: only its sign matters.
-Limits: a wrong sign in equations written by hand, outside the law, is not seen; nor is any member
-of an ensemble looked at.
+The steady force is first checked over decades of speed and load, once for each set of its
+parameters. Most laws pass, and their runs need no further check. Bristles return stored energy, and
+laws with an offset push within their smoothing velocity, so both conditions are required. The
+integral is the
+trapezoidal rule over steps: only its sign matters.
+Limits: a wrong sign in equations written by hand, outside the law, is not detected; ensembles are
+not
+checked.
 
-Overload: the states of a law carry more than they may in any motion, mostly its static level.
+Overload: the states of a law carry more than they can in any motion, usually its static level.
 
     |F(0, N, z)| > (1 + MARGIN) most_held(N)
 
-A bristle that creeps below its smoothing velocity, or below the rounding of the velocities that the
-slip is a difference of, does not relax but stretches on. Where the load is a number a look at how
-far the states went over all accepted steps costs nothing; where it varies a state may be beyond the
-level because the load fell, and only what still grows there is overload.
-Limits: laws that take the applied force, and those that give no static level, are not looked at.
-Long runs whose steps are not kept are looked at at the times of the result where the load varies,
-ensembles only where it is a number.
+A bristle that creeps below its smoothing velocity, or below the rounding of the velocities whose
+difference is the slip, does not relax but stretches on. With a constant load the check uses only
+the extreme values of the states over all accepted steps. With a varying load a state may exceed the
+level because the load fell, and only a state that still grows is an overload.
+Limits: laws that take the applied force, and laws without a static level, are not checked. Long
+runs
+whose steps are not kept are checked at the times of the result if the load varies, ensembles only
+if
+it is constant.
 """
 
 from collections.abc import Collection, Hashable, Iterator, Mapping
@@ -47,23 +51,23 @@ from symfric.model.forces import by_laws
 
 Array = NDArray[np.float64]
 SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
-"""Slips [m/s] of the first look, to both sides."""
+"""Slips [m/s] of the first check, in both directions."""
 LOADS = (1.0, 1e3)
-"""Loads [N] of the first look."""
+"""Loads [N] of the first check."""
 SHARE = 1e-3
-"""Share of the turnover of energy by which friction may gain: rounding, and the rule."""
+"""Energy gain allowed, as a fraction of the energy turnover: rounding, and quadrature."""
 REMEMBERED = 16
-"""Sets of parameters whose first look is remembered."""
+"""Parameter sets whose first check is cached."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Friction of one contact, as it is and in steady sliding.
+    """Friction of one contact, actual and in steady sliding.
 
     Attributes:
-        contact: where.
-        power: (v, N, p) -> power [W] that steady friction takes.
+        contact: the contact.
+        power: (v, N, p) -> power [W] dissipated by steady friction.
         needs: parameters that the power depends on.
         rows: slip, friction and steady friction of the model.
     """
@@ -82,7 +86,7 @@ class Sliding:
 
 
 def gains(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
-    """Sentences about contacts whose friction adds energy to the motion."""
+    """Yield messages about contacts whose friction adds energy to the motion."""
     memory = integrator.model.memory
     known: dict[Hashable, bool] = memory.setdefault("active", {})
     for k, sliding in enumerate(sliding_places(integrator.model)):
@@ -115,7 +119,7 @@ def sliding_places(model: Model) -> tuple[Sliding, ...]:
 
 
 def _sliding(model: Model, contact: Contact) -> Sliding | None:
-    """The friction of a contact; None where it is not known from the unknowns of the model."""
+    """Return the friction of a contact; None if the model's unknowns do not determine it."""
     law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
     try:
         still = dict.fromkeys(contact.given, 0.0)
@@ -133,26 +137,25 @@ def _sliding(model: Model, contact: Contact) -> Sliding | None:
 
 
 MARGIN = 0.05
-"""Share of its level that errors of the integrator may add to friction."""
+"""Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25
-"""The same where the load varies: laws that do not follow it at once pass their level by some."""
+"""The same for a varying load: laws that follow it with a delay exceed their level for a while."""
 LOOKS = 200
-"""Peaks of a run at which a load that varies is looked at."""
+"""Maximum number of peaks checked in a run with a varying load."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What the states of a law carry in one contact, and the most that rest holds there.
+    """Force carried by the states of a law in one contact, and its static level.
 
     Attributes:
-        contact: where.
-        rows: places of its states among those of the model.
-        force: of the states at no slip [N].
-        level: the most that they may, at either side [N].
-        fixed: the load is no function of the motion.
-        screen: (z, p) -> both and the slope of the force; empty where the load varies.
-        columns: integrator -> (force, level, force times its rate) at many times.
+        contact: the contact.
+        rows: indices of its states among those of the model.
+        force: of the states at zero slip [N].
+        level: largest possible force, in either direction [N].
+        fixed: True if the load is independent of the motion.
+        screen: (z, p) -> force, level and the slope of the force; empty if the load varies.
     """
 
     contact: Contact
@@ -166,17 +169,17 @@ class Held:
 
     @cached_property
     def growth(self) -> ca.SX:
-        """The force times its rate: positive where it grows."""
+        """Force times its rate: positive while it grows."""
         z = symbols_of(self.contact.states)
         return self.force * ca.jtimes(self.force, z, self.contact.rate)
 
     def ratios(self, z: Array, p: Array) -> Array:
-        """Force over level of runs whose states `z` went so far, both (n, runs)."""
+        """Return force over level at the extreme states `z` of runs, both (n, runs)."""
         force, level, _ = (rows.full() for rows in self.screen(z, p))
         return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
 
     def bound(self, run: Run, p: Array) -> float:
-        """Force over level in a run at most, by how far each state went."""
+        """Return an upper bound of force over level in a run, from the extremes of each state."""
         tops = np.array([run.farthest(i) for i in self.rows])
         if self.linear:
             level, slope = self.limits(p)
@@ -184,7 +187,7 @@ class Held:
         return max(float(self.ratios(side * tops[:, None], p)[0]) for side in (1.0, -1.0))
 
     def limits(self, p: Array) -> tuple[float, Array]:
-        """Return the level and the slope of a force that is a sum of the states."""
+        """Return the level and the slope of a force that is linear in the states."""
         key = p.tobytes()
         if key not in self._limits:
             _, level, slope = self.screen(0.0, p)
@@ -193,13 +196,13 @@ class Held:
 
     @cached_property
     def linear(self) -> bool:
-        """Whether the force is a sum of the states."""
+        """True if the force is linear in the states."""
         return bool(ca.is_linear(self.force, symbols_of(self.contact.states)))
 
     def over_time(
         self, integrator: Integrator, inputs: InputData, t: Array, y: Array, p: Array
     ) -> tuple[Array, Array, Array]:
-        """Force, level and growth at the times `t` with the unknowns `y`, (times, n)."""
+        """Return force, level and growth at the times `t` with the unknowns `y`, (times, n)."""
         if integrator not in self._columns:
             rows = ca.vertcat(self.force, self.level, self.growth)
             self._columns[integrator] = Columns(integrator.of_time("held", rows))
@@ -209,7 +212,7 @@ class Held:
 
 
 def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
-    """Return warnings about a run that ended well; none where nothing is known against it."""
+    """Return warnings about a run that ended well; empty if there are none."""
     if not run.status.ok:
         return []
     found: list[UserWarning] = [
@@ -233,18 +236,18 @@ def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) ->
             t, y = t[k], y[k]
         force, level, growth = held.over_time(integrator, inputs, t, y, p)
         ratio = np.abs(force) / np.where(level > 0, level, np.inf)
-        start = max(1.0, ratio[0])  # it may have been given more than its level
+        start = max(1.0, ratio[0])  # the start value may exceed the level
         allowed = (1 + (MARGIN if held.fixed else WIDE)) * start
         ratio = ratio if held.fixed else np.where(growth > 0, ratio, 0.0)
         k = int(ratio.argmax())
         if ratio[k] > allowed:
             yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
-        elif most > allowed and not run.complete:  # between the times of the result
+        elif most > allowed and not run.complete:  # the peak is between the result times
             yield overload(held, most)
 
 
 def overload(held: Held, ratio: float, when: str = "") -> str:
-    """The sentence about friction of so many times its level."""
+    """Return the message about friction of `ratio` times its level."""
     law = type(held.contact.law).__name__
     return (
         f"In contact '{held.contact.name}' {law} carries {ratio:.3g} times its static level{when}: "
@@ -254,14 +257,14 @@ def overload(held: Held, ratio: float, when: str = "") -> str:
 
 
 def places(model: Model) -> tuple[Held, ...]:
-    """The contacts of a model whose law holds by its states."""
+    """Return the contacts of a model whose law sticks by its states."""
     if "held" not in model.memory:
         model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
     return model.memory["held"]
 
 
 def _held(model: Model, contact: Contact) -> Held | None:
-    """What its states carry; None where that, or the level, is not known."""
+    """Return the force that its states carry; None if the force or the level is unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
     z = symbols_of(contact.states)
@@ -284,7 +287,7 @@ def _held(model: Model, contact: Contact) -> Held | None:
 
 
 def _peaks(z: Array) -> NDArray[np.intp]:
-    """Where a state is farthest from zero, and just before; `LOOKS` of them at most."""
+    """Return indices of peaks of a state and the points before them; about `LOOKS` at most."""
     size = np.abs(z)
     inner = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])
     k = np.flatnonzero(inner.any(axis=1)) + 1
@@ -295,10 +298,10 @@ def _peaks(z: Array) -> NDArray[np.intp]:
 def of_members(
     model: Model, reach: Mapping[str, Array], p: Array, given: Collection[str]
 ) -> dict[int, str]:
-    """Member -> sentence, for runs that went so far.
+    """Return member -> message, for runs with these extreme states.
 
     Args:
-        reach: state -> least and greatest value, (2, members); NaN of those that did not start.
+        reach: state -> least and greatest value, (2, members); NaN for members that did not start.
         p: parameters, (members, np).
         given: states with start values of the user, which may be anywhere.
     """

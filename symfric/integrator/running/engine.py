@@ -1,4 +1,4 @@
-"""Run many attempts of a step without Python in between: in CasADi's virtual machine or compiled.
+"""Run many step attempts per call, either in CasADi's virtual machine or in compiled C.
 
 Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted step.
 """
@@ -26,8 +26,10 @@ Array = NDArray[np.float64]
 
 
 class Stop(IntEnum):
-    """Why an engine returned: also for what events ask for (`running.events`), and for algebraic
-    unknowns that have to be searched for behind a jump of inputs.
+    """Reason why an engine returned.
+
+    It includes requests of events (`running.events`) and algebraic unknowns that need a full search
+    after a jump of inputs.
     """
 
     END = 0
@@ -41,33 +43,35 @@ class Stop(IntEnum):
 
 
 STOPS = tuple(Stop)
-"""By number."""
+"""Reasons by number."""
 BATCH, FEW = 32, 8
-"""Attempts of one call of the virtual machine, and in intervals that do not take that many more."""
+"""Attempts per call of the virtual machine, and in intervals that need only a few."""
 
 
 class Engine(Protocol):
-    """Runs attempts until the end, a full record, a number of attempts or a tiny step."""
+    """Engine that runs attempts until the end, a full record, an attempt limit or a tiny step."""
 
     @property
     def name(self) -> str:
-        """What ran: vm or compiled."""
+        """Name of the engine: vm or compiled."""
         ...
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
         """Advance `work` over its input intervals, and fill its outputs.
 
-        A step that fell below its `h_min`, or below what rounding leaves of t (`FLOOR`), stops it.
+        A step below `h_min`, or below the resolution of t (`FLOOR`), stops it.
 
         Returns:
-            Records that the next call writes over, the attempts made and why it stopped.
+            Records (overwritten by the next call), the attempts made and the reason to stop.
         """
         ...
 
 
 @final
 class _Batch:
-    """Attempts of one call of the virtual machine, with buffers of their own."""
+    """Buffers and mapped function for a fixed number of attempts in one call of the virtual
+    machine.
+    """
 
     def __init__(self, step: ca.Function, size: int) -> None:
         self.size = size
@@ -80,10 +84,11 @@ class _Batch:
 @final
 @dataclass(frozen=True, eq=False)
 class VmEngine:
-    """Attempts in CasADi's virtual machine, in batches of one call; needs no compiler.
+    """Engine in CasADi's virtual machine: batches of attempts in one call; needs no compiler.
 
-    The same attempts as in the compiled loop, to the bit: both evaluate one graph operation by
-    operation, each rounded once (`compiled.compiler.FLAGS`), with one library of functions.
+    It makes the same attempts as the compiled loop, bit for bit: both evaluate one graph operation
+    by
+    operation, each rounded once (`compiled.compiler.FLAGS`), with one math library.
     """
 
     step: ca.Function
@@ -94,11 +99,13 @@ class VmEngine:
 
     @classmethod
     def of(cls, step: ca.Function, size: int = BATCH, follows: bool = False) -> "VmEngine":
-        """The engine for a step Function; algebraic unknowns, if any, `follow` jumps of inputs."""
+        """Return the engine for a step Function; with `follows`, unknowns follow jumps of
+        inputs.
+        """
         return cls(step, size, follows)
 
     def _batch(self, size: int) -> "_Batch":
-        """So many attempts; buffers that nobody else has, to be given back."""
+        """Return a free batch of `size` attempts, to be given back after use."""
         try:
             return self._batches.setdefault(size, []).pop()
         except IndexError:
@@ -114,9 +121,9 @@ class VmEngine:
         events: Eventful | None,
         size: int,
     ) -> tuple[Array, int, Stop]:
-        """Advance S; return the records, the attempts made and why it stopped.
+        """Advance S; return the records, the attempts made and the reason to stop.
 
-        With `events` these are carried out on the way; `size` attempts are made in one call.
+        Events in `events`, if given, are carried out; `size` attempts are made in one call.
         """
         batch, search = self._batch(size), None if events is None else events.search
         S_out, D = batch.S_out, batch.D
@@ -138,7 +145,7 @@ class VmEngine:
                 S_out[-1, State.T] < t_end
                 and S_out[:, State.H].min() >= surely
                 and size <= min(rows - count, attempts - made)
-            ):  # a batch goes beyond what the compiled loop would do: that is not taken
+            ):  # discard attempts of the batch that the compiled loop would not make
                 room = np.cumsum(took) - took < rows - count
                 goes = (before[:, State.T] < t_end) & _large(before, h_min) & room
                 used = min(size if goes.all() else int(np.argmin(goes)), attempts - made)
@@ -166,7 +173,7 @@ class VmEngine:
         return records, made, Stop(asked) if asked else _reason(S, R, full, h_min)
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work`; return the records, the attempts made and why it stopped."""
+        """Advance `work`; return the records, the attempts made and the reason to stop."""
         loop, found, count, made = work.loop, list[Array](), 0, 0
         size = self.size
         if work.events is not None:
@@ -200,12 +207,13 @@ def _searched(
     attempts: tuple[NDArray[np.bool_], int],
     R: Array,
 ) -> tuple[Array, int, Happened]:
-    """Records of a batch up to the first events in it, how many attempts, what events ask for.
+    """Return the records of a batch up to its first events, the attempts used and the event
+    request.
 
     Args:
-        records, S_out: of the batch; the attempt that led to events goes on behind them.
-        attempts: which were accepted, and how many count.
-        R: what was given.
+        records, S_out: of the batch; the attempt that led to events continues after them.
+        attempts: mask of accepted attempts, and how many attempts count.
+        R: run data of the batch.
     """
     took, used = attempts
     accepted, i = np.flatnonzero(took), 0
@@ -219,7 +227,7 @@ def _searched(
 
 
 def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
-    """Whether the steps of columns S (..., MEMORY + n) are large enough to go on; NaN is not."""
+    """Return True if the steps of columns S (..., MEMORY + n) are long enough; False for NaN."""
     return S[..., State.H] >= np.maximum(h_min, FLOOR * np.abs(S[..., State.T]))
 
 
@@ -234,7 +242,7 @@ def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:
 @final
 @dataclass(frozen=True, eq=False)
 class CompiledEngine:
-    """Attempts in a compiled loop around the generated C of the step; releases the GIL."""
+    """Engine in a compiled loop around the generated C of the step; releases the GIL."""
 
     library: ctypes.CDLL
     name: str = "compiled"
@@ -251,7 +259,7 @@ class CompiledEngine:
     ) -> "CompiledEngine":
         """Compile the loop of these parts (`loop_source`), or load it from the cache.
 
-        `source` is its C where that is written.
+        `source` is its C if already generated.
         """
         source = source or loop_source(step, dense_rows, crossings, follows, follow)
         library = load(source, "symfric_march")
@@ -260,7 +268,9 @@ class CompiledEngine:
         return cls(library)
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work`; return records in its buffer, the attempts made and why it stopped."""
+        """Advance `work`; return records in its buffer, the attempts made and the reason to
+        stop.
+        """
         loop, outputs = work.loop, work.outputs
         loop.max_attempts, loop.found = attempts, outputs.found
         reason = self.library.symfric_march(work.address)

@@ -1,7 +1,7 @@
-"""Events: zero crossings in accepted steps, located, and carried out.
+"""Events: zero crossings in accepted steps, located and carried out.
 
-The search in the virtual machine, and what both engines tell of it. It is written a second time in
-C (`search.c`), operation by operation.
+This is the search for the virtual machine, and the types that both engines share. `search.c`
+repeats the search in C, operation by operation.
 """
 
 from collections.abc import Callable
@@ -34,11 +34,11 @@ from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]
 JUMPS = 512
-"""Jumps between two looks at what came of them."""
+"""Jumps recorded between two returns of an engine."""
 
 
 class Change(IntEnum):
-    """What the search changed of a step."""
+    """Change of a step by the search."""
 
     NOTHING = 0
     RESUMED = 1
@@ -47,7 +47,7 @@ class Change(IntEnum):
 
 
 class Happened(IntEnum):
-    """What events ask for."""
+    """Action requested by events."""
 
     NOTHING = 0
     TERMINAL = 4
@@ -58,12 +58,12 @@ class Happened(IntEnum):
 @final
 @dataclass(eq=False)
 class Eventful:
-    """The events of one run under way: what engines read and write beside the steps.
+    """Event data of a run in progress, which engines read and write.
 
     Attributes:
         crossings: of the model.
         tolerance: of event times [s].
-        steps: accepted ones in the call of an engine that is under way.
+        steps: accepted steps in the current engine call.
         memory: see `Memory`.
         rows: records of jumps, the first `count` of them in use.
     """
@@ -86,34 +86,34 @@ class Eventful:
 
     @property
     def full(self) -> bool:
-        """Whether there is no room for another jump."""
+        """True if the record of jumps is full."""
         return self.count >= self.rows.shape[0]
 
     @property
     def pointers(self) -> tuple[int, int, int]:
-        """Addresses of the memory and of the rows, and the room there, for compiled code."""
+        """Addresses of memory and rows, and the number of rows, for compiled code."""
         return self.memory.ctypes.data, self.rows.ctypes.data, self.rows.shape[0]
 
     def jumps(self, steps: int) -> Jumps:
-        """Those of the last run of an engine, with `steps` steps before it."""
+        """Return the jumps of the last engine call, made after `steps` accepted steps."""
         return Jumps.of(self.rows[: self.count], self.crossings.record.n, steps)
 
     def entered(self) -> None:
-        """Run data jump: what the events were with those before is what they were at the end of
-        the last step, or before a jump there.
+        """Mark a jump of the run data: the stored values are those at the end of the last step, or
+        before a jump there.
         """
         if self.memory[Memory.PHASE] == Memory.ON:
             self.memory[Memory.PHASE] = Memory.JUMPED
 
     def jumped(self, before: Array) -> None:
-        """Start behind a jump where the events had the values `before` it."""
+        """Start just after a jump; `before` are the event values before it."""
         self.memory[Memory.PHASE] = Memory.JUMPED
         self.memory[Memory.before(self.crossings.count)] = before
 
 
 @final
 class Search:
-    """The search for events behind each accepted step, as the compiled loop makes it."""
+    """Event search after each accepted step, equal to that of the compiled loop."""
 
     def __init__(self, eventful: Eventful) -> None:
         self.eventful, self.crossings = eventful, eventful.crossings
@@ -152,11 +152,13 @@ class Search:
         return done
 
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
-        """Look for events in the accepted step `row`, which led to S.
+        """Search the accepted step `row`, which led to S, for events.
 
-        The first ones are carried out: the row is cut there, S goes on behind them. Where they
-        happen at the very start of the step, no row is left. Without events S may get a longer
-        step, if there was one just before.
+        The first events are carried out: the row is cut there and S continues after them. If they
+        happen
+        at the very start of the step, the row is dropped. Without events the step in S may be
+        lengthened
+        if a previous event shortened it.
         """
         d = R[R.size - self.crossings.data :]
         found = self._crossing(row, d)
@@ -181,13 +183,14 @@ class Search:
         steps = self.eventful.steps
         self.eventful.rows[self.eventful.count] = [steps, t, size, *before, *after, *which]
         self.eventful.count += 1
-        # steps beyond the event say nothing; its own is a guess only, what follows may be faster
+        # the step size after an event is a guess: the earlier ones are no guide, dynamics may be
+        # faster
         again = max(min(h, RESTART * self.tolerance), LEAST * h, SURE * abs(t))
         S[:] = State.at(t, again, after)
         return (Change.CUT if kept else Change.DROPPED), self._asked(t, which)
 
     def _resume(self, S: Array, h_max: float) -> Change:
-        """Go back to the step that an event cut."""
+        """Restore the step size from before an event."""
         h = min(float(self.memory[Memory.RESUME]), h_max)
         self.memory[Memory.RESUME] = 0.0
         if S[State.H] >= h:
@@ -196,7 +199,7 @@ class Search:
         return Change.RESUMED
 
     def _asked(self, t: float, which: NDArray[np.bool_]) -> Happened:
-        """What the events `which` at time `t` ask for."""
+        """Return the action that the events `which` at time `t` request."""
         if any(over for over, here in zip(self.crossings.terminal, which, strict=True) if here):
             return Happened.TERMINAL
         if storm(self.memory, t, which):
@@ -204,10 +207,10 @@ class Search:
         return Happened.FOLLOW if self.crossings.follows else Happened.NOTHING
 
     def _crossing(self, row: Array, d: Array) -> tuple[float, NDArray[np.bool_]] | None:
-        """Where in the step the first events happen, and which.
+        """Return the place of the first events in the step and a mask of them; None without events.
 
-        Just after a jump, the signs behind it are those a few tolerances later; an expression that
-        the jump carried through zero, not just to zero, is an event at the very start.
+        Just after a jump, signs are evaluated a few tolerances later; an expression that the jump
+        carried through zero, not just to zero, is an event at the very start.
         """
         memory, count = self.memory, self.crossings.count
         h, low = float(row[Record.T1] - row[Record.T0]), 0.0
@@ -236,16 +239,16 @@ class Search:
         return None
 
     def _inside(self, row: Array, d: Array, theta: float) -> Array:
-        """Values of the events within a step."""
+        """Return the event values at `theta` within a step."""
         return self._values(np.array([theta]), row, d)[0].copy()
 
     def _doubted(self, noise: Array, g: Array) -> Array:
-        """Of each piece between values at five places, whether events are in doubt there."""
+        """Return, for each piece between five places and each event, nonzero if it is in doubt."""
         return self._doubts(g.ravel(), noise)[0].reshape(-1, g.shape[1]).copy()
 
 
 def _called(function: ca.Function) -> Callable[..., list[Array]]:
-    """`function` of flat arrays, with a buffer of its own that its results lie in."""
+    """Return `function` as a callable of flat arrays that reuses one result buffer."""
     arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
     results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
     call = bound(function, arguments, results)
@@ -260,13 +263,13 @@ def _called(function: ca.Function) -> Callable[..., list[Array]]:
 
 
 def storm(memory: Array, t: float, which: NDArray[np.bool_]) -> bool:
-    """Whether the events `which` at time `t` complete a storm; they are remembered.
+    """Record the events `which` at time `t`; return True if they complete a storm.
 
-    Events that pile up at one time (Zeno) must not let the clock stand still. A storm is four
-    events of one kind in a row at distances that shrink like a geometric series with less than a
-    thousand event tolerances still to come; or a hundred events less than a few tolerances, or
-    roundings of the clock, apart. Events that are merely many, of a fast machine or within a long
-    run, are none.
+    Events that accumulate at one time (Zeno) must not stop the clock. A storm is four consecutive
+    events of one kind whose intervals shrink like a geometric series with less than a thousand
+    event tolerances still to come, or a hundred events less than a few tolerances, or roundings of
+    the clock, apart. Frequent events of a fast machine, or many events in a long run, are not a
+    storm.
     """
     last, times = memory[Memory.last(which.size)], memory[Memory.TIMES]
     memory[Memory.ALIKE] = memory[Memory.ALIKE] + 1 if (last == which).all() else 1

@@ -1,4 +1,4 @@
-"""The adaptive integrator of one model: built once, run for any numbers."""
+"""Adaptive integrator of one model: built once, run for any numbers."""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
@@ -34,17 +34,18 @@ Point = tuple[bytes | float, ...]
 Parts = tuple[ca.Function, int, Crossings | None, bool, Following | None]
 Orders = tuple[tuple[str, Order], ...]
 JUDGED = 4
-"""Arguments of `Integrator.suited` whose answers are remembered."""
+"""Number of argument sets of `Integrator.suited` whose results are cached."""
 
 INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
-same form."""
+same form.
+"""
 
 EVENT_BATCH = 8
-"""Attempts of one call of the virtual machine with events; those behind one are made in vain."""
+"""Attempts per virtual machine call with events; attempts after an event are wasted."""
 
 SPARE = 2
-"""Sets of buffers kept: one for a run, one for a run within its callback."""
+"""Buffer sets kept: one for a run, one for a run within its callback."""
 
 
 @final
@@ -52,10 +53,12 @@ SPARE = 2
 class Integrator:
     """System, step and Functions of a model with one structure of inputs.
 
-    Which engine runs is a question of speed alone: both give the same bits.
+    The engine affects speed only: both give the same bits.
 
-    Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
-    which it decides when compiling pays, the last start, and others of its kind with other pivots.
+    Mutable state is only a cache: engines, the time spent in the virtual machine (from which it
+    decides
+    when compiling saves time), the last start, and integrators of the same system with other
+    pivots.
     """
 
     model: Model
@@ -86,21 +89,24 @@ class Integrator:
         self.build_time = perf_counter() - begin
 
     def _written(self) -> str:
-        """C of the loop."""
+        """Return the C of the loop."""
         return loop_source(*self._parts)
 
     def _schedules(self) -> tuple[str, ...]:
-        """Event expressions in time alone, serialised: error control sees nothing of them."""
+        """Return event expressions that depend on time only, serialised; error control does not
+        see them.
+        """
         own, t = [ca.SX(event.expression) for event in self.model.events], self.model.t
         alone = (e for e in own if not any(not ca.is_equal(s, t) for s in ca.symvar(e)))
         return tuple(ca.SX.serialize(e) for e in alone)
 
     def _event_function(self) -> ca.Function:
-        """Event expressions (t, y, d), where algebraic unknowns solve their equations.
+        """Return the event expressions (t, y, d), with algebraic unknowns that solve their
+        equations.
 
-        Within a step they do to the tolerance, and behind an event exactly: without one step of
-        Newton's method an event that depends on them may pass through zero a second time there.
-        Those of a mechanism are left as they are.
+        Within a step these unknowns are accurate to the tolerance, and after an event exact.
+        Without one step of Newton's method an event that depends on them may pass through zero a
+        second time there. Those of a mechanism are unchanged.
         """
         values = stacked(ca.SX(e.expression) for e in self.model.events)
         events, s = self.of_time("events", ca.densify(values)), self.system
@@ -112,12 +118,12 @@ class Integrator:
         return ca.Function("events", [t, s.y, s.d], [solved], {"cse": True})
 
     def _reset_function(self) -> ca.Function:
-        """Values of all resets, event after event, as a Function (t, y, d)."""
+        """Return the values of all resets, event after event, as a Function (t, y, d)."""
         resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
         return self.of_time("resets", stacked(resets))
 
     def _crossings(self) -> Crossings:
-        """What the search for events evaluates."""
+        """Return the Functions of the event search."""
         manifold = self.system.manifold
         return crossings(
             self.model.events,
@@ -131,7 +137,9 @@ class Integrator:
         )
 
     def _sizes(self) -> ca.Function:
-        """What t and y contribute to event expressions (t, y, d), in magnitude."""
+        """Return the magnitudes of the contributions of t and y to event expressions, as a
+        Function (t, y, d).
+        """
         s, t = self.system, ca.SX.sym("time")
         values = stacked(ca.SX(e.expression) for e in self.model.events)
         own = ca.vertcat(t, s.y)
@@ -139,7 +147,7 @@ class Integrator:
         return ca.Function("sizes", [t, s.y, s.d], [ca.fabs(slopes) @ ca.fabs(own)])
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
-        """`expression` of the model as a Function (t, y, d), inputs put in."""
+        """Return `expression` of the model as a Function (t, y, d) with the inputs inserted."""
         s, t = self.system, ca.SX.sym("time")
         driven = ca.substitute(expression, self.model.vector("u"), self.inputs.expression)
         if s.timed:
@@ -148,17 +156,17 @@ class Integrator:
 
     @cached_property
     def follows(self) -> bool:
-        """Whether there are algebraic unknowns, which follow jumps."""
+        """True if there are algebraic unknowns, which follow jumps."""
         return bool(self.system.free.any()) or self.system.manifold is not None
 
     @cached_property
     def follow(self) -> Following | None:
-        """How algebraic unknowns follow a jump of inputs or of states; None without any."""
+        """Update of algebraic unknowns after a jump of inputs or states; None without any."""
         return following(self.system)
 
     @property
     def _every(self) -> ca.SX:
-        """All signals of the model, modes as the whole numbers that they are."""
+        """All signals of the model, with modes as integers."""
         m = self.model
         x = (in_results(v.kind, v.symbol) for v in m.x)
         outputs = (ca.SX(o.expression) for o in m.outputs.values())
@@ -170,9 +178,9 @@ class Integrator:
         return self.refined(self._every)
 
     def refined(self, expression: ca.SX) -> ca.Function:
-        """`expression` of the model as a Function (t, y, d), that of a mechanism refined.
+        """Return `expression` as a Function (t, y, d), for a mechanism with refined unknowns.
 
-        Between steps the constraints of a mechanism hold to the tolerance only, at results exactly.
+        Between steps the constraints of a mechanism hold to the tolerance only, in results exactly.
         """
         signals, manifold = self.of_time("signals", expression), self.system.manifold
         if manifold is None:
@@ -182,17 +190,17 @@ class Integrator:
 
     @cached_property
     def signal_columns(self) -> Columns:
-        """The signals at many times."""
+        """Signals at many times."""
         return Columns(self.signals)
 
     @cached_property
     def plain_signal_columns(self) -> Columns:
-        """The signals at many times as they are, drift of constraints included."""
+        """Signals at many times without refinement, drift of constraints included."""
         return Columns(self.of_time("signals", self._every))
 
     @cached_property
     def states(self) -> Columns | None:
-        """States at many times from (y, d) there; None where those of y are what they should be.
+        """Projection of states at many times from (y, d); None if y needs none.
 
         Between steps the loops of a mechanism are closed to the tolerance only.
         """
@@ -203,45 +211,46 @@ class Integrator:
         return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
 
     def start(self, y: Array, d: Array) -> Array:
-        """`y` with consistent algebraic unknowns; remembered, for runs from one start.
+        """Return `y` with consistent algebraic unknowns; cached, for runs from one start.
 
         Raises:
-            ValueError: none near.
+            ValueError: no consistent values near.
         """
         if not self.follows:
             return y
         key = (y.tobytes(), d.tobytes())
         found = self._starts.get(key)
-        if found is None:  # another thread may remember another one meanwhile
+        if found is None:  # another thread may cache another one meanwhile
             found = self.consistent(f"model '{self.model.name}'", y, d)
             self._starts = {key: found}
         return found
 
     def consistent(self, where: str, y: Array, d: Array) -> Array:
-        """`y` with consistent algebraic unknowns.
+        """Return `y` with consistent algebraic unknowns.
 
         Raises:
-            ValueError: none near; `where` begins its sentence.
+            ValueError: no consistent values near; the message begins with `where`.
         """
         manifold = self.system.manifold
-        # normal forces are found from afar; what nothing drives seldom starts twice
+        # normal forces need the full search; models without inputs seldom need a second start
         quick = manifold is not None and not manifold.applied and bool(self.model.u)
         return consistent(self.system, where, y, d, self.follow if quick else None)
 
     @cached_property
     def has_pivots(self) -> bool:
-        """Whether there is a choice of pivots, which may be sound here and not there."""
+        """True if pivots have to be chosen, which may be stable at one point and not at another."""
         return self.system.manifold is None and not self.system.is_ode
 
     def suited(self, points: Sequence[tuple[Array, Array]], span: float) -> "Integrator":
-        """The integrator itself, or one of the same model whose pivots are sound.
+        """Return this integrator, or one of the same model with stable pivots.
 
-        Which one depends on the arguments alone, not on what was run before.
+        The result depends on the arguments only, not on earlier runs.
 
         Args:
-            points: (y, d) where a run has to get through, the newest last; algebraic unknowns of
-                the first follow.
-            span: its length [s].
+            points: (y, d) that a run has to pass, the newest last; algebraic unknowns of the first
+            one
+                are computed.
+            span: duration of the run [s].
         """
         if not self.has_pivots:
             return self
@@ -257,26 +266,26 @@ class Integrator:
         return found
 
     def _other(self, whole: System) -> "Integrator":
-        """The integrator of the same equations with other pivots, built once."""
+        """Return the integrator of the same equations with other pivots, built once."""
         orders = tuple(sorted(whole.orders.items()))
         if orders not in self._others:
             self._others[orders] = Integrator(self.model, self.inputs, self.tableau, whole)
         return self._others[orders]
 
     def borrow(self) -> Work:
-        """Buffers for a run, which nobody else has: threads and callbacks may run another one."""
+        """Return buffers for exclusive use by a run; threads and callbacks may run another one."""
         try:
             return self._spare.pop()
         except IndexError:
             return Work(self.system.n, self.step.numel_in(1), self.tableau.H.shape[0])
 
     def give_back(self, work: Work) -> None:
-        """Buffers that a run needs no longer; a few are kept for the next one."""
+        """Return buffers after a run; a few are kept for the next one."""
         if len(self._spare) < SPARE:
             self._spare.append(work)
 
     def vm(self) -> Engine:
-        """The engine that needs no compiler."""
+        """Return the engine that needs no compiler."""
         if "vm" not in self._engines:
             size = EVENT_BATCH if self.model.events else BATCH
             self._engines["vm"] = VmEngine.of(self.step, size, self.follows)
@@ -284,17 +293,17 @@ class Integrator:
 
     @property
     def _parts(self) -> Parts:
-        """What the compiled loop is made of."""
-        # what nothing drives seldom jumps: not worth the compiler's time
+        """Arguments from which the compiled loop is built."""
+        # models without inputs and events seldom jump: not worth the compile time
         jumps = bool(self.model.u or self.model.events)
         follow = self.follow if self.follows and jumps else None
         return self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow
 
     def compiled(self) -> Engine:
-        """The compiled engine; compiles, or loads from the cache, on first use.
+        """Return the compiled engine; compiles, or loads from the cache, on first use.
 
         Raises:
-            CompileError: there is no compiler, or it failed.
+            CompileError: no compiler was found, or it failed.
         """
         if "compiled" not in self._engines:
             begin = perf_counter()
@@ -304,11 +313,11 @@ class Integrator:
         return self._engines["compiled"]
 
     def choose(self, backend: str, left: float) -> Engine:
-        """The engine for `backend`; "auto" compiles when that is predicted to pay.
+        """Return the engine for `backend`; "auto" compiles if that is expected to save time.
 
         Args:
             backend: "vm", "compiled" or "auto".
-            left: predicted time [s] that the virtual machine still needs, 0 where unknown.
+            left: predicted time [s] that the virtual machine still needs, 0 if unknown.
         """
         if backend == "compiled":
             return self.compiled()
@@ -319,20 +328,21 @@ class Integrator:
         if self.prospect.pays(max(left, self.vm_time)):
             try:
                 return self.compiled()
-            except CompileError:  # a broken compiler is no reason not to simulate
+            except CompileError:  # simulate in the VM if the compiler is broken
                 self.prospect.hopeless = True
         return self.vm()
 
 
 REMEMBERED = 16
-"""Integrators kept per model; the oldest goes first."""
+"""Integrators cached per model; the oldest is dropped first."""
 
 
 def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, bool]:
-    """The integrator of this model, structure of inputs and method; whether it was built just now.
+    """Return the integrator of this model, input structure and method, and True if it is new.
 
-    The model holds it, not a table of models: an integrator refers to its model, and a table would
-    keep both alive for ever.
+    The cache belongs to the model: an integrator refers to its model, and a global table would keep
+    both
+    alive for ever.
     """
     known: dict[Hashable, Integrator] = model.memory.setdefault("integrators", {})
     key = (method.name, method.finer, inputs.key)

@@ -1,4 +1,4 @@
-/* The signals of every plant where it stands. */
+/* Computes the signals of all plants at their current times. */
 void symfric_look(const symfric_members *m, double *out)
 {
   double w[$w];

@@ -1,10 +1,9 @@
-"""The compiled loop around the step, in pieces of C: attempts, events, outputs, input intervals.
+"""Compiled loop around the step, assembled from C templates: attempts, events, outputs, intervals.
 
-`attempts.c` makes steps with one set of run data, and looks for events behind them by `search.c`,
-which does what `running.events` does in Python; `march.c` goes on from input interval to input
-interval and writes the unknowns at the times of the result on the way. What it needs stands in one
-struct, so that a call from Python hands over one address (`Work`). These files are templates: what
-begins with a dollar is filled in.
+`attempts.c` makes steps with one set of run data and searches them for events with `search.c`,
+which matches `running.events` in Python. `march.c` advances over the input intervals and writes the
+unknowns at the times of the result. All data are in one struct, so a call from Python passes a
+single address (`Work`). Names that begin with a dollar in the templates are substituted.
 """
 
 import ctypes
@@ -38,16 +37,16 @@ from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 
 Array = NDArray[np.float64]
 MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20
-"""Accepted steps that a buffer holds, and its size in memory, which is kept between runs."""
+"""Limits of accepted steps in a buffer, and its size in bytes; the buffer is kept between runs."""
 
 
 def width(n: int, dense_rows: int) -> int:
-    """Length of a record row (t0, t1, y0, y1, D)."""
+    """Return the length of a record row (t0, t1, y0, y1, D)."""
     return 2 + 2 * n + dense_rows * n
 
 
 class Loop(ctypes.Structure):
-    """`symfric_loop` of the C below, field by field."""
+    """Struct `symfric_loop` of the C code, field by field."""
 
     _fields_ = (
         *(
@@ -65,14 +64,14 @@ class Loop(ctypes.Structure):
 
 @final
 class Work:
-    """The numbers of one run under way, where engines find them; used again by later runs.
+    """Buffers of one run, shared with the engines; reused by later runs.
 
     Attributes:
-        S, R: the step's memory and unknowns, and what an attempt does not change.
+        S, R: memory and unknowns of the step, and the constant data of an attempt.
         rows: buffer of records.
         loop: counters, limits and addresses.
-        outputs: what is wanted at given times.
-        events: what is remembered of events; None of a model without any.
+        outputs: requested values at given times.
+        events: state of the event search; None for a model without events.
     """
 
     def __init__(self, n: int, given: int, dense_rows: int, rows: int | None = None) -> None:
@@ -90,7 +89,7 @@ class Work:
         self.breaks, self.data = np.zeros(2), np.zeros((0, 1))
 
     def over(self, breaks: Array, data: Array) -> None:
-        """Go over input intervals between `breaks` (k + 1,), with `data` (n_data, k) on each."""
+        """Set the input intervals: `breaks` (k + 1,) and the `data` (n_data, k) on each of them."""
         loop, self.breaks, self.data = self.loop, breaks, data
         loop.intervals, loop.n_data = breaks.size - 1, data.shape[0]
         if breaks.size > 2:
@@ -99,18 +98,18 @@ class Work:
         self.enter(0)
 
     def interval(self, times: Array) -> NDArray[np.intp]:
-        """Number of the input interval of each time; at a break the later one."""
+        """Return the index of the input interval of each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
     def enter(self, interval: int) -> None:
-        """Begin an input interval: its end and its data."""
+        """Start an input interval: set its end and its data."""
         self.loop.interval = interval
         self.R[Given.T_END] = self.breaks[interval + 1]
         if self.data.shape[0]:
             self.R[-self.data.shape[0] :] = self.data[:, interval]
 
     def want(self, outputs: Outputs, events: Eventful | None) -> None:
-        """Fill `outputs`, and carry out `events`."""
+        """Set the `outputs` to fill and the `events` to carry out."""
         loop, self.outputs, self.events = self.loop, outputs, events
         loop.n_times = outputs.times.size
         loop.times, loop.out = address(outputs.times), address(outputs.values)
@@ -119,7 +118,7 @@ class Work:
 
 
 def filled(name: str, /, **numbers: object) -> str:
-    """C of a template of this folder."""
+    """Return the C of a template of this folder with `numbers` substituted."""
     text = Path(__file__).with_name(name).read_text(encoding="utf-8")
     return Template(text).substitute(numbers)
 
@@ -130,10 +129,10 @@ def c_source(
     *others: ca.Function,
     crossings: Crossings | None = None,
 ) -> str:
-    """C of the step as CasADi generates it, with the attempts that call it until they must stop.
+    """Return the CasADi C of the step with the attempt loop that calls it until it must stop.
 
-    `others` are Functions that further C calls by their names. A model without events has nothing
-    of the search for them in its code.
+    `others` are Functions that further C calls by name. Without events, the code has no event
+    search.
     """
     generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
     called = (step, *(crossings.functions if crossings else ()))
@@ -158,13 +157,13 @@ def loop_source(
     follows: bool = False,
     follow: Following | None = None,
 ) -> str:
-    """C of the whole loop.
+    """Return the C of the whole loop.
 
     Args:
         step, dense_rows: one attempt.
         crossings: events.
-        follows: whether there are algebraic unknowns, which follow a jump of inputs.
-        follow: how; where it is left out, the loop returns at each jump, and at each event.
+        follows: True if there are algebraic unknowns, which follow a jump of inputs.
+        follow: update of these unknowns; without it the loop returns at each jump and each event.
     """
     others = () if follow is None else (follow.round,)
     march = filled(
@@ -178,7 +177,7 @@ def loop_source(
 
 
 def search_source(crossings: Crossings | None, given: int) -> str:
-    """C of the search in an accepted step, to be called behind it; none without events.
+    """Return the C of the event search in an accepted step, empty without events.
 
     `given` is the length of R.
     """
@@ -219,5 +218,5 @@ def search_source(crossings: Crossings | None, given: int) -> str:
 
 
 def _table(values: Iterable[int]) -> str:
-    """Entries of a C array, which has at least one."""
+    """Return the entries of a C array, at least one."""
     return ", ".join(str(int(value)) for value in values) or "0"

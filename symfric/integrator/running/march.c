@@ -1,10 +1,10 @@
-/* The whole loop. FOLLOWS is 0 without algebraic unknowns; 1 where it returns at each jump of inputs,
-   as they are searched for; 2 where they follow by `symfric_follow`. Where it SETTLES, they do so
-   behind events, too. */
+/* Complete loop. FOLLOWS is 0 without algebraic unknowns; 1 if it returns at each jump of inputs,
+   for a search in Python; 2 if `symfric_follow` updates them. With SETTLES they are also updated
+   after events. */
 #define FOLLOWS $follows
 #define SETTLES $settles
 
-/* A run under way: buffers, limits, and how far it is. */
+/* Run in progress: buffers, limits and counters. */
 typedef struct {
   double *S, *R, *rows;
   const double *times;
@@ -16,7 +16,7 @@ typedef struct {
   long long count, made, jumped;
 } symfric_loop;
 
-/* Unknowns at the times within an accepted step, out[unknown][time]; at its end if it is last. */
+/* Writes unknowns at the times within an accepted step, out[unknown][time]; at its end if last. */
 static void symfric_outputs(symfric_loop *L, const double *row, int last)
 {
   long long i, r;
@@ -34,8 +34,8 @@ static void symfric_outputs(symfric_loop *L, const double *row, int last)
   }
 }
 
-/* Steps over all input intervals, up to a full record, a number of attempts, a tiny step, or what
-   events ask for; 7 where algebraic unknowns have to be searched for behind a jump of inputs. */
+/* Makes steps over all input intervals, up to a full record, an attempt limit, a tiny step, or a
+   request of events. Returns 7 if algebraic unknowns need a full search after a jump of inputs. */
 int symfric_march(symfric_loop *L)
 {
   L->count = L->made = L->jumped = 0;

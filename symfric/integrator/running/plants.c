@@ -1,10 +1,10 @@
-/* Plants go from sample to sample by the attempts of `attempts.c`, without records. */
+/* Advances plants from sample to sample by the attempts of `attempts.c`, without records. */
 enum { NU = $nu, DATA = $data, HELD = $held };
 #if !$follows
 static int symfric_follow(double *y, const double *d) { return 0; }
 #endif
 
-/* Attempts towards R[T_END]; why they ended. */
+/* Makes attempts towards R[T_END]; returns the reason to stop. */
 static int symfric_runs(const symfric_members *m, double *S, const double *R, long long *made)
 {
   long long counts[3];
@@ -13,7 +13,7 @@ static int symfric_runs(const symfric_members *m, double *S, const double *R, lo
   return why;
 }
 
-/* New inputs and the time of the next sample; whether algebraic unknowns could follow. */
+/* Sets new inputs and the next sample time; returns 0 if algebraic unknowns could not follow. */
 static int symfric_takes_over(const symfric_members *m, long long b)
 {
   double *R = m->R + b * GIVEN;
@@ -25,7 +25,7 @@ static int symfric_takes_over(const symfric_members *m, long long b)
   return m->ready[b] || !symfric_follow(m->S + b * (MEM + N) + MEM, R + DATA);
 }
 
-/* All plants go to their next sample; how many did not get there. */
+/* Advances all plants to their next sample; returns how many did not get there. */
 long long symfric_plants(const symfric_members *m, int begin)
 {
   long long b, failed = 0;

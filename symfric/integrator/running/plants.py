@@ -1,4 +1,4 @@
-"""Plants that go from sample to sample with inputs held: all of them in one call, without records.
+"""Sampled plants with held inputs: all of them advance by one call, without records.
 
 As in `symfric.integrator.running.engine` there are two engines, which do the same operations in one
 order: a loop in C around the generated step, and one in Python around CasADi's virtual machine.
@@ -28,36 +28,38 @@ from symfric.integrator.step.layout import Given, State
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
-"""Why a plant stands: at its sample, out of attempts, steps fell to nothing, its algebraic unknowns
-are too far from the last ones to follow (`symfric.integrator.equations.following`), it stands no
-more because somebody has helped it, events pile up, a terminal event has ended its run."""
+"""State of a plant: at its sample; out of attempts; steps too small; algebraic unknowns too far
+from the last ones to follow (`symfric.integrator.equations.following`); resolved by the caller, to
+be continued; event storm; ended by a terminal event.
+"""
 SAMPLES = 1000
-"""A plant begins with the first step of a run of so many samples."""
+"""The first step of a plant is that of a run of this many samples."""
 REFUSED = -1
-"""What `Advance` returns where an input is no finite number, and nothing has happened."""
+"""Return value of `Advance` if an input is not finite; nothing has changed then."""
 
 Advance = Callable[[int], int]
-"""Take over inputs and go on to the next sample (1), or on with those that are to go AGAIN (0); how
-many plants did not get there."""
+"""Function that takes over inputs and goes to the next sample (1), or continues plants marked AGAIN
+(0); returns the number of plants that did not get there.
+"""
 
 
 @final
 @dataclass(eq=False)
 class Plants:
-    """What changes in plants of one model; both engines work on these arrays, row by row in memory.
+    """Mutable data of plants of one model; both engines work on these arrays, row by row in memory.
 
     Attributes:
-        S, R: columns of an attempt, a row each plant (`symfric.integrator.step.layout`).
+        S, R: columns of an attempt, one row per plant (`symfric.integrator.step.layout`).
         u: inputs to hold next, shape (plants, nu); the last run data are those held now.
         begin: start times [s]; the k-th sample of a plant is at begin + k dt.
-        count: k; it stays where a plant has not reached it.
-        ready: whether its algebraic unknowns fit the inputs to hold next already.
-        why: END ... SEARCH.
+        count: k; unchanged for a plant that has not reached its sample.
+        ready: 1 if its algebraic unknowns already match the inputs to hold next.
+        why: END ... OVER.
         made: attempts in its last interval.
         dt: interval [s].
-        attempts: allowed in one.
-        h_min: step [s] below which a plant stands.
-        memory: what is remembered of events, a row each plant; without columns if there are none.
+        attempts: allowed in one interval.
+        h_min: least step [s].
+        memory: event memory, one row per plant; without columns if there are no events.
         happened: (plant, time [s], name) of the events of the last interval.
     """
 
@@ -76,26 +78,26 @@ class Plants:
     happened: list[tuple[int, float, str]] = field(default_factory=list[tuple[int, float, str]])
 
     def first_step(self) -> float:
-        """Step [s] that a start tries: that of a run of `SAMPLES` samples."""
+        """Return the first step [s] to try: that of a run of `SAMPLES` samples."""
         return min(first_step(SAMPLES * self.dt, self.begin[0]), float(self.R[0, Given.H_MAX]))
 
     def copy(self) -> "Plants":
-        """The same, in memory of its own."""
+        """Return a copy with its own memory."""
         own = {name: getattr(self, name).copy() for name in (*SHARED, "memory", "happened")}
         return replace(self, **own)
 
     def back_to(self, before: "Plants") -> None:
-        """Stand as `before`, a copy, in the same memory."""
+        """Restore the state `before`, a copy, in the same memory."""
         for name in (*SHARED, "memory", "happened"):
             getattr(self, name)[:] = getattr(before, name)
 
 
 SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
-"""What C reads and writes, in this order."""
+"""Arrays that C reads and writes, in this order."""
 
 
 class _Members(ctypes.Structure):
-    """`symfric_members` of members.h."""
+    """Struct `symfric_members` of members.h."""
 
     _fields_ = (
         *((name, ctypes.c_longlong) for name in ("members", "attempts")),
@@ -105,16 +107,16 @@ class _Members(ctypes.Structure):
 
     @classmethod
     def of(cls, plants: Plants) -> "_Members":
-        """The addresses of arrays that somebody else keeps alive."""
+        """Return the struct with the addresses of arrays; the caller keeps them alive."""
         addresses = (getattr(plants, name).ctypes.data for name in SHARED)
         return cls(plants.S.shape[0], plants.attempts, plants.dt, plants.h_min, *addresses)
 
 
 def compiled(integrator: Integrator, plants: Plants) -> Advance:
-    """The loop in C.
+    """Return the compiled loop.
 
     Raises:
-        CompileError: there is no compiler, or it failed.
+        CompileError: no compiler was found, or it failed.
     """
     return loaded(integrator, plants, "plants", c_source)
 
@@ -122,7 +124,7 @@ def compiled(integrator: Integrator, plants: Plants) -> Advance:
 def loaded(
     integrator: Integrator, plants: Plants, name: str, source: Callable[[Integrator], str]
 ) -> Advance:
-    """The function `symfric_plants` of C, on arrays; the integrator keeps its library by `name`."""
+    """Return the C function `symfric_plants` bound to arrays; the integrator caches its library."""
     kept = integrator.__dict__
     if name not in kept:
         library = load(source(integrator), "symfric_plants")
@@ -142,7 +144,7 @@ def loaded(
 
 
 def in_vm(integrator: Integrator, plants: Plants) -> Advance:
-    """The loop in Python; needs no compiler."""
+    """Return the loop in Python; needs no compiler."""
     step, follow, nx = integrator.step, integrator.follow, integrator.system.nx
     S, R, after = (np.zeros(k) for k in (step.numel_in(0), step.numel_in(1), step.numel_in(0)))
     attempt = bound(step, (S, R), (after,))
@@ -190,27 +192,27 @@ def in_vm(integrator: Integrator, plants: Plants) -> Advance:
 
 
 def _large(S: Array, h_min: float) -> bool:
-    """Whether the step is large enough to go on; NaN is not."""
+    """Return True if the step is long enough to continue; False for NaN."""
     h = S[State.H]
     return bool(h >= h_min and h >= FLOOR * abs(S[State.T]))
 
 
 EVENTFUL_ATTEMPTS = 50_000
-"""Attempts of one call of an engine."""
+"""Attempts per call of an engine."""
 WHY = {Stop.END: END, Stop.STEP_TOO_SMALL: STEP_TOO_SMALL, Stop.TERMINAL: OVER, Stop.STORM: STORM}
 
 
 def with_events(
     integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
 ) -> Advance:
-    """The loop for models with events, one plant after the other by an engine of runs.
+    """Return the loop for models with events: one plant after the other, by an engine of runs.
 
-    Python stands between the samples, and between what events ask for; the search for them is the
-    engine's (`symfric.integrator.running.events`).
+    Python handles the samples and event requests; the engine searches for events
+    (`symfric.integrator.running.events`).
 
     Args:
-        integrator, plants: what goes on.
-        engine: that makes the steps.
+        integrator, plants: model and data.
+        engine: makes the steps.
         tolerance: of event times [s].
     """
     return _Eventful(integrator, plants, engine, tolerance).advance
@@ -218,7 +220,7 @@ def with_events(
 
 @final
 class _Eventful:
-    """Buffers of the plant that is under way."""
+    """Loop for models with events, with buffers for one plant."""
 
     def __init__(
         self, integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
@@ -235,7 +237,7 @@ class _Eventful:
         self.data = Given.d(system.nx)
 
     def advance(self, begin: int) -> int:
-        """As `Advance`."""
+        """Advance all plants, as `Advance`."""
         plants = self.plants
         if begin and not np.isfinite(plants.u).all():
             return REFUSED
@@ -254,7 +256,7 @@ class _Eventful:
         return int(np.count_nonzero(plants.why > 0))
 
     def _takes_over(self, b: int, first: bool) -> bool:
-        """New inputs and the time of the next sample; whether algebraic unknowns could follow."""
+        """Take over inputs and the next sample time; return False if unknowns could not follow."""
         plants, S, R = self.plants, self.work.S, self.work.R
         plants.count[b] += S[State.T] >= R[Given.T_END]
         plants.made[b] = plants.ready[b] = 0
@@ -267,7 +269,7 @@ class _Eventful:
         return self._follow()
 
     def _before_start(self) -> None:
-        """Events that have happened by the start have values as if just before it."""
+        """Give events that have already happened at the start the values just before them."""
         events = self.integrator.model.events
         if any(event.at_start for event in events):
             S, d = self.work.S, self.work.R[self.data]
@@ -276,7 +278,7 @@ class _Eventful:
             self.events.jumped(np.array(signs))
 
     def _follow(self) -> bool:
-        """Whether algebraic unknowns could follow a jump."""
+        """Update algebraic unknowns after a jump; return False if that fails."""
         follow = self.integrator.follow
         if follow is None:
             return True
@@ -286,7 +288,7 @@ class _Eventful:
         return found is not None
 
     def _runs(self, b: int) -> int:
-        """Steps and events up to the sample; why they ended."""
+        """Make steps and events up to the sample; return the reason to stop."""
         plants, manifold = self.plants, self.integrator.system.manifold
         events = self.integrator.model.events
         while plants.made[b] < plants.attempts:
@@ -306,7 +308,7 @@ class _Eventful:
 
 
 def c_source(integrator: Integrator) -> str:
-    """C of the step, of what follows a jump, and of the loop around them."""
+    """Return the C of the step, of the update after a jump, and of the loop around them."""
     follow, nx = integrator.follow, integrator.system.nx
     n_d, nu = integrator.system.d.numel(), integrator.inputs.data.numel()
     others = () if follow is None else (follow.round,)
@@ -324,12 +326,13 @@ def c_source(integrator: Integrator) -> str:
 @final
 @dataclass(eq=False)
 class Looks:
-    """All signals of plants where they stand: in the virtual machine until compiling pays.
+    """Signals of all plants at their current times: in the virtual machine until compiling saves
+    time.
 
     Attributes:
         integrator: of the plants.
-        plants: where they stand.
-        values: the signals, shape (plants, signals); what a look writes.
+        plants: their current data.
+        values: the signals, shape (plants, signals), overwritten by each call.
     """
 
     integrator: Integrator
@@ -339,7 +342,7 @@ class Looks:
     _compiled: Callable[[], None] | None = None
 
     def __call__(self, backend: str) -> Array:
-        """Look, by "vm", "compiled" or "auto"."""
+        """Compute the signals by "vm", "compiled" or "auto"."""
         if self._compiled is None and self._pays(backend):
             self._compiled = self._in_c()
         if self._compiled is not None:
@@ -376,7 +379,7 @@ class Looks:
 
 
 def look_source(integrator: Integrator) -> str:
-    """C of the signals, and of the loop over plants."""
+    """Return the C of the signals and of the loop over plants."""
     function, nx = integrator.signals, integrator.system.nx
     generator = ca.CodeGenerator("symfric_look.c", {"static_aux": True})
     generator.add(function)

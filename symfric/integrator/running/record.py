@@ -1,4 +1,4 @@
-"""The record of a run: steps with their continuous solution, values at times, and events."""
+"""Record of a run: steps with their continuous solution, values at times, and events."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Dense:
-    """Piecewise polynomial solution, one piece an accepted step.
+    """Piecewise polynomial solution, one piece per accepted step.
 
     With theta = (t - t0) / (t1 - t0) and d(theta) = d_1 + theta (d_2 + theta d_3):
 
@@ -36,16 +36,16 @@ class Dense:
 
     @property
     def nbytes(self) -> int:
-        """Memory that it takes."""
+        """Memory of the arrays [bytes]."""
         return sum(a.nbytes for a in (self.t0, self.t1, self.y0, self.y1, self.D))
 
     def __call__(self, times: Array) -> Array:
-        """Values at `times`, shape (n, m); at an event the value after it."""
+        """Return values at `times`, shape (n, m); at an event the value after it."""
         k = np.searchsorted(self.t0[1:], times, side="right")
         return self.piece(k, (times - self.t0[k]) / (self.t1[k] - self.t0[k])).T
 
     def piece(self, k: NDArray[np.intp], theta: Array) -> Array:
-        """Values of the pieces `k` at `theta`, shape (m, n)."""
+        """Return values of the pieces `k` at `theta`, shape (m, n)."""
         s = theta[:, None]
         bend = np.zeros_like(self.y0[k])
         for row in range(self.D.shape[1] - 1, -1, -1):
@@ -53,7 +53,7 @@ class Dense:
         return (1 - s) * self.y0[k] + s * (self.y1[k] + (1 - s) * bend)
 
     def rates(self, k: NDArray[np.intp], theta: Array) -> Array:
-        """Rates of the pieces `k` at `theta`, shape (m, n)."""
+        """Return time derivatives of the pieces `k` at `theta`, shape (m, n)."""
         s = theta[:, None]
         bend, slope = np.zeros_like(self.y0[k]), np.zeros_like(self.y0[k])
         for row in range(self.D.shape[1] - 1, -1, -1):
@@ -64,7 +64,7 @@ class Dense:
 
 
 def hermite(t: Array, y: Array, slope: Array) -> Dense:
-    """Cubic Hermite interpolation through y (n, m) with slopes (n, m) at times t (m,)."""
+    """Return the cubic Hermite interpolant of y (n, m) with slopes (n, m) at times t (m,)."""
     h = np.diff(t)[None, :]
     rise = np.diff(y, axis=1)
     first = h * slope[:, :-1] - rise
@@ -74,7 +74,7 @@ def hermite(t: Array, y: Array, slope: Array) -> Dense:
 
 
 def pieces_of(records: Array, n: int) -> Dense:
-    """Pieces as views of the rows (t0, t1, y0, y1, D) that a step engine writes."""
+    """Return pieces as views of the rows (t0, t1, y0, y1, D) that an engine writes."""
     k, rows = records.shape[0], (records.shape[1] - 2) // n - 2
     return Dense(
         records[:, 0],
@@ -86,7 +86,7 @@ def pieces_of(records: Array, n: int) -> Dense:
 
 
 def join(pieces: list[Dense]) -> Dense:
-    """Pieces of several runs, in order."""
+    """Concatenate pieces of several runs, in order."""
     if len(pieces) == 1:
         return pieces[0]
     return Dense(
@@ -101,14 +101,14 @@ def join(pieces: list[Dense]) -> Dense:
 @final
 @dataclass(eq=False)
 class Outputs:
-    """Unknowns at increasing times; mutable, filled from the start on.
+    """Unknowns at increasing times; mutable, filled in order.
 
-    The compiled loop does what `fill` does, operation by operation (`loop.OUTPUTS`).
+    The compiled loop repeats `fill` operation by operation (`symfric_outputs` in `march.c`).
 
     Attributes:
         times: of the result [s], shape (m,).
         values: unknowns there, shape (n, m), known for the first `found` times.
-        found: how many times were reached.
+        found: number of times reached.
     """
 
     times: Array
@@ -117,15 +117,15 @@ class Outputs:
 
     @classmethod
     def at(cls, times: Array, n: int) -> "Outputs":
-        """Nothing yet of `n` unknowns at `times`."""
+        """Return empty outputs for `n` unknowns at `times`."""
         times = np.ascontiguousarray(times)
         return cls(times, np.empty((n, times.size)))
 
     def fill(self, piece: Dense, last: bool = False) -> None:
-        """Values at the times within `piece`.
+        """Fill in the values at the times within `piece`.
 
-        A time at its very end belongs to what follows, which an event or a break may have changed;
-        unless the run ends there, with this `last` piece.
+        A time at its very end belongs to the next piece, since an event or a break may change the
+        values there, unless this is the `last` piece of the run.
         """
         end = int(np.searchsorted(self.times, piece.t1[-1], side="right" if last else "left"))
         if end > self.found:
@@ -133,13 +133,13 @@ class Outputs:
             self.found = end
 
     def stand(self, t: float, y: Array) -> None:
-        """Values at the times up to `t` [s] that are left: a run stands there with `y`."""
+        """Set the remaining times up to `t` [s] to the constant unknowns `y`."""
         end = int(np.searchsorted(self.times, t, side="right"))
         self.values[:, self.found : end] = y[:, None]
         self.found = max(self.found, end)
 
     def back_to(self, t: float) -> None:
-        """Forget what lies behind `t` [s]: steps that were interrupted before they were kept."""
+        """Discard values after `t` [s], from steps that were interrupted before they were kept."""
         self.found = min(self.found, int(np.searchsorted(self.times, t, side="right")))
 
     @property
@@ -151,13 +151,13 @@ class Outputs:
 @final
 @dataclass(frozen=True, eq=False)
 class Jumps:
-    """Events that happened, a row each time.
+    """Events of a run, one row per time.
 
     Attributes:
         step: number of accepted steps before it, shape (k,).
         t: time [s], shape (k,).
-        size: of the step that they cut [s], in full; negative where nothing of it is left, 0 where
-            a jump led there and no motion, shape (k,).
+        size: full size of the step that it cut [s]; negative if nothing of the step is left, 0 if a
+            jump led there instead of motion, shape (k,).
         before, after: unknowns just before and after it, shape (k, n).
         which: the events that happened together, shape (k, events).
     """
@@ -171,7 +171,9 @@ class Jumps:
 
     @classmethod
     def of(cls, rows: Array, n: int, steps: int = 0) -> "Jumps":
-        """From records (steps before, t, size, y before, y after, which), `steps` behind others."""
+        """Build from records (steps before, t, size, y before, y after, which), `steps` already
+        made.
+        """
         rows = rows.copy()
         return cls(
             rows[:, 0].astype(np.intp) + steps,
@@ -184,7 +186,7 @@ class Jumps:
 
     @classmethod
     def joined(cls, parts: "list[Jumps]") -> "Jumps":
-        """Those of several stretches of a run, of which there is one at least."""
+        """Concatenate the events of several parts of a run, at least one."""
         return cls(
             np.concatenate([p.step for p in parts]),
             np.concatenate([p.t for p in parts]),
@@ -196,8 +198,9 @@ class Jumps:
 
 
 MOST_BYTES = 64 * 2**20
-"""Of accepted steps that a run keeps. A longer one keeps none: its results stand at their times,
-and who asks for what lies between lets it run again, to the bit."""
+"""Memory limit of the accepted steps of a run. A longer run keeps only the values at its result
+times; dense output is then recomputed by a second run with the same bits.
+"""
 
 
 @final
@@ -213,18 +216,18 @@ class Extent:
 @final
 @dataclass(eq=False)
 class Run:
-    """What a run has produced so far; a mutable record that survives interrupts and failures.
+    """Mutable record of a run; it survives interrupts and failures.
 
     Attributes:
-        t, y: where it started.
+        t, y: start.
         outputs: unknowns at the times of the result.
         jumps: the events that happened, with the unknowns on both sides.
         happened: (time, name) of every event.
-        steps, attempts: how many, accepted and all.
-        engine: what ran it.
-        most: bytes of accepted steps that it keeps.
-        again: (times, bytes) -> another run with these outputs, which keeps so many bytes of steps;
-            None where this one has kept all.
+        steps, attempts: number of accepted steps and of all attempts.
+        engine: name of the engine.
+        most: memory limit of the accepted steps [bytes].
+        again: (times, bytes) -> another run with these outputs and this memory limit; None if this
+            run has kept all steps.
         status, message: how it ended.
     """
 
@@ -245,9 +248,9 @@ class Run:
     _before: Extent | None = None
 
     def keep(self, piece: Dense | Array) -> None:
-        """Append accepted steps with their continuous solution, or rows of records of them.
+        """Append accepted steps with their continuous solution, or their record rows.
 
-        They belong to the run from now on.
+        The run takes ownership of them.
         """
         count = piece.shape[0] if isinstance(piece, np.ndarray) else piece.t0.size
         if not count:
@@ -259,21 +262,21 @@ class Run:
             self._before, self._kept = self.extent, [self.last]
 
     def keep_all(self, steps: Dense) -> None:
-        """Take the steps of a run that is over, all that it counts already."""
+        """Replace the kept steps by all steps of the finished run; the counters stay."""
         self._kept = [steps]
 
     @property
     def kept(self) -> int:
-        """How many accepted steps are in memory."""
+        """Number of accepted steps in memory."""
         return sum(p.shape[0] if isinstance(p, np.ndarray) else p.t0.size for p in self._kept)
 
     @property
     def complete(self) -> bool:
-        """Whether all accepted steps are kept."""
+        """True if all accepted steps are kept."""
         return self._before is None
 
     def stop(self, status: Status, message: str | None = None) -> None:
-        """End the run with `status`, said in `message` or in the sentence of the status."""
+        """End the run with `status` and `message`, by default the sentence of the status."""
         self.status, self.message = status, message or status.value
 
     def _pieces(self) -> list[Dense]:
@@ -286,14 +289,14 @@ class Run:
 
     @cached_property
     def dense(self) -> Dense:
-        """The continuous solution over all accepted steps, of a long run by another one."""
+        """Continuous solution over all accepted steps; a long run is recomputed."""
         if self.again is not None:
             return self.again(np.zeros(0), np.inf).dense
         return join(self._pieces())
 
     @property
     def last(self) -> Dense:
-        """The last accepted step, as a copy."""
+        """Last accepted step, as a copy."""
         p = self._pieces()[-1]
         return Dense(*(a[-1:].copy() for a in (p.t0, p.t1, p.y0, p.y1, p.D)))
 
@@ -315,7 +318,7 @@ class Run:
 
     @property
     def extent(self) -> Extent:
-        """How long the steps are and how large the unknowns become."""
+        """Range of the step lengths and of the unknowns."""
         lengths = [p.t1 - p.t0 for p in self._pieces()]
         shortest = [float(h.min()) for h in lengths]
         longest = [float(h.max()) for h in lengths]
@@ -335,7 +338,7 @@ class Run:
 
     @property
     def seen(self) -> tuple[Array, Array]:
-        """Start and ends of steps, (k,) and (k, n); of a long run the times of the result."""
+        """Start and ends of steps, (k,) and (k, n); for a long run the times of the result."""
         if not self.complete:
             return self.outputs.times[: self.outputs.found], self.outputs.reached.T
         found = self._pieces()
@@ -348,14 +351,14 @@ class Run:
         return np.abs(self.reach).max(axis=0)
 
     def farthest(self, unknown: int) -> float:
-        """Largest magnitude of an unknown at the start and at the ends of steps."""
+        """Return the largest magnitude of an unknown at the start and at the ends of steps."""
         found = self._pieces()
         first = found[0].y0[0] if self._before is None else self._before.reach
         ends = (first[..., unknown], *(p.y1[:, unknown] for p in found))
         return max(float(np.abs(y).max()) for y in ends)
 
     def at(self, times: Array) -> Array:
-        """Unknowns at `times` [s], shape (n, times), of a long run as outputs of another one."""
+        """Return unknowns at `times` [s], shape (n, times); for a long run by recomputation."""
         if self.again is None or "dense" in self.__dict__:
             return self.dense(times)
         if times.size and times.min() >= self._pieces()[-1].t0[0]:

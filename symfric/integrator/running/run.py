@@ -1,9 +1,9 @@
 """Drive an integrator from start to end: input intervals, events, progress, failures.
 
-Tolerances follow the size of the motion: absolute ones are fractions of each state's nominal value,
-which is a guess of the model: a decimetre, a turn. A motion of a micrometre would be resolved to a
-hundredth of itself, one of a nanometre not at all. So a run that turns out to be that small is run
-again on its own scale.
+Absolute tolerances are fractions of each state's nominal value, which the model only guesses (a
+decimetre, a turn). With them a motion of a micrometre would be resolved to a hundredth of its size,
+one of a nanometre not at all. A run with such a small motion is therefore repeated on its own
+scale.
 """
 
 from collections.abc import Callable
@@ -30,16 +30,20 @@ from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
-"""Sizes, in nominal values, below which a motion has a scale of its own and is none any more: what
-is left then is the rounding of states it is coupled to."""
+"""Sizes, in nominal values, below which a motion gets its own scale, and below which it is treated
+as
+zero: such values are rounding errors of the states that it is coupled to.
+"""
 
 ROUNDS = 3
-"""How often: a motion that was not resolved at all may have been taken for a larger one."""
+"""Maximum number of repetitions: an unresolved motion may have seemed larger than it is."""
 
 
 def ample(run: Run, nominal: Array) -> bool:
-    """Whether no state of a run is small all the time: most do not even end small."""
-    # few numbers: quicker than by NumPy
+    """Return True if no state of a run is small all the time; most are not even small at the
+    end.
+    """
+    # few numbers: faster than NumPy
     ends = zip(run.end.tolist(), nominal.tolist(), strict=False)
     return all(
         abs(end) >= SMALL * typical or run.farthest(i) >= SMALL * typical
@@ -48,34 +52,38 @@ def ample(run: Run, nominal: Array) -> bool:
 
 
 def own_scale(size: Array, nominal: Array) -> Array:
-    """Typical magnitudes: `nominal`, or the `size` of what moves far less."""
+    """Return typical magnitudes: `nominal`, or `size` where a state moves far less."""
     small = (size < SMALL * nominal) & (size > REST * nominal)
     return np.where(small, size, nominal)
 
 
 def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
-    """The scale of another run of a motion of this `size`; None where `scale` serves."""
+    """Return the scale for another run of a motion of this `size`, None if `scale` is fine
+    enough.
+    """
     own = np.minimum(scale, own_scale(size, nominal))
     return own if (own < 0.1 * scale).any() else None
 
 
 PACES = 8
-"""Straight pieces of an input that a step may pass with events, which look at its quarters."""
+"""Linear pieces of an input that one step may span in models with events (checked at its
+quarters)."""
 
 NOWHERE = np.zeros(0)
-"""No times of a result."""
+"""Empty array of result times."""
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
-"""Attempts between two looks at progress and interrupts: tens of milliseconds."""
+"""Attempts between two checks of progress and interrupts: tens of milliseconds."""
 MOST_ORDERS = 8
-"""How often pivots are replaced in a run."""
+"""Maximum number of pivot replacements in a run."""
 MANY_STEPS, MOST_STEPS = 10_000_000, 1e9
-"""Attempts after which the pace of a run is looked at, and how many more it may ask for then."""
+"""Attempts after which the progress rate of a run is checked, and the most it may still need
+then."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Tolerances:
-    """What a run has to meet.
+    """Tolerances and limits of a run.
 
     Attributes:
         rtol: relative tolerance.
@@ -83,8 +91,8 @@ class Tolerances:
         event: tolerance of event times [s].
         max_steps: attempts allowed.
         max_step: longest step [s].
-        follow: whether `atol` shrinks to the size of a motion that is tiny.
-        extends: whether more attempts are allowed where the pace of the run leads to its end.
+        follow: True if `atol` shrinks to the size of a tiny motion.
+        extends: True if more attempts are allowed while the run will reach its end.
     """
 
     rtol: float
@@ -96,7 +104,7 @@ class Tolerances:
     extends: bool = False
 
     def given(self, t_end: float, d: Array) -> Array:
-        """What an attempt towards `t_end` does not change, for run data d (..., n_d)."""
+        """Return the constant data of an attempt towards `t_end`, for run data d (..., n_d)."""
         return Given.of(t_end, self.rtol, self.max_step, self.atol, d)
 
 
@@ -110,15 +118,16 @@ def integrate(
     progress: Callable[[float], None] | None,
     times: Array = NOWHERE,
 ) -> tuple[Run, Integrator]:
-    """Integrate over all input intervals, with outputs at `times`; the run holds what was reached.
-
-    Returned with it is the integrator that it ended with: pivots that fail on the way are replaced.
+    """Integrate over all input intervals, with outputs at `times`.
 
     A motion that turns out to be tiny is integrated again on its own scale.
+
+    Returns:
+        The run, and the last integrator used: pivots that fail during the run are replaced.
     """
     nominal = integrator.system.nominal
     if integrator.model.events:
-        # where a machine rests, nothing but its events tells that an input has become too strong
+        # at equilibrium only the events show that an input has become large enough to start motion
         quickest = min([inputs.pace, *(pace(f, *inputs.span) for f in integrator.schedules)])
         tolerances = replace(tolerances, max_step=min(tolerances.max_step, PACES * quickest))
     scale, allowed = nominal, tolerances
@@ -130,9 +139,7 @@ def integrate(
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
         again, other = _integrated(last, inputs, y0, p, allowed, backend, None, times)
         if not again.status.ok and again.status is not Status.INTERRUPTED:
-            run.message += (
-                f" Motions that are tiny were not resolved on their own scale: {again.message}"
-            )
+            run.message += f" Tiny motions were not resolved on their own scale: {again.message}"
             break
         run, last = again, other
     return run, last
@@ -149,7 +156,7 @@ def _integrated(
     times: Array,
     most: float | None = None,
 ) -> tuple[Run, Integrator]:
-    """One run over all input intervals; it keeps steps of up to `most` bytes."""
+    """Run once over all input intervals; keep steps of up to `most` bytes."""
     data = inputs.values[:, 0]
     y = integrator.start(y0, np.concatenate([p, data]) if data.size else p)
     work = integrator.borrow()
@@ -173,7 +180,7 @@ def _integrated(
 
 @final
 class _March:
-    """One run under way: the step's memory and unknowns S, and what it has produced."""
+    """Run in progress: the step's memory and unknowns S, and the results so far."""
 
     def __init__(
         self,
@@ -206,12 +213,12 @@ class _March:
 
     @property
     def t(self) -> float:
-        """Time reached [s]."""
+        """Current time [s]."""
         return float(self.S[State.T])
 
     @property
     def S(self) -> Array:
-        """The step's memory and unknowns."""
+        """Memory and unknowns of the step."""
         return self.work.S
 
     @property
@@ -221,7 +228,7 @@ class _March:
 
     @property
     def d(self) -> Array:
-        """Run data on the input interval that is under way, as a copy."""
+        """Run data on the current input interval, as a copy."""
         return self.work.R[Given.d(self.integrator.system.nx)].copy()
 
     def whole(self) -> None:
@@ -238,13 +245,15 @@ class _March:
                 self.progress((self.t - self.t_start) / self.span)
 
     def finish(self) -> None:
-        """Outputs at the very end, where engines did not know that it is."""
+        """Fill in outputs at the final time, which engines leave open."""
         outputs = self.run.outputs
         if outputs.found < outputs.times.size:
             outputs.fill(self.run.last, last=True)
 
     def attempts(self, left: float) -> tuple[Array, Stop, float]:
-        """A batch of attempts: records, why it stopped, time [s] the VM will still need."""
+        """Make a batch of attempts; return records, reason to stop, remaining time of the VM
+        [s].
+        """
         engine = self.integrator.choose(self.backend, left)
         self.run.engine = engine.name
         if self.run.attempts >= self.limit and self.tolerances.extends:
@@ -252,7 +261,7 @@ class _March:
         allowed = min(ATTEMPTS[engine.name], self.limit - self.run.attempts)
         if allowed <= 0:
             hint = chattering(self.integrator.model)
-            said = f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s.{hint}"
+            said = f"{Status.MAX_STEPS.value} Stopped at t = {self.t:g} s.{hint}"
             self.run.stop(Status.MAX_STEPS, said)
             return self.work.rows[:0], Stop.ATTEMPTS, left
         virtual = engine.name == "vm"
@@ -268,16 +277,17 @@ class _March:
         return records, reason, left
 
     def extend_limit(self) -> None:
-        """Allow more attempts if the pace of the last ones leads to the end in `MOST_STEPS`."""
+        """Allow more attempts if the recent progress rate reaches the end within `MOST_STEPS`."""
         advance, self.limit_set_at = self.t - self.limit_set_at, self.t
         if (self.t_end - self.t) * MANY_STEPS <= MOST_STEPS * advance:
             self.limit += MANY_STEPS
 
     def found_pivots(self) -> bool:
-        """Whether steps failed for pivots that are not sound here; others are used from now on.
+        """Return True if steps failed because of unstable pivots, after replacing these.
 
-        What such pivots spoil no step size mends: steps shrink to nothing there, and that is when
-        to look, at the same place whatever runs the steps.
+        No step size compensates for unstable pivots: steps shrink to nothing. The check is
+        therefore made
+        there, at the same place for every engine.
         """
         if len(self.places) > MOST_ORDERS:
             return False
@@ -293,7 +303,7 @@ class _March:
         return True
 
     def happen(self) -> None:
-        """Take note of the events in the steps to come."""
+        """Record the events in the steps about to be kept."""
         if self.events is None or not self.events.count:
             return
         jumps = self.events.jumps(self.run.steps)
@@ -304,7 +314,7 @@ class _March:
         self.run.jumps.append(jumps)
 
     def heed(self, reason: Stop) -> None:
-        """Do what the `reason` to stop asks for."""
+        """Act on the `reason` to stop."""
         if reason is Stop.STEP_TOO_SMALL:
             h = self.S[State.H]
             self.run.stop(*explain(self.integrator, self.t, self.y, self.d, h))
@@ -315,7 +325,7 @@ class _March:
             name = self.integrator.model.events[int(np.argmax(which))].name
             self.run.stop(
                 Status.EVENT_STORM,
-                f"{Status.EVENT_STORM.value} It stands at t = {self.t:.9g} s, event '{name}'.",
+                f"{Status.EVENT_STORM.value} Stopped at t = {self.t:.9g} s, event '{name}'.",
             )
         elif reason is Stop.SEARCH:
             self.make_consistent()
@@ -325,7 +335,7 @@ class _March:
             last.after[-1] = self.y
 
     def before_start(self) -> None:
-        """Events that have happened by the start have values as if just before it."""
+        """Give events that have already happened at the start the values just before them."""
         if self.events is None:
             return
         events = self.integrator.model.events
@@ -335,9 +345,9 @@ class _March:
             self.events.jumped(np.array(list(signs)))
 
     def make_consistent(self, moved: bool = False) -> None:
-        """Let the algebraic unknowns follow a jump, or stop the run where they cannot.
+        """Update the algebraic unknowns after a jump, or stop the run if that fails.
 
-        Where states `moved`, those of a mechanism have to be put back onto its constraints, too.
+        If states `moved`, the states of a mechanism are projected back onto its constraints, too.
         """
         follow, manifold = self.integrator.follow, self.integrator.system.manifold
         if follow is None and manifold is None:

@@ -1,4 +1,4 @@
-/* Zero crossings in an accepted step; M is what is remembered between steps. */
+/* Zero crossings in an accepted step; M is the event memory between steps. */
 enum { EVENTS = $events, LOOKS = $looks, RESETS = $resets, UNKNOWNS = $n, KEPT = $kept };
 enum { PHASE, TOLERANCE, COUNT, ALIKE, RESUME, TIMES };
 enum { BEFORE = TIMES + KEPT, LAST = BEFORE + EVENTS };
@@ -30,7 +30,7 @@ static int symfric_passed(double before, double after, int direction)
       || (before > 0 && after <= 0 && direction <= 0);
 }
 
-/* Root of one event in [a, b] by the Illinois method; the side after the root. */
+/* Returns the root of one event in [a, b] by the Illinois method, rounded up. */
 static double symfric_locate(const symfric_place *p, int event, double a, double b,
                              double fa, double fb, double tolerance)
 {
@@ -61,11 +61,11 @@ static double symfric_locate(const symfric_place *p, int event, double a, double
   return b;
 }
 
-/* What was found of the first roots in a step, beyond 1 where none is, the noise of the events once
-   it is known, the event tolerance as a part of the step, and how many pieces may still be cut. */
+/* First roots found in a step (above 1 if there is none), the noise of the events once it is known,
+   the event tolerance as a fraction of the step, and the number of subdivisions still allowed. */
 typedef struct { double root[EVENTS], noise[EVENTS], tolerance; int known, left; } symfric_found;
 
-/* HITS and DOUBTS of one event between five places; pieces in doubt, if `wanted`, are suspects. */
+/* Returns HITS and DOUBTS of one event between five places; marks doubtful pieces if `wanted`. */
 static int symfric_examined(const symfric_place *p, symfric_found *f, const double *g, int event,
                             int wanted, int (*suspects)[EVENTS])
 {
@@ -92,8 +92,8 @@ static int symfric_examined(const symfric_place *p, symfric_found *f, const doub
   return wanted ? found | DOUBTS : found;
 }
 
-/* The same of all events; those whose bends are small beside their values are neither in doubt nor
-   pass zero more than once (STRAIGHT). All is wanted where `wanted` is 0. */
+/* Does the same for all events. If all bends are small relative to the values (STRAIGHT), there
+   is no doubt and at most one root. If `wanted` is 0, all events are wanted. */
 static int symfric_scanned(const symfric_place *p, symfric_found *f, const double *g,
                            const int *wanted, int (*suspects)[EVENTS])
 {
@@ -122,8 +122,7 @@ static int symfric_scanned(const symfric_place *p, symfric_found *f, const doubl
 static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
                             const double *g, int found, int (*suspects)[EVENTS]);
 
-/* As symfric_first, from a to b, with values of which the first ones are there, where some events
-   are in doubt. */
+/* Repeats symfric_first from a to b for the wanted events; g holds the values at a. */
 static double symfric_again(const symfric_place *p, symfric_found *f, double a, double b, double *g,
                             const int *wanted)
 {
@@ -136,9 +135,10 @@ static double symfric_again(const symfric_place *p, symfric_found *f, double a, 
   return symfric_first(p, f, at, g, symfric_scanned(p, f, g, wanted, suspects), suspects);
 }
 
-/* The first of all roots between the places `at` with values g, or one behind them. What is in
-   doubt is looked at again before the first sure root, since what jumps with that event does not do
-   so before it, or piece by piece where there is none, or it is its own. */
+/* Returns the first root between the places `at` with values g, or a value beyond them. If there is
+   a certain root, doubtful events are searched once more before it, because those that jump with its
+   event do not jump earlier. Otherwise, or if the root is their own, they are searched piece by
+   piece. */
 static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
                             const double *g, int found, int (*suspects)[EVENTS])
 {
@@ -184,7 +184,7 @@ static double symfric_first(const symfric_place *p, symfric_found *f, const doub
   return sure;
 }
 
-/* Where in the step the first events happen, and which; -1 where none does. */
+/* Returns the place of the first events in the step, -1 without events; marks them in `which`. */
 static double symfric_crossing(const symfric_place *p, double *M, double *which)
 {
   const double *arg[$arg];
@@ -231,7 +231,7 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
   return -1;
 }
 
-/* Whether the events at time t complete a storm, see EventStorm. */
+/* Returns 1 if the events at time t complete a storm (see `storm` in events.py). */
 static int symfric_storm(double *M, double t, const double *which)
 {
   int i, alike = 1;
@@ -253,9 +253,10 @@ static int symfric_storm(double *M, double t, const double *which)
   return b < a && c < b && c * c / (b - c) < 1000 * M[TOLERANCE];
 }
 
-/* Looks for events in the accepted step `row`, which led to S. The first ones are carried out: the
-   row is cut there, S goes on behind them, and `jump` tells of them. Where they happen at the very
-   start, no row is left. Without events S may get a longer step, if there was one just before. */
+/* Searches the accepted step `row`, which led to S, for events. The first ones are carried out: the
+   row is cut there, S continues after them, and `jump` records them. If they happen at the very
+   start, the row is dropped. Without events the step in S may be lengthened if a previous event
+   shortened it. */
 static int symfric_search(double *row, double *S, const double *R, double *M, double *jump,
                           long long rows, casadi_int *iw, double *w, int *stop)
 {

@@ -1,1 +1,1 @@
-"""One attempt of an adaptive step as one CasADi Function."""
+"""Attempt of an adaptive step as one CasADi Function."""

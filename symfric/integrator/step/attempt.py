@@ -1,21 +1,21 @@
-"""An attempt of a step, the errors that it watches, and the form in which it is written.
+"""Attempt of a step: its error control, and its form as a CasADi Function.
 
-Error control watches sliding velocities and algebraic unknowns, too. A sliding velocity s is the
+Error control also monitors sliding velocities and algebraic unknowns. A sliding velocity s is the
 difference of two velocities that may be a thousand times larger, so its error is measured on the
-velocity scale w of the law instead. And a step must not carry it across that scale without a look:
-friction that acts near rest only, a peak without a Coulomb level behind it, leaves no trace in a
-step that leaps over it. No stage falls on the peak, no error is estimated, and a block that should
-have been caught goes on. Whatever the estimate says,
+velocity scale w of the law instead. In addition, a step must not jump across that scale: friction
+that acts near zero velocity only (a peak without a Coulomb level) has no effect on a step that
+passes over it. No stage falls on the peak, no error is estimated, and a block that should stick
+moves on. Whatever the estimate,
 
     travel <= REACH (w + nearest) / finer
 
-holds for every step, `nearest` being its least |s|, or 0 where s changes sign: steps shrink
-geometrically on the way to rest and cross it in steps of a few w. The parabola through both ends
-and the middle of the dense output serves for s. A method whose steps are differentiated is
-`finer`: the derivative of friction, a peak of width w, has to be seen by several stages, while the
-state only asks for its integral. A model without monitors has none of this.
+holds for every step, where `nearest` is its least |s|, or 0 if s changes sign: steps shrink
+geometrically towards zero and cross it in steps of a few w. The parabola through both ends and the
+middle of the dense output approximates s. A method whose steps are differentiated has a larger
+`finer`: the derivative of friction, a peak of width w, needs several stages, while the state needs
+only its integral. A model without monitors has none of this.
 
-An attempt is ONE CasADi Function, whatever the method. Its state S and what it is given, R, are
+An attempt is ONE CasADi Function, whatever the method. Its state S and its constant data R are
 columns (`layout`). `step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds
 the dense output) or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for
 derivatives and C code.
@@ -37,24 +37,26 @@ from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 from symfric.integrator.step.tangent import tangent
 
 REACH = 4.0
-"""Friction that rises over w and falls behind it is seen by the stages of a step this long."""
+"""Largest travel in units of w: the stages of such a step resolve friction that rises over w and
+then falls.
+"""
 
 FINEST = 1e-14
-"""A step this short, relative to the end time, is about to end the run: neither it nor the one
-behind it is asked for."""
+"""Step relative to the end time below which limits on the step are ignored: the run is about to
+end."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """The watched expressions of a system over one trial.
+    """Monitored expressions of a system over one trial.
 
     Attributes:
         before, half, after: their values at the start, in the middle and at the end.
         nominal: their typical magnitudes.
-        change: (y, direction, d) -> what a change of y does to them, to first order.
+        change: (y, direction, d) -> their change with y, to first order.
         slips: how many of them, the first ones, are sliding velocities.
-        finer: how many times shorter their ways near rest are than usual.
+        finer: factor by which their travel near zero is limited more than usual.
     """
 
     before: Any
@@ -66,17 +68,18 @@ class Watch:
     finer: float = 1.0
 
     def error(self, y: Any, error: Any, d: Any, rtol: Any) -> Any:
-        """Mean square sum of what an error of y makes of them, in units of rtol.
+        """Return the sum of squares of the monitored errors caused by an error of y, in units of
+        rtol.
 
         A value is scaled by rtol (nominal + min|value|): where a contact sticks, its sliding
         velocity is resolved relative to the velocity scale of the law instead of the velocity of
-        the body, or breaking away comes too late or not at all.
+        the body; otherwise breakaway comes too late or not at all.
         """
         smallest = ca.fmin(ca.fabs(self.before), ca.fabs(self.after))
         return ca.sumsqr(self.change(y, error, d) / (rtol * (self.nominal + smallest)))
 
     def leap(self) -> Any:
-        """Largest travel of a sliding velocity, in units of what is allowed."""
+        """Return the largest travel of a sliding velocity, in units of the limit."""
         here = range(self.slips)
         before, half, after, scale = (
             x[here] for x in (self.before, self.half, self.after, self.nominal)
@@ -87,7 +90,7 @@ class Watch:
 
 
 def watching(system: System, finer: float = 1.0) -> Callable[[Any, Trial, Any], Watch] | None:
-    """(y, trial, d) -> what is watched over it, so many times `finer`; None where nothing is."""
+    """Return (y, trial, d) -> `Watch` with the factor `finer`; None if nothing is monitored."""
     if not system.monitors.numel():
         return None
     direction = ca.SX.sym("direction", system.n)
@@ -107,18 +110,19 @@ def watching(system: System, finer: float = 1.0) -> Callable[[Any, Trial, Any], 
 
 SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
 E_FLOOR = 1e-6
-"""Smallest error the controller believes."""
+"""Smallest error estimate that the controller uses."""
 
 FAR = 100.0
-"""Beyond so many tolerances a shift onto the constraints is none of the method's error: near a
-singular position it is a leap onto another branch."""
+"""Shift onto the constraints, in tolerances, above which it is not counted as an error of the
+method: near a singular position it is a jump to another branch.
+"""
 
 KAPPA = 0.1
-"""What Newton's method may leave over, in units of the tolerance."""
+"""Allowed residual of Newton's method, in units of the tolerance."""
 
 
 def steps(system: System, method: Method) -> Trials:
-    """The steps of a method; those of a mechanism end on its constraints."""
+    """Return the steps of a method; those of a mechanism end on its constraints."""
     chart, manifold = tangent(system), system.manifold
     if chart is not None:
         inside = method.trials(chart.reduced)
@@ -141,16 +145,19 @@ def steps(system: System, method: Method) -> Trials:
 
 
 def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] | None:
-    """What forbids a step over h to end at y although its error is small; None where nothing can.
+    """Return a test that rejects a step despite a small error; None if it cannot fail.
 
     Returns:
-        (y, h, d) -> a number that is negative where something does.
+        (y, h, d) -> a number, negative if the step over h must not end at y.
 
-    Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
-    stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
-    from normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction
-    has jammed: that solution is none of the machine, nor is one where a bearing pulls. A pivot of
-    I - dN/dN below `SHOCK` is on the way there. Mechanisms without friction have none of this.
+    Breakaway would be missed without notice: where a contact turns unstable, a long step stays on
+    the
+    sticking solution, with a small error estimate; `signs` detects that. Where the loop from normal
+    forces over friction to reactions and back, det(I - dN/dN), is negative, friction has jammed:
+    that
+    solution is not physical, nor is one in which a bearing pulls. A pivot of I - dN/dN below
+    `SHOCK` is
+    close to that. Mechanisms without friction need no test.
     """
     gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
     if gamma is None or (manifold is not None and not system.rubs):
@@ -167,7 +174,7 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
         own, tiny, pivots = every(here, h, data)
         if manifold is None:
             return own * tiny
-        # with a definite mass matrix and no friction, that of n accelerations is (-1)^n
+        # with a definite mass matrix and no friction, the sign for n accelerations is (-1)^n
         signs_of = [own * tiny, (-1) ** manifold.n * tiny]
         return ca.mmin(ca.vertcat(*signs_of, pivots - SHOCK, manifold.pressing(y, d) + PULLING))
 
@@ -175,7 +182,7 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
 
 
 def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
-    """The bare step (y, h, d) -> y_next, without error control: what derivatives are taken of."""
+    """Return the bare step (y, h, d) -> y_next, without error control, for derivatives."""
     y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
     h = kind.sym("h")
     end = steps(system.plain, method)(y, h, d).end
@@ -183,7 +190,9 @@ def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Functio
 
 
 def build_dense_step(system: System, method: Method) -> ca.Function:
-    """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities."""
+    """Return the bare step with its dense output, (y, h, d) -> all = (y_next, D), for
+    sensitivities.
+    """
     y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
     h = ca.SX.sym("h")
     trial = steps(system.plain, method)(y, h, d)
@@ -197,9 +206,9 @@ Norm = Callable[[Any], Any]
 def error_norm(
     system: System, y: Any, y_new: Any, atol: Any, rtol: Any, d: Any, watch: Watch | None
 ) -> Norm:
-    """Mean square of an error of y_new in the states and in what is watched, scaled.
+    """Return the mean square norm of an error of y_new in states and monitored expressions, scaled.
 
-    A state is scaled by atol + rtol max|x|, what is watched as `Watch.error` says.
+    A state is scaled by atol + rtol max|x|, monitored expressions as in `Watch.error`.
     """
     nx = system.nx
     scale = atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx]))
@@ -216,22 +225,23 @@ def error_norm(
 
 
 def converged(before: Any, last: Any) -> Any:
-    """Whether Newton's method is near enough, from the norms of its last two corrections.
+    """Return True if Newton's method has converged, from the norms of its last two corrections.
 
-    Its last correction is small, or what is still to come, a geometric series with their ratio.
+    The last correction is small, or the sum of the remaining ones, a geometric series with their
+    ratio.
     """
     last, rate = ca.sqrt(last), ca.sqrt(last / (before + 1e-300))
     return ca.logic_or(last <= KAPPA, last * rate <= KAPPA * (1 - rate))
 
 
 def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
-    """The adaptive attempt (S, R) -> (S_next, D).
+    """Return the adaptive attempt (S, R) -> (S_next, D).
 
     Args:
-        system: what is integrated.
-        method: how; it must estimate its error.
-        kind: SX inlines everything (virtual machine, small systems), MX keeps the blocks as
-            calls, which compile faster where they are large.
+        system: the system to integrate.
+        method: must estimate its error.
+        kind: SX inlines everything (virtual machine, small systems), MX keeps the blocks as calls,
+            which compile faster if they are large.
     """
     n, nx = system.n, system.nx
     S = kind.sym("S", State.MEMORY + n)
@@ -266,7 +276,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     accept = ca.logic_and(e2 <= 1, left > 0)
 
     # Gustafsson's predictive controller (Hairer and Wanner, IV.8), with growth = e^(-1/order) as
-    # its memory, so that one power an attempt is enough
+    # its memory, so that one power per attempt is enough
     growth = ca.fmax(e2, E_FLOOR**2) ** (-0.5 / order)
     if watch is not None and watch.slips:
         far = ca.if_else(h > FINEST * ca.fabs(t_end), watch.leap(), 0)
@@ -275,7 +285,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     predicted = (h / h_old) * (growth * growth / growth_old)
     factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(growth, predicted)))
     factor = ca.if_else(rejected > 0, ca.fmin(factor, 1), factor)
-    # a step cut by t_end must not forget the step size it could have had
+    # a step cut by t_end keeps the step size that it could have had
     h_next = ca.fmin(h_max, ca.if_else(h < h_wish, ca.fmax(h_wish, h * factor), h * factor))
     h_less = h * ca.fmax(SHRINK, SAFETY * growth)
 
@@ -294,10 +304,10 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
 
 
 def written(system: System, method: Method, inline: int) -> tuple[ca.Function, int]:
-    """The attempt, written out unless that takes more than `inline` instructions; how many it has.
+    """Return the attempt, inlined up to `inline` instructions, and its number of instructions.
 
-    What is large for sure is not written out to be counted: that took half the time of building a
-    long chain.
+    A step that is certainly too large is not inlined just to be counted: for a long chain that took
+    half of the build time.
     """
     if least(system, method) <= inline:
         step = build_step(system, method)
@@ -309,7 +319,9 @@ def written(system: System, method: Method, inline: int) -> tuple[ca.Function, i
 
 
 def least(system: System, method: Method) -> int:
-    """Instructions of an attempt's blocks, without what joins them; 0 without blocks."""
+    """Return the instructions of an attempt's blocks, without the code between; 0 without
+    blocks.
+    """
     gamma, chart = method.diagonal, tangent(system)
     if gamma is None:
         return 0
@@ -321,7 +333,7 @@ def least(system: System, method: Method) -> int:
 
 
 def instructions(step: ca.Function) -> int:
-    """Operations on numbers in a step that calls blocks."""
+    """Return the number of scalar operations in a step that calls blocks."""
     found = 0
     for k in range(step.n_instructions()):
         operation = step.instruction_id(k)

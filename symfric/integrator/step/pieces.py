@@ -1,14 +1,14 @@
 """Attempts as C for other programs and devices.
 
-Functions of columns become C on arrays, by the own emitter, for FMUs and graphics processors. It
-needs nothing but `math.h` and `stdbool.h` (of C; C++ and CUDA have both): no work arrays, no
-integers of CasADi's, no calls between functions. Double precision has CasADi's bits.
+Functions of columns become C on arrays, by symfric's own emitter, for FMUs and graphics processors.
+The C needs only `math.h` and `stdbool.h` (C++ and CUDA have both): no work arrays, no CasADi
+integers, no calls between functions. Double precision has CasADi's bits.
 
-An SX Function becomes one C function (`in_c`). An MX Function that calls others, as the step of a
-large mechanism does, becomes a C function for each of those and one that calls them; what stands
-between two calls is written out. Text and compile time then grow with the blocks and not with how
-often a step calls them: those of a six-joint arm in 0.5 MB and 3 s. The bits are CasADi's in both
-forms.
+An SX Function becomes one C function (`in_c`). An MX Function that calls others, such as the step
+of a large mechanism, becomes a C function for each of those and one that calls them; the code
+between two calls is written out. Code size and compile time then grow with the blocks and not with
+how often a
+step calls them: those of a six-joint arm in 0.5 MB and 3 s. The bits are CasADi's in both forms.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,13 +25,13 @@ from symfric.foundation.graph import graph
 @final
 @dataclass(frozen=True)
 class Written:
-    """A C function.
+    """C function.
 
     Attributes:
         head: without a semicolon.
         body: statements, a line each.
         calls: functions of `math.h` that it reaches through macros (`macros`), by double's name.
-        operations: how many, calls included.
+        operations: number of operations, calls included.
     """
 
     head: str
@@ -41,7 +41,7 @@ class Written:
 
     @property
     def text(self) -> str:
-        """The whole function."""
+        """Source of the function."""
         return f"{self.head}\n{{\n" + "".join(f"    {line}\n" for line in self.body) + "}\n"
 
 
@@ -53,16 +53,16 @@ def in_c(
     real: Real = DOUBLE,
     head: str = "static ",
 ) -> Written:
-    """`head` void `name`(const real *S, ..., real *next, ...) of a Function.
+    """Return the C `head` void `name`(const real *S, ..., real *next, ...) of a Function.
 
     Args:
-        function: of columns, SX or MX (written out, then); sparse results are filled with zeros.
+        function: of columns, SX or MX (inlined then); sparse results are filled with zeros.
         name: of the C function.
         arguments: C names of the arguments, the Function's own by default.
-        results: C names of the results likewise; with an empty name one is left out, and what only
-            that takes. Results may not overlap arguments.
+        results: C names of the results likewise; an empty name omits a result and the code for it.
+            Results may not overlap arguments.
         real: floating point type.
-        head: what stands before `void`.
+        head: text before `void`.
 
     Raises:
         ValueError: operations that C does not have.
@@ -92,13 +92,13 @@ def in_c(
 
 
 def macros(written: Iterable[Written], real: Real = DOUBLE) -> str:
-    """Definitions of the macros that these functions call, such as `#define SF_EXP exp`."""
+    """Return definitions of the macros that these functions call, such as `#define SF_EXP exp`."""
     calls = sorted({call for one in written for call in one.calls})
     return "".join(f"#define {macro(call, real)} {call}{real.letter}\n" for call in calls)
 
 
 def _dense(function: ca.Function, kept: Sequence[int]) -> ca.Function:
-    """The results `kept` of a Function, dense and written out."""
+    """Return the results `kept` of a Function, dense and inlined."""
     function = function if function.is_a("SXFunction") else function.expand()
     symbols = [ca.SX.sym(name, *function.size_in(k)) for k, name in enumerate(function.name_in())]
     values = function.call(symbols, True, False)
@@ -106,15 +106,15 @@ def _dense(function: ca.Function, kept: Sequence[int]) -> ca.Function:
 
 
 def all_macros() -> str:
-    """Definitions of all macros through which written functions call transcendental ones."""
+    """Return definitions of all macros through which written functions call transcendental ones."""
     called = sorted(set(TRANSCENDENTAL.values()))
     return "".join(f"#define {macro(name, DOUBLE)} {name}\n" for name in called)
 
 
 def routine(function: ca.Function, name: str) -> str:
-    """C of `function`: static void name(const double *a0, ..., double *r0, ...), dense columns.
+    """Return the C of `function`: static void name(const double *a0, ..., double *r0, ...).
 
-    Results must not share memory with arguments.
+    Columns are dense. Results must not share memory with arguments.
 
     Raises:
         ValueError: operations that C does not have; calls with sparse arguments.
@@ -138,8 +138,8 @@ class _Pieces:
     """C functions of the blocks that an MX Function calls, and its own C.
 
     Attributes:
-        name: of the function in C, with which those of its blocks begin.
-        known: the blocks written so far, by what they are.
+        name: of the function in C, prefix of the names of its blocks.
+        known: the blocks written so far, by their hash.
         arrays: symbols (n, 1) and the C arrays that hold them.
     """
 
@@ -150,7 +150,7 @@ class _Pieces:
     lines: list[str] = field(default_factory=list[str])
 
     def written(self, function: ca.Function) -> str:
-        """C of `function` and of all that it calls."""
+        """Return the C of `function` and of all functions that it calls."""
         slots: dict[int, ca.SX] = {}
         results: dict[int, list[tuple[int, ca.SX]]] = {}
         for k in range(function.n_instructions()):
@@ -178,7 +178,7 @@ class _Pieces:
         return any(array in line for line in self.lines)
 
     def _array(self, name: str, sparsity: ca.Sparsity) -> ca.SX:
-        """Symbols for the numbers of a C array."""
+        """Return symbols for the numbers of a C array."""
         if not sparsity.is_dense():
             raise ValueError(f"codegen '{self.name}': expected calls of dense columns, got sparse")
         symbols = ca.SX.sym(name, sparsity.numel())
@@ -186,7 +186,7 @@ class _Pieces:
         return ca.reshape(symbols, sparsity.size1(), sparsity.size2())
 
     def _block(self, function: ca.Function) -> str:
-        """Name of the C function of a block, which is written at its first call."""
+        """Return the name of the C function of a block, which is written at its first call."""
         key = function.__hash__()
         if key not in self.known:
             self.known[key] = f"{self.name}_{len(self.known) + 1}_{function.name()}"
@@ -194,7 +194,7 @@ class _Pieces:
         return self.known[key]
 
     def _call(self, function: ca.Function, arguments: list[ca.SX], number: int) -> list[ca.SX]:
-        """The results of a call."""
+        """Return the results of a call."""
         name = self._block(function)
         places = [self._place(a, f"x{number}_{i}") for i, a in enumerate(arguments)]
         made = [f"y{number}_{i}" for i in range(function.n_out())]
@@ -205,7 +205,7 @@ class _Pieces:
         return [self._array(one, shape) for one, shape in zip(made, dense, strict=True)]
 
     def _place(self, value: ca.SX, name: str) -> str:
-        """Where the numbers of an argument stand in C: part of an array, or one made for them."""
+        """Return the C array of an argument: part of an existing array, or a new one."""
         column = ca.vec(ca.densify(value))
         for symbols, array in self.arrays:
             begin = _within(column, symbols)
@@ -216,7 +216,7 @@ class _Pieces:
         return name
 
     def _write(self, values: Sequence[ca.SX], arrays: Sequence[str]) -> None:
-        """Statements that put `values` into C arrays."""
+        """Append statements that store `values` in C arrays."""
         used = [(s, name) for s, name in self.arrays if ca.depends_on(ca.veccat(*values), s)]
         glue = ca.Function(
             "between", [s for s, _ in used], ca.cse([ca.vec(value) for value in values])
@@ -231,13 +231,13 @@ class _Pieces:
 
 
 def _joined(parts: list[tuple[int, ca.SX]]) -> ca.SX:
-    """A result of its parts and where each begins."""
+    """Assemble a result from its parts and their offsets."""
     ordered = sorted(parts, key=lambda part: part[0])
     return ca.densify(ca.vertcat(ca.SX(0, 1), *(ca.vec(part) for _, part in ordered)))
 
 
 def _within(column: ca.SX, symbols: ca.SX) -> int | None:
-    """Where in `symbols` the rows of `column` stand one after the other; None where they do not."""
+    """Return the offset of `column` in `symbols`; None if it is not a contiguous part."""
     count = column.numel()
     if not count or count > symbols.numel():
         return None
@@ -253,7 +253,7 @@ def _hashes(column: ca.SX) -> Iterator[int]:
 
 
 def _between(node: ca.MX, arguments: list[ca.SX]) -> ca.SX:
-    """The value of an MX operation that is no call."""
+    """Return the value of an MX operation that is not a call."""
     if not arguments:
         return ca.SX(ca.evalf(node))
     parts = [node.dep(i) for i in range(node.n_dep())]

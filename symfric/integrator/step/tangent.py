@@ -1,4 +1,4 @@
-"""The tangent-space form of a constrained mechanism: index 0, in a chart made for every step.
+"""Tangent-space form of a constrained mechanism: index 0, in a chart made for every step.
 
 At (q0, t0) on the constraints, with U = phi_q(q0)', B = (U'U)^-1 and the columns of V an
 orthonormal basis of the tangent space, phi_q(q0) V = 0, positions and velocities near it are
@@ -7,17 +7,17 @@ functions of as many numbers w, w' as there are degrees of freedom:
     q  = q0 + V w - U u,    u with phi(q, t) = 0:            u  <- u + B phi
     q' = V w' - U s,        s with phi_q q' + phi_t = 0:     s  <- s + B (phi_q q' + phi_t)
 
-and since V'V = I and V'U = 0,
+and since V'V = I and V'U = 0, a method integrates
 
     (w)' = w',    (w')' = V' a,    M a + phi_q' lam = Q,   phi_q a + gamma = 0,   normal forces
 
-is what a method integrates: as many differential equations as the machine has degrees of freedom,
-with accelerations a, multipliers lam and normal forces as linearly solved unknowns. B stays frozen
-over the step. Derivatives at its start follow from the implicit-function theorem,
+with as many differential equations as degrees of freedom; accelerations a, multipliers lam and
+normal forces are linearly solved unknowns. B stays frozen over the step. Derivatives at its start
+follow from the implicit-function theorem,
 
     dq = V dw - U B phi_t dt,    dq' = V dw' - U B [r_q dq + r_t dt],    r = phi_q q' + phi_t,
 
-so that none goes through a factorisation. The next step gets V and projects it onto its own tangent
+so none goes through a factorisation. The next step gets V and projects it onto its own tangent
 space: no basis is ever chosen, and none turns singular.
 
 Source: Haug, Mech. Based Des. Struct. Mach., 2016-2018 (tangent-space index-0 DAE).
@@ -37,7 +37,8 @@ from symfric.integrator.methods.method import Trial
 
 POSITION, VELOCITY = 3, 4
 """Frozen iterations of q and q' from the origin of the chart: each gains an order in |w|, from 2
-and from 1, and the stages of a method of order 5 want 5."""
+and from 1, and the stages of a method of order 5 need 5.
+"""
 
 
 @final
@@ -52,8 +53,8 @@ class Tangent:
         leave: (y_c, data) -> y, on the constraints to the order of the method.
         polish: (y, d) -> y on the constraints.
         lift: (e_c, data) -> change of y, to first order.
-        bend: (y0, y1, h, data) -> what the dense output needs in addition, normal to the chart:
-            two columns, of a cubic with the values and rates at both ends.
+        bend: (y0, y1, h, data) -> correction of the dense output, normal to the chart: two columns,
+            of a cubic with the values and rates at both ends.
     """
 
     reduced: System
@@ -65,7 +66,7 @@ class Tangent:
     bend: ca.Function
 
     def trial(self, found: Trial, y: Any, h: Any, d: Any, data: Any) -> Trial:
-        """What a method made of a step in the chart, in the unknowns of the mechanism."""
+        """Convert a step in the chart to the unknowns of the mechanism."""
         free = self.leave(found.end, data)
         end = self.polish(free, d)
         dense = [self.lift(row, data) for row in found.dense]
@@ -83,7 +84,7 @@ class Tangent:
 @final
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Where things stand in y = (q, q', s, a, lam and normal forces, V, t)."""
+    """Layout of y = (q, q', s, a, lam and normal forces, V, t)."""
 
     n: int
     nv: int
@@ -103,14 +104,14 @@ class _Rows:
 
     @property
     def others(self) -> list[int]:
-        """Rows that a chart leaves as they are, but for time."""
+        """Rows that a chart leaves unchanged, except time."""
         return [*self.states, *self.algebraic]
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Constraints:
-    """Functions of positions, velocities, time and run data.
+    """Constraints as Functions of positions, velocities, time and run data.
 
     Attributes:
         phi: (q, t, d) -> constraints.
@@ -174,22 +175,22 @@ class _Chart:
 
     @property
     def symbols(self) -> ca.SX:
-        """All as one column."""
+        """All symbols as one column."""
         return ca.vertcat(self.q0, ca.vec(self.V), _entries(self.phi_q), self.lu)
 
     def across(self, r: ca.SX) -> ca.SX:
-        """U B r, column by column."""
+        """Return U B r, column by column."""
         columns = (self.phi_q.T @ self.solve(self.lu, r[:, i]) for i in range(r.shape[1]))
         return ca.horzcat(ca.SX(self.q0.numel(), 0), *columns)
 
     def along(self, x: ca.SX) -> ca.SX:
-        """The part of x in the chart, V V' x."""
+        """Return the part of x in the chart, V V' x."""
         return self.V @ (self.V.T @ x)
 
 
 @lru_cache(maxsize=2)
 def tangent(system: System) -> Tangent | None:
-    """The tangent-space form of a mechanism that asks for it; None of any other system."""
+    """Return the tangent-space form of a mechanism that requests it; None for any other system."""
     manifold = system.manifold
     if manifold is None or not manifold.charted:
         return None
@@ -215,12 +216,12 @@ def tangent(system: System) -> Tangent | None:
 
 
 def _entries(matrix: ca.SX) -> ca.SX:
-    """The nonzeros as a column."""
+    """Return the nonzeros as a column."""
     return ca.vec(ca.SX(matrix.nz[:]))
 
 
 def _parts(y_c: ca.SX, rows: _Rows) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """W, w', the unknowns a chart leaves as they are, time."""
+    """Return w, w', the unknowns that a chart leaves unchanged, and time."""
     end = 2 * rows.nv + len(rows.others)
     return y_c[: rows.nv], y_c[rows.nv : 2 * rows.nv], y_c[2 * rows.nv : end], y_c[end:, 0]
 
@@ -228,7 +229,7 @@ def _parts(y_c: ca.SX, rows: _Rows) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
 def _embedded(
     y_c: ca.SX, d: ca.SX, rows: _Rows, constraints: _Constraints, chart: _Chart
 ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Positions, velocities, other unknowns and time at y_c."""
+    """Return positions, velocities, other unknowns and time at y_c."""
     w, wd, others, t = _parts(y_c, rows)
     q, qd = chart.q0 + chart.V @ w, chart.V @ wd
     for _ in range(POSITION):
@@ -239,7 +240,7 @@ def _embedded(
 
 
 def _reduced(system: System, rows: _Rows, constraints: _Constraints, chart: _Chart) -> System:
-    """The equations in the chart, with their Jacobian at its origin."""
+    """Return the equations in the chart, with their Jacobian at its origin."""
     n, nv = rows.n, rows.nv
     q, qd, t = system.y[:n], system.y[n : 2 * n], system.y[list(rows.time)]
     own = system.y[rows.others]
@@ -277,7 +278,7 @@ def _reduced(system: System, rows: _Rows, constraints: _Constraints, chart: _Cha
 def _slope(
     system: System, y_c: ca.SX, rows: _Rows, constraints: _Constraints, chart: _Chart
 ) -> ca.SX:
-    """Jacobian of the reduced equations at the origin of the chart."""
+    """Return the Jacobian of the reduced equations at the origin of the chart."""
     n, nv, d = rows.n, rows.nv, system.d
     _, wd, own, t = _parts(y_c, rows)
     q, qd, time = system.y[:n], system.y[n : 2 * n], system.y[list(rows.time)]
@@ -309,7 +310,7 @@ def _slope(
 
 
 def _open(system: System, rows: _Rows, constraints: _Constraints, chart: _Chart) -> ca.Function:
-    """The chart at y: its V projected onto the tangent space there and made orthonormal."""
+    """Return the chart at y: its V projected onto the tangent space there and made orthonormal."""
     y, d, n = system.y, system.d, rows.n
     before = ca.SX.sym("before", n, rows.nv)
     projected = before - chart.across(chart.phi_q @ before)
@@ -329,7 +330,7 @@ def _open(system: System, rows: _Rows, constraints: _Constraints, chart: _Chart)
 
 
 def _bend(system: System, data: ca.SX, rows: _Rows, chart: _Chart) -> ca.Function:
-    """Cubics through positions and velocities at both ends, normal to the chart."""
+    """Return cubics through positions and velocities at both ends, normal to the chart."""
     n, h = rows.n, ca.SX.sym("h")
     y0, y1 = system.y, ca.SX.sym("y1", system.n)
     first, second = ca.SX.zeros(system.n), ca.SX.zeros(system.n)

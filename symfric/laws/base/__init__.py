@@ -1,1 +1,1 @@
-"""Base classes of laws, and the smooth functions that they are made of."""
+"""Base classes of laws, and their smooth functions."""

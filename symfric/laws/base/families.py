@@ -1,4 +1,4 @@
-"""Families of laws: two levels, one formula for both sides of rest, rest as a mode."""
+"""Families of laws: with two levels, with one formula for both directions, with a stick mode."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -16,7 +16,7 @@ Fall = Callable[[Scalar, Scalar, Scalar], Scalar]
 
 @dataclass(frozen=True, eq=False)
 class Levels(Law):
-    """A law with a static level mu_s N that is not below its dynamic level mu_d N."""
+    """Law with a static level mu_s N that is not below its dynamic level mu_d N."""
 
     ordered = (("mu_d", "mu_s"),)
 
@@ -25,38 +25,38 @@ class Levels(Law):
 
 
 class TwoLevels(Levels, StaticLaw):
-    """A law without states that holds mu_s N at rest and tends to mu_d N in sliding."""
+    """Law without states, with mu_s N at rest and mu_d N as its limit in sliding."""
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 in the limit of zero widths."""
         return self.mu_d * N
 
     def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
+        """Return the break-away force [N], mu_s N."""
         return self.mu_s * N
 
 
 @dataclass(frozen=True, eq=False)
 class Curve(StaticLaw):
-    """A law without states that is written once, with the direction s of slip and a fall.
+    """Law without states with one formula for both directions s of slip.
 
         F = formula(v, N, s, fall)
 
-    `force` takes s = tanh(v / v_eps), and a fall that rounds |v| over 1e-4 v_eps; `outside` takes
-    s = 1 and the fall on one side of rest. v_eps is the first parameter that is a width, or the
-    inverse of a steepness.
+    `force` uses s = tanh(v / v_eps), and a fall that rounds |v| over 1e-4 v_eps; `outside` uses s =
+    1 and the fall on one side of rest. v_eps is the first parameter that is a width, or the inverse
+    of a steepness.
     """
 
     @abstractmethod
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] at the velocity `v` with the direction `s`."""
+        """Return the friction force [N] at the velocity `v` with the direction `s`."""
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 in the limit of zero widths."""
         return self.formula(speed, N, 1.0, smooth.fall)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         width = next(item for item in fields_of(self) if item.metadata.get("width"))
         value = getattr(self, width.name)
         if width.metadata["width"] > 0:
@@ -67,15 +67,15 @@ class Curve(StaticLaw):
 
 
 FINEST = 1e-7
-"""Relative tolerance of runs with such a law at most: they are what other laws are measured by."""
+"""Largest relative tolerance of runs with such a law, a reference for other laws."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sticking(Law):
-    """A law whose mode is the direction of sliding, or 0 for a contact at rest.
+    """Law with a mode: the direction of sliding, or 0 in stick.
 
         F = slip force in the direction `mode`   while sliding
-        F = F_e                                  at rest, mode = 0, which ends at the static level
+        F = F_e                                  in stick, mode = 0, up to the static level
 
     A form without modes (`has_mode` false) has no states.
     """
@@ -85,7 +85,7 @@ class Sticking(Law):
     @property
     @abstractmethod
     def has_mode(self) -> bool:
-        """Return True if rest is a mode and not a band of velocities."""
+        """True if stick is a mode and not a band of velocities."""
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -98,14 +98,16 @@ class Sticking(Law):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The applied force F_e [N], which rest has to carry."""
+        """Applied force F_e [N], which is carried in stick."""
         return (APPLIED_FORCE,)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Zero; beyond the static level at rest the overload (F_e -+ level)/(|F_e| + 1 N) [1/s].
+        """Return zero; in stick beyond the static level the overload (F_e -+ level)/(|F_e| + 1 N)
+        [1/s].
 
-        Nothing depends on it, and rest ends at the instant where it would begin. It is there for
-        error control, which would else step over a short overload: at rest nothing else moves.
+        Nothing depends on it, and stick ends at the instant where it would become nonzero. It lets
+        error control detect a short overload, which a long step would otherwise skip: in stick
+        nothing moves.
         """
         if not self.has_mode:
             return empty(v)
@@ -115,34 +117,34 @@ class Sticking(Law):
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
 
     def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N: the largest that rest holds."""
+        """Return the break-away force [N], mu_s N, the largest force in stick."""
         return self.mu_s * N
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The direction of sliding."""
+        """Return the direction of sliding."""
         return column(smooth.sign(v, 0.0)) if self.has_mode else empty(v)
 
 
 def rests(mode: Scalar) -> Scalar:
-    """Return True if `mode`, -1, 0 or 1 but for the overload that error control sees, says rest."""
+    """Return True if `mode`, up to the overload for error control -1, 0 or 1, is stick."""
     return smooth.magnitude(mode, 0.0) < 0.5
 
 
 def carried(mode: Scalar, F_e: Scalar, slip: Scalar) -> Scalar:
-    """The force [N] of the contact: `slip` while it slides, at rest whatever is applied.
+    """Return the force [N] of the contact: `slip` while sliding, the applied force in stick.
 
-    Not clipped to the static level: the equations of rest stay smooth beyond its end, and so does
-    the dense output on which that end is found.
+    It is not clipped to the static level: the equations of stick stay smooth beyond its end, and so
+    does the dense output on which that end is located.
     """
     return smooth.choose(rests(mode), F_e, slip)
 
 
 def stick_and_slip(v: Scalar, mode: Scalar, F_e: Scalar, static: Scalar) -> tuple[Switch, ...]:
-    """End of sliding at v = 0, and its beginning where the load passes `static`.
+    """Return the end of sliding at v = 0, and its start where the load exceeds `static`.
 
-    Sliding goes on in the other direction where the contact cannot hold `F_e`; rest ends at once
-    where the load is beyond `static` from the very start. While the load beyond `static` pulls
-    forward v = 0 is a beginning, and no end.
+    Sliding continues in the other direction if the contact cannot hold `F_e`; stick ends at once if
+    the load exceeds `static` from the start. While a load above `static` pulls forward, v = 0 is a
+    start of sliding, not an end.
     """
     onward, still = smooth.choose(F_e < 0, -1.0, 1.0), rests(mode)
     excess = smooth.magnitude(F_e, 0.0) - static

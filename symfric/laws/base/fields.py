@@ -1,7 +1,7 @@
-"""Parameters that many laws share: name, unit, role, bounds and meaning, each written once.
+"""Parameter fields shared by many laws: name, unit, role, bounds and meaning.
 
-A law gives the default, as in `mu_s: Scalar = MU_S(0.15)`, and what differs, as in
-`mu_d: Scalar = MU_D(0.1, lower=1e-12)` where it divides by the level.
+A law gives the default, as in `mu_s: Scalar = MU_S(0.15)`, and its deviations, as in
+`mu_d: Scalar = MU_D(0.1, lower=1e-12)` if it divides by the level.
 """
 
 from functools import partial
@@ -40,5 +40,6 @@ V_EPS = partial(param, unit="m/s", role="width", width=1, doc="smoothing velocit
 F_EPS = partial(WIDTH, unit="N", doc="rounding of the break-away")
 U_EPS = partial(WIDTH, doc="rounding of the peak", lower=0.0, upper=1.0)
 REST_EPS = partial(param, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0)
-"""Of laws with states, whose bristles smooth the jump at rest: it is no width of that jump."""
+"""Width for laws with states, whose bristles smooth the jump at rest: it is not a width of that
+jump."""
 R_EPS = partial(WIDTH, doc="smoothing of the load share")

@@ -33,7 +33,7 @@ PHENOMENA = {
     "N": "no drift under vibration below break-away",
     "T": "static friction grows with the dwell time",
 }
-"""What a law can show, by the codes in `Facts.phenomena`."""
+"""Phenomena that a law can reproduce, by the codes in `Facts.phenomena`."""
 
 CONFIDENCE = {
     "two sources": "the formula was compared with two independent ones",
@@ -43,7 +43,7 @@ CONFIDENCE = {
     "constructed": "made here",
     "unverified": "written from memory, compared with no publication and no public code",
 }
-"""How sure a formula is, by the words in `Facts.confidence`."""
+"""Confidence in a formula, by the words in `Facts.confidence`."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class Facts:
         confidence: one of `CONFIDENCE`.
         source: the publication, read or not.
         odd: the force changes sign with v, states and further inputs together.
-        load: how the dry force follows the normal force: "proportional", "independent" or in
-            words.
-        checked: what the formula was compared with, or what else speaks for it.
+        load: dependence of the dry force on the normal force: "proportional", "independent" or
+            a description.
+        checked: the reference of the comparison, or other evidence.
     """
 
     phenomena: tuple[str, ...]
@@ -78,11 +78,11 @@ class Facts:
 
 @dataclass(frozen=True)
 class State:
-    """An internal state of a law: name, unit, typical magnitude and what it is.
+    """Internal state of a law: name, unit, typical magnitude and description.
 
-    `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such
-    as deflections and forces, change sign with it. A `whole` state is a mode: -1, 0 or 1, and
-    results give these numbers.
+    `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such as
+    deflections and forces, change sign with it. A `whole` state is a mode: -1, 0 or 1, also in
+    results.
     """
 
     name: str
@@ -97,7 +97,7 @@ class State:
 class Input:
     """Input of a law besides v and N: a keyword-only argument of its methods.
 
-    `nominal` is its typical magnitude, `steady` its value in pictures of steady sliding (v > 0).
+    `nominal` is its typical magnitude, `steady` its value in figures of steady sliding (v > 0).
     """
 
     name: str
@@ -109,20 +109,20 @@ class Input:
 
 FORCE = "F_e"
 APPLIED_FORCE = Input(FORCE, "N", "force that keeps the sliding velocity constant", steady=1.0)
-"""What the contact must carry for no acceleration: m dv/dt = F_e - F."""
+"""Force that the contact must carry for zero acceleration: m dv/dt = F_e - F."""
 
 
 @dataclass(frozen=True, eq=False)
 class Switch:
-    """A change of mode: the states in `reset` jump when `expression` passes through zero.
+    """Change of mode: the states in `reset` jump when `expression` passes through zero.
 
     Attributes:
         expression: in v, N, z and the further inputs of the law.
         direction: +1 only rising, -1 only falling, 0 both.
         reset: state -> its value afterwards, in terms of the values before.
-        halts: the sliding velocity, zero at this instant, becomes zero without rounding.
-        at_start: it happens at the start, too, where the expression is beyond zero already.
-        rtol: largest relative tolerance that a run may have, where a law promises exact instants.
+        halts: True if the sliding velocity, zero at this instant, is set to exactly zero.
+        at_start: True if it also happens at the start if the expression is already beyond zero.
+        rtol: largest relative tolerance of a run, if the law requires exact instants.
     """
 
     name: str
@@ -135,10 +135,10 @@ class Switch:
 
 
 def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
-    """`method(law, v, N, z)` that takes states as people have them, and refuses others.
+    """Wrap `method(law, v, N, z)` so that it accepts states in any common form, and checks them.
 
     Raises:
-        ValueError: another number of states than the law has; an integer that no float holds.
+        ValueError: another number of states than the law has; an integer too large for a float.
     """
 
     @wraps(method)
@@ -155,15 +155,15 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
 
 @dataclass(frozen=True, eq=False)
 class Law(Parametric, ABC):
-    """A friction law F(v, N, z) with internal states dz/dt = rate(v, N, z).
+    """Friction law F(v, N, z) with internal states dz/dt = rate(v, N, z).
 
-    Sign: `force` has the sign of the sliding velocity in steady sliding; whoever applies it to a
-    body writes the minus (m dv/dt = F_e - force).
+    Sign: `force` has the sign of the sliding velocity in steady sliding; it is applied to a body
+    with a minus (m dv/dt = F_e - force).
 
     `v` is the sliding velocity [m/s], `N` >= 0 the normal force [N], `z` the column of internal
-    states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states); of one state it
+    states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states); for one state it
     may be a number. Any of them may be a float, a NumPy array, SX, MX or DM. A law that needs
-    another input, such as the applied tangential force, names it in `inputs` and takes it as a
+    another input, such as the applied tangential force, lists it in `inputs` and takes it as a
     keyword-only argument with default 0.
 
     A law with modes (stick, slip) keeps them in states that only jump, at its `switches`.
@@ -189,10 +189,10 @@ class Law(Parametric, ABC):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Sliding velocity [m/s] over which the force changes; inf where there is none.
+        """Sliding velocity [m/s] over which the force changes; inf if there is none.
 
-        Unless the law says otherwise that of its first width that is not zero or, without one, its
-        first parameter with the role "velocity scale"; the inverse of a steepness [s/m].
+        By default it is that of its first nonzero width or, without one, its first parameter with
+        the role "velocity scale"; the inverse of a steepness [s/m].
         """
         known = parameters(self).values()
         widths = [p for p in known if p.width and not equals(p.value, 0.0)]
@@ -202,94 +202,103 @@ class Law(Parametric, ABC):
 
     @abstractmethod
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N] opposing the sliding velocity."""
+        """Return the friction force [N] opposing the sliding velocity."""
 
     @property
     def widths(self) -> dict[str, int]:
         """Parameters that smooth the jump at v = 0: name -> exponent of their unit in m/s.
 
-        Scaled by s^exponent, all of them, the layer of velocities in which the law differs from
-        `sliding` is s times as wide. Empty for laws that do not smooth: those with modes, and
-        bristles, whose stiffness is physics. A float 0 is no width.
+        If all of them are scaled by s^exponent, the band of velocities in which the law differs
+        from `sliding` is s times as wide. Empty for laws without smoothing: those with modes, and
+        bristles, whose stiffness is physical. A float 0 is not a width.
         """
         known = parameters(self).items()
         return {name: p.width for name, p in known if p.width and not equals(p.value, 0.0)}
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the `widths` vanish; of a dynamic law when steady.
+        """Return the sliding force [N] at a speed >= 0 in the limit of zero `widths`, when steady.
 
-        With its one-sided derivatives at speed 0, and finite below it: what an odd law writes, and
-        `sliding` and `static_level` follow. All three take further inputs but F_e by keyword.
+        It has one-sided derivatives at speed 0, and is finite below. An odd law defines this
+        method, and `sliding` and `static_level` follow from it. All three take further inputs
+        except F_e by keyword.
 
         Raises:
-            ValueError: the law does not say, or has no such limit.
+            ValueError: the law does not define it, or has no such limit.
         """
-        raise one_sided(self, "it does not say; write its method `outside(speed, N)`")
+        raise one_sided(self, "it is not defined; write its method `outside(speed, N)`")
 
     def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
-        """Sliding force [N] on one side of v = 0, `side` 1 or -1, as the `widths` vanish.
+        """Return the sliding force [N] on one side of v = 0, `side` 1 or -1, as the `widths`
+        vanish.
 
-        Smooth in v from v = 0 on, with the sign of `side`; a Stribeck curve with a velocity of its
-        own stays. Raises as `outside`.
+        It is smooth in v from v = 0 on, with the sign of `side`; a Stribeck curve with a velocity
+        of its own stays. Raises as `outside`.
         """
         return side * self.outside(side * v, N)
 
     def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """Largest force [N] that rest holds against being pulled to `side`, as the widths vanish.
+        """Return the largest force [N] in stick against a pull to `side`, in the limit of zero
+        widths.
 
-        The top of the curve at rest, unless the law says otherwise. Raises as `outside`.
+        By default it is the top of the curve at rest. Raises as `outside`.
         """
         return self.outside(0.0, N)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Largest force [N] that the states carry in any motion at a steady load: a bound.
+        """Return an upper bound of the force [N] carried by the states in any motion at a steady
+        load.
 
-        The static level, unless the law says otherwise. Raises as `outside`.
+        By default it is the static level. Raises as `outside`.
         """
         return self.static_level(N, side, **inputs)
 
     @abstractmethod
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Time derivative of the internal states, shape (n, 1) or (n, ...)."""
+        """Return the time derivative of the internal states, shape (n, 1) or (n, ...)."""
 
     @abstractmethod
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Internal states after long sliding at constant `v`; zero at v = 0.
+        """Return the internal states after long sliding at constant `v`; zero at v = 0.
 
         With a smoothing velocity the rate vanishes there to rounding beyond 20 v_eps.
         """
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """The changes of mode; none for a law whose rate says it all."""
+        """Return the changes of mode; empty for a law without modes."""
         return ()
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """States after a step of `h` [s] with v and N held, and their means over it.
+        """Return states after a step of `h` [s] with v and N held, and their means over it.
 
-        None where they are not known in closed form; for laws with modes, whose rates do not say.
+        None if they are not known in closed form; needed for laws with modes, where rates are not
+        enough.
         """
         return None
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Value at which each state comes to rest while v, N and the other states stay constant.
+        """Return the equilibrium of each state while v, N and the other states stay constant.
 
-        None for a law of which only the `steady_state` is known, where all rest together.
+        None for a law with a known `steady_state` only, in which all states are steady.
         """
         return None
 
     def warnings(self) -> tuple[str, ...]:
-        """What the present numbers give away, such as passivity, one sentence each."""
+        """Return warnings about the present parameters, such as missing passivity, one sentence
+        each.
+        """
         return ()
 
     def thumbnail(self) -> "Figure | None":
-        """The force in steady sliding under 1 N, small; nothing for a law with symbols."""
+        """Return a small figure of the force in steady sliding under 1 N; None for a law with
+        symbols.
+        """
         from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
 
         if any(is_symbolic(p.value) for p in parameters(self).values()):
             return None
         scale = checks.as_number(self.velocity_scale)
         largest = 20 * scale if scale is not None and isfinite(scale) else 1.0
-        v = largest * np.linspace(-1.0, 1.0, 400)  # even: v = 0 is not among them
+        v = largest * np.linspace(-1.0, 1.0, 400)  # even count: excludes v = 0
         ahead = smooth.sign(v, 0.0) if self.facts.odd else 1.0
         inputs = {i.name: i.steady * ahead for i in self.inputs}
         with np.errstate(all="ignore"):
@@ -305,7 +314,7 @@ class Law(Parametric, ABC):
 
 
 def one_sided(law: Law, reason: str) -> ValueError:
-    """The error for a law whose force has no limit, or none known, on one side of rest."""
+    """Return the error for a law whose force has no known limit on one side of rest."""
     return ValueError(
         f"{type(law).__name__}: expected a law with a sliding force on each side of v = 0 and a "
         f"static level, got one without; {reason}"
@@ -313,54 +322,54 @@ def one_sided(law: Law, reason: str) -> ValueError:
 
 
 def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
-    """Those of `inputs` that `law` takes."""
+    """Return those of `inputs` that `law` takes."""
     return {i.name: inputs[i.name] for i in law.inputs if i.name in inputs}
 
 
 def check_law(where: str, law: object) -> None:
-    """Refuse what is not a law: its class, or its name."""
+    """Raise an error for anything but a law, such as its class or its name."""
     if isinstance(law, Law):
         return
     hint = ""
     if isinstance(law, type) and issubclass(law, Law):
         hint = f"write {law.__name__}() with parentheses"
     elif isinstance(law, str):
-        hint = f"law_from_text({law!r}) makes one of its name"
+        hint = f"use law_from_text({law!r})"
     raise checks.refused(where, "a law such as LuGre()", law, hint)
 
 
 @dataclass(frozen=True, eq=False)
 class StaticLaw(Law):
-    """A memoryless law: no internal states, the rate has no rows."""
+    """Memoryless law: no internal states, no rows of the rate."""
 
     @property
     def states(self) -> tuple[State, ...]:
-        """No internal states: the force is a map of v and N."""
+        """No internal states: the force is a function of v and N."""
         return ()
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """No rows."""
+        """Return an empty column."""
         return empty(v)
 
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
     ) -> tuple[Switch, ...]:
-        """No modes: nothing jumps."""
+        """Return no changes of mode."""
         return ()
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """No rows."""
+        """Return an empty column."""
         return empty(v)
 
 
 def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
-    """`z` with a row for each state of `law`.
+    """Return `z` with a row for each state of `law`.
 
-    Of a law of one state a number is its row, and so is an array beside one of velocities.
+    For a law of one state a number is its row, and so is an array with an array of velocities.
     """
     given = z
     if is_casadi(z):
-        rows = z.shape[0] if z.numel() else 0  # what is cut of a scalar has shape (1, 0)
+        rows = z.shape[0] if z.numel() else 0  # a slice of a scalar has shape (1, 0)
     elif isinstance(z, Rows):
         return z
     elif is_number(z):
@@ -385,6 +394,6 @@ def _wrong_states(law: Law, z: Scalar, rows: int) -> ValueError:
     else:
         names = checks.listed(s.name for s in known)
         what = f"z with {len(known)} {'state' if len(known) == 1 else 'states'}, {names}"
-        hint = "z = law.steady_state(v, N) are those of steady sliding"
+        hint = "z = law.steady_state(v, N) gives those of steady sliding"
     got = "none" if rows == 0 else checks.shown(z)
     return ValueError(f"{name}: expected {what}, got {got}; {hint}")

@@ -1,8 +1,8 @@
-"""Smooth stand-ins for sign, abs, max and powers: the only home of regularisation.
+"""Smooth approximations of sign, abs, max and powers: all regularisation of laws.
 
 `fabs`, `sign`, `if_else`, `norm` and fractional powers have silently wrong or NaN derivatives at
 zero; no law uses them. A width `eps` is always a parameter of the law, in the unit of `x`. The
-float `eps = 0.0` asks for the original, non-smooth function where one is offered.
+float `eps = 0.0` selects the original, non-smooth function where one is offered.
 """
 
 import casadi as ca
@@ -12,21 +12,21 @@ from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_casadi, is
 from symfric.foundation.vector import ROUND, TINY, NotIsotropicError, Vector, Vectors, no_vector
 
 BACK = 1e16
-"""Yielding this many times as fast as slip at the limit, an element is back there at once."""
+"""Yielding factor above which an element returns to its limit at once."""
 
 SHARE = 1e-6
-"""Share of the Stribeck velocity over which one side of its fall is rounded at rest."""
+"""Fraction of the Stribeck velocity over which one side of its fall is rounded at rest."""
 
 CORNER = 1e-4
-"""Share of the smoothing velocity over which a static law rounds |v| in its fall.
+"""Fraction of the smoothing velocity over which a static law rounds |v| in its fall.
 
-The smooth sign beside the fall is as small as this share there: the force differs from the formula
-with |v| by less than the share of its fall.
+The smooth sign multiplied with the fall is as small as this fraction there: the force differs from
+the formula with |v| by less than this fraction of its fall.
 """
 
 
 def sign(x: Scalar, eps: Scalar) -> Scalar:
-    """Smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps.
+    """Return the smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps.
 
     The float `eps = 0.0` gives the sign itself, with value and derivative 0 at x = 0.
     """
@@ -38,10 +38,10 @@ def sign(x: Scalar, eps: Scalar) -> Scalar:
 
 
 def magnitude(x: Scalar, eps: Scalar) -> Scalar:
-    """Smooth |x| = x tanh(x / eps), exactly 0 at x = 0.
+    """Return the smooth |x| = x tanh(x / eps), exactly 0 at x = 0.
 
-    Being zero at rest it does not relax a bristle that stands still, and beyond 20 eps
-    it equals |x| to rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
+    Since it is zero at rest, it does not relax a bristle at rest; beyond 20 eps it equals |x| to
+    rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
     """
     if equals(eps, 0.0):
         if isinstance(x, Vector):
@@ -51,11 +51,11 @@ def magnitude(x: Scalar, eps: Scalar) -> Scalar:
 
 
 def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
-    """Smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, exactly 0 at x = 0.
+    """Return the smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, 0 at x = 0.
 
-    Finite with all derivatives in x and in the exponent. The float `exponent = 2.0`
-    gives x^2 exactly and costs one multiplication; the float `eps = 0.0` gives |x|^exponent
-    itself, without a derivative at x = 0 for exponents below 1.
+    It is finite with all derivatives in x and in the exponent. The float `exponent = 2.0` gives x^2
+    exactly and costs one multiplication; the float `eps = 0.0` gives |x|^exponent itself, without a
+    derivative at x = 0 for exponents below 1.
     """
     if equals(exponent, 2.0):
         return x * x
@@ -65,31 +65,31 @@ def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
 
 
 def overload(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
-    """`power` of a load share that may be far above 1, bounded so that it is a number in float.
+    """Return `power` of a load share that may be far above 1, bounded to avoid overflow in float.
 
         w^(n/2) [1 + n/2 (1 - w/q)] - eps^n,   q = x^2 + eps^2
         w = q well below Q = BACK^(2/n), w = Q well above it, smooth
 
-    To the bit the `power` up to q = (1 + Q)/2, and never falling. What yields as fast as beyond is
-    back at its limit within a path of 1/BACK of its stretch, the rounding of a double: how fast it
-    is cannot be seen in any result. But |x|^50 of a load that fell to a sixth is no number in
-    float, and |x|^1000 of one that fell to a half none in double.
+    It equals `power` bit for bit up to q = (1 + Q)/2, and is monotonic. An element that yields
+    faster returns to its limit within a path of 1/BACK of its stretch, the rounding of a double, so
+    its exact rate does not affect any result. In contrast, |x|^50 of a load that fell to a sixth
+    overflows in float, and |x|^1000 of one that fell to a half in double.
     """
     if equals(exponent, 2.0) or equals(eps, 0.0):
         return power(x, exponent, eps)
     q, top = x * x + eps * eps, BACK ** (2 / exponent)
-    beyond = tanh(40 * (q - top) / (top - 1))  # -1 to the bit up to the middle between 1 and top
+    beyond = tanh(40 * (q - top) / (top - 1))  # exactly -1 up to the middle between 1 and top
     within = (q * (1 - beyond) + top * (1 + beyond)) / 2
     return within ** (exponent / 2) * (1 + exponent / 2 * (1 - within / q)) - eps**exponent
 
 
 def signed_power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
-    """Smooth |x|^exponent sign(x) = x (x^2 + eps^2)^((exponent - 1)/2), exactly 0 at x = 0."""
+    """Return the smooth |x|^exponent sign(x) = x (x^2 + eps^2)^((exponent - 1)/2), 0 at x = 0."""
     return x * (x * x + eps * eps) ** ((exponent - 1) / 2)
 
 
 def positive(x: Scalar, eps: Scalar) -> Scalar:
-    """Smooth max(x, 0) = (x + sqrt(x^2 + eps^2)) / 2; value eps/2 at x = 0.
+    """Return the smooth max(x, 0) = (x + sqrt(x^2 + eps^2)) / 2; value eps/2 at x = 0.
 
     The float `eps = 0.0` gives max(x, 0) itself, with its kink at x = 0.
     """
@@ -100,7 +100,7 @@ def positive(x: Scalar, eps: Scalar) -> Scalar:
 
 
 def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
-    """`x` held between `low` and `high`; kinks at both. A vector within +-`high`, as by `hold`."""
+    """Return `x` limited to [low, high], with kinks; vectors are limited to +-`high` by `hold`."""
     if isinstance(x, Vector):
         if is_number(low) and equals(high, -low):
             return hold(x, high, 0.0)
@@ -111,10 +111,10 @@ def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
 
 
 def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
-    """`x` held within +-`top`: exactly x up to top - eps, exactly +-top from top + eps on, C2.
+    """Return `x` limited to +-`top`: exactly x up to top - eps, exactly +-top from top + eps, C2.
 
-    A contact that carries hold(F_e) in full does not creep under a load below top - eps, as it
-    would under tanh. The float `eps = 0.0` gives the kinks. A vector keeps its direction.
+    A contact that carries hold(F_e) does not creep under a load below top - eps, as it would with
+    tanh. The float `eps = 0.0` gives the kinks. A vector keeps its direction.
     """
     if isinstance(x, Vector):
         return x.odd(lambda size: hold(size, top, eps), ROUND * top)
@@ -125,31 +125,31 @@ def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
         t = positive((y - top) / (2 * eps) + 0.5, 0.0)
         return t * t * t * (2 - t) * eps
 
-    # one clip alone, so that no two of them disagree by rounding about which side of a knot it is
+    # a single clip: several could disagree by rounding about the side of a knot
     within = clip(x, -top - eps, top + eps)
     return within - corner(within) + corner(-within)
 
 
 def step3(x: Scalar) -> Scalar:
-    """The cubic step 3x^2 - 2x^3 from 0 at x <= 0 to 1 at x >= 1, C1."""
+    """Return the cubic step 3x^2 - 2x^3 from 0 at x <= 0 to 1 at x >= 1, C1."""
     t = clip(x, 0.0, 1.0)
     return t * t * (3 - 2 * t)
 
 
 def step5(x: Scalar) -> Scalar:
-    """The quintic step 10x^3 - 15x^4 + 6x^5 from 0 at x <= 0 to 1 at x >= 1, C2."""
+    """Return the quintic step 10x^3 - 15x^4 + 6x^5 from 0 at x <= 0 to 1 at x >= 1, C2."""
     t = clip(x, 0.0, 1.0)
     return t * t * t * (10 - t * (15 - 6 * t))
 
 
 def fraction(x: Scalar) -> Scalar:
-    """`x` modulo 1, in [0, 1)."""
+    """Return `x` modulo 1, in [0, 1)."""
     no_vector("counts", x)
     return x - (ca.floor(x) if is_casadi(x) else np.floor(x))
 
 
 def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
-    """`yes` where the condition holds, else `no`: for modes and for originals that jump."""
+    """Return `yes` where the condition holds, else `no`: for modes and for originals that jump."""
     if isinstance(yes, Vector) or isinstance(no, Vector):
         return _chosen(condition, yes, no)
     if is_casadi(condition, yes, no):
@@ -165,11 +165,11 @@ def _chosen(condition: Scalar, yes: Vectors, no: Vectors) -> Vector:
 
 
 def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
-    """The Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s.
+    """Return the Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s.
 
-    Rounded at rest over `eps`, beyond 1e3 eps that weight to 4e-6 for every delta from 0 to 10. The
-    float `delta = 2.0` needs no rounding; the float `eps = 0.0` gives the original, for delta < 2
-    with a kink at rest.
+    It is rounded at rest over `eps`, and beyond 1e3 eps equals that weight to 4e-6 for every delta
+    from 0 to 10. The float `delta = 2.0` needs no rounding; the float `eps = 0.0` gives the
+    original, for delta < 2 with a kink at rest.
     """
     u = v / v_s
     if equals(delta, 2.0) or equals(eps, 0.0):
@@ -178,26 +178,27 @@ def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
 
 
 def _rounded_power(u: Scalar, exponent: Scalar, width: Scalar) -> Scalar:
-    """|u|^exponent = u^2 (u^2 + width^2)^(exponent/2 - 1), exactly 0 at u = 0.
+    """Return |u|^exponent = u^2 (u^2 + width^2)^(exponent/2 - 1), exactly 0 at u = 0.
 
-    The relative error falls like (width/u)^2. That of `power`, with its offset width^exponent, does
-    not for exponents below 2: 3e-3 at u = 1 for the exponent 0.5 and the width 1e-5.
+    The relative error decreases like (width/u)^2. That of `power`, with its offset width^exponent,
+    does not for exponents below 2: 3e-3 at u = 1 for the exponent 0.5 and the width 1e-5.
     """
     return u * u * (u * u + width * width) ** (exponent / 2 - 1)
 
 
 def onward(x: Scalar) -> Scalar:
-    """`x` for x >= 0 and tanh(2 x) / 2 below, C2: what is written for speeds >= 0, seen past rest.
+    """Return `x` for x >= 0 and tanh(2 x) / 2 below, C2, to extend formulas for speeds >= 0.
 
-    An iterate of a solver may be there; a fall that grows exponentially would throw it off.
+    Iterates of a solver may have a negative speed; a fall that grows exponentially there would make
+    it diverge.
     """
     return choose(x < 0, tanh(2 * x) / 2, x)
 
 
 def fall(speed: Scalar, v_s: Scalar, delta: Scalar) -> Scalar:
-    """The Stribeck weight exp(-(speed / v_s)^delta) on one side of rest, for speeds >= 0.
+    """Return the Stribeck weight exp(-(speed / v_s)^delta) on one side of rest, for speeds >= 0.
 
-    A float `delta` that is a whole number has all derivatives at rest. Others round the power over
+    A float `delta` that is an integer has all derivatives at rest. Others round the power over
     `SHARE` of v_s, since for delta < 2 it has no second derivative there. Bounded below zero, see
     `onward`.
     """
@@ -210,10 +211,10 @@ def fall(speed: Scalar, v_s: Scalar, delta: Scalar) -> Scalar:
 
 
 def phi1(x: Scalar) -> Scalar:
-    """(exp(x) - 1) / x, with value 1 and all derivatives right at x = 0.
+    """Return (exp(x) - 1) / x, with value 1 and all derivatives correct at x = 0.
 
-    A Taylor polynomial replaces the quotient for |x| < 1e-2 (next term x^5/720, 1.4e-13): the
-    usual guarded quotient has derivative 0 at x = 0 instead of 1/2.
+    A Taylor polynomial replaces the quotient for |x| < 1e-2 (next term x^5/720, 1.4e-13): the usual
+    guarded quotient has derivative 0 at x = 0 instead of 1/2.
     """
     series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
     if not is_casadi(x):

@@ -1,1 +1,1 @@
-"""Laws made of laws: sums, wrappers, vectors of slip, populations of contacts."""
+"""Laws composed of laws: sums, wrappers, vectors of slip, populations of contacts."""

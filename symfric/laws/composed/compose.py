@@ -1,4 +1,4 @@
-"""Laws made of laws: sum, asymmetric and load-dependent. Wrap, never subclass."""
+"""Sum, asymmetric and load-dependent laws, which wrap other laws."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
@@ -16,14 +16,13 @@ from symfric.laws.composed.wrap import Wrapper
 @final
 @dataclass(frozen=True, eq=False)
 class Sum(Law):
-    """Friction forces added; the states of the terms stand below each other.
+    """Sum of friction forces; its states are those of the terms, one after another.
 
         F = F_1 + F_2 + ...
 
-    A sum of sums is one sum. Parameters and states that share a name get the number of their
-    term: mu_d_1, mu_d_2, ...
-    Limits: those of the terms.
-    Source: superposition, as in Coulomb + viscous friction.
+    A sum of sums is flattened. Parameters and states that share a name get the number of their
+    term: mu_d_1, mu_d_2, ... Limits: those of the terms. Source: superposition, as in Coulomb +
+    viscous friction.
     """
 
     facts = Facts((), "that of its terms", "constructed", "constructed")
@@ -42,7 +41,7 @@ class Sum(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The states of all terms."""
+        """States of all terms."""
         names = distinct([[state.name for state in law.states] for law in self.laws])
         return tuple(
             replace(state, name=name)
@@ -52,11 +51,11 @@ class Sum(Law):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of all terms, each once."""
+        """Further inputs of all terms, each once."""
         return tuple(dict.fromkeys(i for law in self.laws for i in law.inputs))
 
     def terms(self, z: Scalar) -> list[tuple[Law, Scalar]]:
-        """The laws, each with its rows of `z`."""
+        """Return the laws, each with its rows of `z`."""
         ends = [0]
         for law in self.laws:
             ends.append(ends[-1] + len(law.states))
@@ -65,27 +64,27 @@ class Sum(Law):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smallest one of the terms [m/s]."""
+        """Smallest velocity scale of the terms [m/s]."""
         return smallest(*(law.velocity_scale for law in self.laws))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return _added(law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z))
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Sliding forces [N] of all terms on one side."""
+        """Return the sum of the sliding forces [N] on one side."""
         return _added(law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Largest force [N] at rest: that of all terms together."""
+        """Return the sum of the static levels [N]."""
         return _added(law.static_level(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """That of all terms together."""
+        """Return the sum of the bounds of the terms."""
         return _added(law.most_held(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rates of all states."""
+        """Return the rates of all states."""
         rates = [
             law.rate(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z) if law.states
         ]
@@ -94,7 +93,7 @@ class Sum(Law):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
     ) -> tuple[Switch, ...]:
-        """The changes of mode of all terms, by the names of the states of the sum."""
+        """Return the changes of mode of all terms, with the state names of the sum."""
         names = iter(state.name for state in self.states)
         found: list[Switch] = []
         for law, part in self.terms(z):
@@ -105,7 +104,7 @@ class Sum(Law):
         return tuple(found)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Those of the terms below each other, where every term with states knows its own."""
+        """Return the held steps of the terms, if every term with states has one."""
         known = [law.held_step(v, N, part, h) for law, part in self.terms(z) if law.states]
         steps = [step for step in known if step is not None]
         if not steps or len(steps) < len(known):
@@ -113,32 +112,32 @@ class Sum(Law):
         return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Those of the terms below each other; steady states where a term knows no more."""
+        """Return the equilibria of the terms; steady states for terms without them."""
         known = [(law, law.held_rest(v, N, part)) for law, part in self.terms(z) if law.states]
         if all(rest is None for _, rest in known):
             return None
         return _join(v, [law.steady_state(v, N) if r is None else r for law, r in known])
 
     def warnings(self) -> tuple[str, ...]:
-        """Those of the terms."""
+        """Return the warnings of the terms."""
         return tuple(warning for law in self.laws for warning in law.warnings())
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Steady states of all terms."""
+        """Return the steady states of all terms."""
         return _join(v, [law.steady_state(v, N) for law in self.laws if law.states])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Asymmetric(Wrapper):
-    """One law with different parameters for the two directions of sliding.
+    """Law with different parameters for the two directions of sliding.
 
         p(v) = p_pos w + p_neg (1 - w),   w = [1 + tanh(v / v_blend)] / 2
 
     Every parameter that differs between `positive` and `negative` is blended, so a bristle law
-    keeps its one state and a parameter that is equal on both sides costs nothing.
-    Limits: one-sided curves beyond 3 v_blend; keep v_blend below the smoothing velocity of the law.
-    Source: separate parameter sets per direction, usual for drives (Armstrong-Helouvry 1991).
+    keeps its one state and equal parameters cost nothing. Limits: one-sided curves beyond 3
+    v_blend; keep v_blend below the smoothing velocity of the law. Source: separate parameter sets
+    per direction, usual for drives (Armstrong-Helouvry 1991).
     """
 
     facts = Facts((), "that of its law", "constructed", "separate sets")
@@ -161,11 +160,11 @@ class Asymmetric(Wrapper):
 
     @property
     def inner(self) -> Law:
-        """The law of one side."""
+        """Law of one side."""
         return self.positive
 
     def inner_at(self, v: Scalar) -> Law:
-        """The law with the numbers of the direction of `v`."""
+        """Return the law with the parameters of the direction of `v`."""
         w = (1 + smooth.sign(v, self.v_blend)) / 2
         rest = 1 - w
         sides = zip(
@@ -179,31 +178,31 @@ class Asymmetric(Wrapper):
         return with_values(self.positive, blended)
 
     def inner_of(self, side: int) -> Law:
-        """The law of one side."""
+        """Return the law of one side."""
         return self.positive if side > 0 else self.negative
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smaller one of the sides [m/s]."""
+        """Smaller velocity scale of the sides [m/s]."""
         return smallest(self.positive.velocity_scale, self.negative.velocity_scale)
 
     def warnings(self) -> tuple[str, ...]:
-        """Those of both sides, each once."""
+        """Return the warnings of both sides, each once."""
         return tuple(dict.fromkeys(self.positive.warnings() + self.negative.warnings()))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class LoadDependent(Wrapper):
-    """A law under the effective normal force of a preloaded, load-carrying contact.
+    """Law under the effective normal force of a preloaded, load-carrying contact.
 
         N_eff = N_0 + c max(N, 0)
 
-    N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps
-    so that nothing divides by zero or turns negative at lift-off (with N_0 = 0 down to
-    N = -1e7 N_eps, where the difference of the square root rounds to zero).
-    Limits: N_0 = 0, c = 1, N_eps = 0 is the law itself for N >= 0.
-    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
+    N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps,
+    so that there is no division by zero and no negative load at lift-off (with N_0 = 0 down to N =
+    -1e7 N_eps, where the difference of the square root rounds to zero). Limits: N_0 = 0, c = 1,
+    N_eps = 0 is the law itself for N >= 0. Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas.
+    Control 134(5), 2012 (linear load part).
     """
 
     facts = Facts((), "that of its law", "unverified", "Bittencourt and Gunnarsson 2012")
@@ -214,7 +213,7 @@ class LoadDependent(Wrapper):
     N_eps: Scalar = param(1e-3, unit="N", role="width", doc="smoothing of the lift-off", lower=0.0)
 
     def load(self, N: Scalar) -> Scalar:
-        """The effective normal force [N]."""
+        """Return the effective normal force [N]."""
         return self.N_0 + self.c * smooth.positive(N, self.N_eps)
 
 
@@ -224,7 +223,7 @@ def _added(forces: Iterable[Scalar]) -> Scalar:
 
 
 def _structure(value: object) -> object:
-    """A law without its numbers: class, options, and the same of what it holds."""
+    """Return a law without its numbers: class, options, and the same for its parts."""
     if isinstance(value, Parametric):
         held = (getattr(value, item.name) for item in fields(value) if "unit" not in item.metadata)
         return type(value), *map(_structure, held)

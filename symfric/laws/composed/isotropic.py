@@ -1,4 +1,4 @@
-"""Any isotropic law for slip in a plane or in space."""
+"""Isotropic laws for slip in a plane or in space."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,27 +19,25 @@ from symfric.laws.composed.wrap import Lagged
 
 @dataclass(frozen=True, eq=False)
 class Isotropic(Parametric):
-    """A friction law for slip v in two or three dimensions d.
+    """Friction law for slip v in two or three dimensions d.
 
         F = F(w, N)/w v,   w = sqrt(v'v + v_eps^2)      laws without states
         F = F(v, N, z),    dz/dt = rate(v, N, z)        laws with states, v and z vectors
 
-    What changes sign with the motion, v and deflections, is a vector; what does not, an age or a
-    level, stays a number. The expressions of the law take vectors as they stand, |a| for a size,
-    a/|a| for a sign, a'b for a product: see `symfric.foundation.vector`. Elements that yield spend
-    slip along their load only, and only what of the slip goes along it (radial return, rounded
-    over `turn`).
-    So Maxwell-slip, Bouc-Wen and elasto-plastic elements are those of plasticity in the plane, and
-    LuGre, Dahl, Gonthier those of the literature. Further inputs, as F_e, are vectors (d, 1).
-    In components: vector states along x, then along y, then along z, then the states that are
-    numbers.
-    Limits: slip along a line is the law itself. Equivariant under rotations. Every vector state
-    stays within the bound that it has in straight slip. v_eps is for laws without states; the
-    others have their own.
+    Quantities that change sign with the motion, v and deflections, are vectors; those that do not,
+    an age or a level, stay numbers. The expressions of the law are evaluated with vectors, |a| for
+    a size, a/|a| for a sign, a'b for a product: see `symfric.foundation.vector`. Elements that
+    yield reduce slip along their load only, by the component of the slip along it (radial return,
+    rounded over `turn`). Maxwell-slip, Bouc-Wen and elasto-plastic elements then are those of
+    plasticity in the plane, and LuGre, Dahl, Gonthier those of the literature. Further inputs, such
+    as F_e, are vectors (d, 1). In components: vector states along x, then along y, then along z,
+    then the states that are numbers. Limits: slip along a line is the law itself. Equivariant under
+    rotations. Every vector state stays within the bound that it has in straight slip. v_eps is for
+    laws without states; the others have their own.
 
     Raises:
-        ValueError: a law that tells forward from backward, has modes (they change where v passes
-            through zero), or is written with expressions that vectors do not have.
+        ValueError: a law that distinguishes forward from backward, has modes (they change where v
+            passes through zero), or contains expressions that are undefined for vectors.
     """
 
     axes: ClassVar[str] = ""
@@ -60,7 +58,7 @@ class Isotropic(Parametric):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The vectors along x, then along y, and so on, then the states that are numbers."""
+        """Vector states along x, then along y, and so on, then the states that are numbers."""
         vectors = [s for s in self.law.states if not s.even]
         numbers = tuple(s for s in self.law.states if s.even)
         along = (replace(s, name=f"{s.name}_{x}") for x in self.axes for s in vectors)
@@ -68,14 +66,14 @@ class Isotropic(Parametric):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of the law, each a vector of shape (d, 1)."""
+        """Further inputs of the law, each a vector of shape (d, 1)."""
         return self.law.inputs
 
     def _vector(self, a: Scalar) -> Vector:
         return Vector([a[i] for i in range(len(self.axes))], self.turn)
 
     def _vectors(self, z: Scalar) -> list[Vectors]:
-        """The states of the law, vectors and numbers, from the rows of `z`."""
+        """Return the states of the law, vectors and numbers, from the rows of `z`."""
         d, even = len(self.axes), [s.even for s in self.law.states]
         n = even.count(False)
         vectors = (self._vector([z[i * n + k] for i in range(d)]) for k in range(n))
@@ -83,7 +81,7 @@ class Isotropic(Parametric):
         return [next(numbers if is_even else vectors) for is_even in even]
 
     def _rows(self, z: Sequence[Vectors]) -> Scalar:
-        """The rows of a column of vectors and numbers."""
+        """Return the rows of a column of vectors and numbers."""
         vectors = [a for a in z if isinstance(a, Vector)]
         numbers = [a for a in z if not isinstance(a, Vector)]
         return column(*(a.parts[i] for i in range(len(self.axes)) for a in vectors), *numbers)
@@ -93,21 +91,21 @@ class Isotropic(Parametric):
         return {i.name: self._vector(inputs.get(i.name, rest)) for i in self.inputs}
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N], shape (d, 1), for the sliding velocity v, shape (d, 1)."""
+        """Return the friction force [N], shape (d, 1), for the sliding velocity v, shape (d, 1)."""
         given = self._given(inputs)
         return self._rows(
             [_force(self.law, self._vector(v), N, self._vectors(z), given, self.v_eps)]
         )
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rates of the states, in their order."""
+        """Return the rates of the states, in their order."""
         if not self.law.states:
             return empty(v[0])
         given = self._given(inputs)
         return self._rows(_rate(self.law, self._vector(v), N, self._vectors(z), given))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """States after long sliding along `v`, in their order."""
+        """Return the states after long sliding along `v`, in their order."""
         if not self.law.states:
             return empty(v[0])
         slip = self._vector(v)
@@ -117,14 +115,14 @@ class Isotropic(Parametric):
         return self._rows([z[k] if s.even else z[k] / w * slip for k, s in own])
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """None: laws with modes are refused."""
+        """Return no changes of mode: laws with modes are refused."""
         return ()
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PlanarSlip(Isotropic):
-    """An isotropic friction law for slip in a plane, d = 2: see `Isotropic`.
+    """Isotropic friction law for slip in a plane, d = 2: see `Isotropic`.
 
     Source: isotropy; LuGre in two dimensions: Velenis, Tsiotras, Canudas de Wit, Vehicle Syst. Dyn.
     43(1), 2005; Bouc-Wen: Park, Wen, Ang, Earthq. Eng. Struct. Dyn. 14(4), 1986 (not read), with
@@ -137,7 +135,7 @@ class PlanarSlip(Isotropic):
 @final
 @dataclass(frozen=True, eq=False)
 class SpatialSlip(Isotropic):
-    """An isotropic friction law for slip in space, d = 3, as of a ball in its socket: `Isotropic`.
+    """Isotropic friction law for slip in space, d = 3, such as a ball in its socket: `Isotropic`.
 
     Limits: bristles have the direction they have in the axes in which v is given.
     Source: isotropy.
@@ -152,13 +150,13 @@ def is_isotropic(law: Law) -> bool:
 
 
 def anisotropy(law: Law) -> str:
-    """Why a law has no form in several dimensions by isotropy alone; empty if it has one."""
+    """Return the reason why a law has no isotropic form in several dimensions; empty if it has."""
     if not _is_odd(law):
-        return "it tells forward from backward slip, as no direction in a plane does"
+        return "it distinguishes forward from backward slip, which has no meaning in a plane"
     N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     if law.switches(ca.SX.sym("v"), N, z):
         return (
-            "its modes change where v passes through zero, as a vector does not; take a form of "
+            "its modes change where v passes through zero, which a vector does not; use a form of "
             "the law without modes"
         )
     v, *vectors = (Vector(ca.vertsplit(ca.SX.sym("a", 2)), 0.0) for _ in (0, *law.states))
@@ -184,7 +182,7 @@ Inputs = Mapping[str, Vector]
 
 
 def _terms(law: Law, z: Sequence[Vectors]) -> Iterator[tuple[Law, list[Vectors]]]:
-    """The terms of a sum with their states, or the law itself."""
+    """Yield the terms of a sum with their states, or the law itself."""
     states = iter(z)
     for term in law.laws if isinstance(law, Sum) else (law,):
         yield term, list(islice(states, len(term.states)))
@@ -193,7 +191,7 @@ def _terms(law: Law, z: Sequence[Vectors]) -> Iterator[tuple[Law, list[Vectors]]
 def _force(
     law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs, v_eps: Scalar
 ) -> Vector:
-    """Force of a law in vectors, of a sum term by term."""
+    """Return the force of a law in vectors, of a sum term by term."""
     first, *rest = (_term(term, v, N, part, inputs, v_eps) for term, part in _terms(law, z))
     return sum(rest, start=first)
 
@@ -201,7 +199,7 @@ def _force(
 def _term(
     law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs, v_eps: Scalar
 ) -> Vector:
-    """Without states along v, or along the velocity that lags behind it."""
+    """Return the force of a term, without states along v, or along the lagged velocity."""
     if law.inputs or (z and not isinstance(law, Lagged)):
         return law.force(v, N, z, **chosen(law, inputs))
     law, slip = (law.law, z[0]) if isinstance(law, Lagged) else (law, v)
@@ -210,7 +208,7 @@ def _term(
 
 
 def _rate(law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs) -> list[Vectors]:
-    """Rates of the states of a law in vectors and numbers."""
+    """Return the rates of the states of a law in vectors and numbers."""
     rows: list[Vectors] = []
     for term, part in _terms(law, z):
         if part:

@@ -1,8 +1,8 @@
-"""Friction of many random contacts: seeded references, which no optimiser can use.
+"""Friction of many random contacts: seeded reference models, not usable in optimisation.
 
 Their force depends on a history of contacts made and lost at random. Smooth laws are identified
-from, and compared with, what they produce. One contact is an expression like a law, so that a
-population runs in NumPy, all contacts at once, and as generated C, in a loop.
+from, and compared with, their results. One contact is an expression like a law, so a population
+runs in NumPy, all contacts at once, and as generated C, in a loop.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from symfric.laws.base.law import Facts, Input, Law, State
 
 Array = NDArray[np.float64]
 SPEEDS = 20
-"""Speeds a decade at which the mean force is computed; between them it is interpolated."""
+"""Speeds per decade at which the mean force is computed; between them it is interpolated."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """The contacts of a population at one time.
+    """Contacts of a population at one time.
 
     Attributes:
         z: their states, shape (states, count).
         r: a random number of each, shape (count,).
-        random: where fresh ones come from.
+        random: generator for new random numbers.
     """
 
     z: Array
@@ -45,14 +45,15 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class Population(Parametric, ABC):
-    """Friction of `count` contacts that are made and lost at random, the same for the same `seed`.
+    """Friction of `count` contacts that are made and lost at random, reproducible by `seed`.
 
-    It has figures and a force along a motion, but no rate: it is no `Law`, and no scene takes it.
+    It has figures and a force along a motion, but no rate: it is not a `Law`, and cannot be used in
+    scenes.
     """
 
     facts: ClassVar[Facts]
     redraws: ClassVar[bool]
-    """True if contacts take a fresh random number at every step."""
+    """True if contacts draw a new random number at every step."""
 
     count: int
     seed: int
@@ -67,17 +68,17 @@ class Population(Parametric, ABC):
     @property
     @abstractmethod
     def states(self) -> tuple[State, ...]:
-        """The states of one contact."""
+        """States of one contact."""
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Nothing besides v and N."""
+        """No inputs besides v and N."""
         return ()
 
     @property
     @abstractmethod
     def velocity_scale(self) -> float:
-        """Sliding velocity [m/s] over which the mean force changes; inf where there is none."""
+        """Sliding velocity [m/s] over which the mean force changes; inf if there is none."""
 
     @property
     @abstractmethod
@@ -87,34 +88,36 @@ class Population(Parametric, ABC):
     @property
     @abstractmethod
     def path(self) -> float:
-        """Way that renews every contact [m]."""
+        """Path that renews every contact [m]."""
 
     @property
     def step(self) -> float:
-        """Longest way that is one step of a contact [m]."""
+        """Longest path of one step of a contact [m]."""
         return self.path / 20
 
     @abstractmethod
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """States of one contact after the way dx [m] in the time dt [s], and below its force [N].
+        """Return the states of one contact after a step, with its force [N] as last row.
 
-        `z` are its states and `r` its random number; N [N] is the load of the whole population.
-        Floats, arrays of all contacts and CasADi symbols are taken alike.
+        The step is the path dx [m] in the time dt [s]. `z` are its states and `r` its random
+        number; N [N] is the load of the whole population. Floats, arrays of all contacts and CasADi
+        symbols are accepted.
         """
 
     @abstractmethod
     def _draw(self, random: np.random.Generator) -> tuple[Array, Array]:
-        """States (states, count) and random numbers (count,) of unloaded contacts."""
+        """Return states (states, count) and random numbers (count,) of unloaded contacts."""
 
     def begin(self) -> Contacts:
-        """Unloaded contacts, where their random numbers place them."""
+        """Return unloaded contacts at their random places."""
         random = np.random.default_rng(self.seed)
         return Contacts(*self._draw(random), random)
 
     def advance(self, contacts: Contacts, dx: float, dt: float, N: float) -> tuple[Contacts, float]:
-        """The contacts after the way `dx` [m] in the time `dt` [s] under N [N], and their force.
+        """Return the contacts after the path `dx` [m] in the time `dt` [s] under N [N], and their
+        force.
 
-        A long way is made in steps.
+        A long path is divided into steps.
         """
         z, r, rows = contacts.z, contacts.r, np.zeros(0)
         parts = max(1, ceil(abs(dx) / self.step * (1 - 1e-9)))
@@ -126,10 +129,11 @@ class Population(Parametric, ABC):
         return Contacts(z, r, contacts.random), float(rows[-1].sum())
 
     def force(self, t: ArrayLike, x: ArrayLike, N: float) -> Array:
-        """Friction force [N] along the motion x(t) [m] under N [N], from unloaded contacts.
+        """Return the friction force [N] along the motion x(t) [m] under N [N], from unloaded
+        contacts.
 
         Raises:
-            ValueError: t not rising, or other lengths.
+            ValueError: t not increasing, or other lengths.
         """
         where = f"{type(self).__name__}.force"
         t, x = checks.times(f"{where}: t", t), checks.array(f"{where}: x", x)
@@ -146,9 +150,9 @@ class Population(Parametric, ABC):
         return F
 
     def steady_force(self, v: ArrayLike, N: float) -> Array:
-        """Mean force [N] in steady sliding at `v` [m/s]; 0 at rest.
+        """Return the mean force [N] in steady sliding at `v` [m/s]; 0 at rest.
 
-        Computed at 20 speeds a decade over the range of `v`, and interpolated between them.
+        It is computed at 20 speeds a decade over the range of `v`, and interpolated between them.
         """
         where = f"{type(self).__name__}.steady_force"
         v = checks.array(f"{where}: v", v, ndim=None)
@@ -163,19 +167,21 @@ class Population(Parametric, ABC):
         return np.where(v == 0, 0.0, smooth.sign(v, 0.0) * at)
 
     def _mean_force(self, v: float, N: float) -> float:
-        """Force [N] at the speed `v` [m/s], averaged over the second renewal of all contacts."""
+        """Return the force [N] at the speed `v` [m/s], averaged over the second renewal of all
+        contacts.
+        """
         contacts, F, parts = self.begin(), np.zeros(80), 40
         for i in range(F.size):
             contacts, F[i] = self.advance(contacts, self.path / parts, self.path / parts / v, N)
         return float(F[parts:].mean())
 
     def warnings(self) -> tuple[str, ...]:
-        """Nothing to warn of: every parameter within its bounds will do."""
+        """Return no warnings: all parameters within their bounds are valid."""
         return ()
 
 
 AnyLaw = Law | Population
-"""What has a name, facts and figures."""
+"""Law or population, with a name, facts and figures."""
 
 
 @final
@@ -195,7 +201,7 @@ class GenericAsperity(Population):
     the mean) that sticks, and slips at a force that grows with its age. When contact is lost its
     energy is.
     Limits: the force lies between mu_0 N in fast and mu_inf N in slow sliding, less what the
-    springs lack; hysteresis with memory, velocity weakening, lag and dwell come by themselves. The
+    springs lack; hysteresis with memory, velocity weakening, lag and dwell emerge. The
     scatter of the force falls like 1/sqrt(count). A reconstruction from words.
     Source: Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004.
     """
@@ -229,7 +235,7 @@ class GenericAsperity(Population):
 
     @property
     def velocity_scale(self) -> float:
-        """The velocity at which a contact lasts for tau_c [m/s]."""
+        """Velocity at which a contact lasts for tau_c [m/s]."""
         return self.duty * self.lam / self.tau_c
 
     @property
@@ -239,11 +245,12 @@ class GenericAsperity(Population):
 
     @property
     def path(self) -> float:
-        """The period of the counterface [m]."""
+        """Period of the counterface [m]."""
         return self.lam
 
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """Place, stretch and age of an asperity after a step, and below its force [N].
+        """Return place, stretch and age of an asperity after a step, with its force [N] as last
+        row.
 
         Its stiffness is (1 + r/2) times the mean, r in [-1, 1].
         """
@@ -293,12 +300,12 @@ class RandomBristles(Population):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The stretch of one bristle."""
+        """Stretch of one bristle."""
         return (State("d", "m", 1e-6, doc="stretch of the bristle"),)
 
     @property
     def velocity_scale(self) -> float:
-        """None: the force depends on the path alone."""
+        """Always infinite: the force depends on the path only."""
         return float("inf")
 
     @property
@@ -312,9 +319,9 @@ class RandomBristles(Population):
         return 2 * self.delta_s
 
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """Stretch of a bristle after a step, and below its force [N]; it bonds anew at r delta_s.
+        """Return the stretch of a bristle after a step, with its force [N] as last row.
 
-        r in [-1, 1].
+        After it snaps, it bonds again at r delta_s, r in [-1, 1].
         """
         d = z[0] + dx
         d = smooth.choose(smooth.magnitude(d, 0.0) > self.delta_s, r * self.delta_s, d)
@@ -326,9 +333,9 @@ class RandomBristles(Population):
 
 
 def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
-    """Force in steady sliding [N] at the velocities `v` [m/s].
+    """Return the force in steady sliding [N] at the velocities `v` [m/s].
 
-    Further inputs of the law have their values `Input.steady`, with the sign of v where the law is
+    Further inputs of the law have their values `Input.steady`, with the sign of v if the law is
     odd: an applied force pulls forward.
     """
     if isinstance(law, Population):
@@ -340,7 +347,7 @@ def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
 
 
 def steady_inputs(law: AnyLaw) -> str:
-    """The further inputs behind `steady_force` as text: ", F_e = 1 N"; empty where there are none.
+    """Return the further inputs of `steady_force` as text: ", F_e = 1 N"; empty without inputs.
 
     For an odd law these are the values at v > 0.
     """
@@ -349,7 +356,7 @@ def steady_inputs(law: AnyLaw) -> str:
 
 @dataclass(frozen=True)
 class Cost:
-    """CasADi instructions, those of inputs and outputs included.
+    """Number of CasADi instructions, including inputs and outputs.
 
     Attributes:
         value: of force and rate together, or of one contact of a population.
@@ -361,7 +368,7 @@ class Cost:
 
 
 def cost(law: AnyLaw) -> Cost:
-    """The cost of `law` with the numbers it holds, common parts counted once."""
+    """Return the cost of `law` with its numbers, common parts counted once."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     if isinstance(law, Population):
         r, dt = ca.SX.sym("r"), ca.SX.sym("dt")

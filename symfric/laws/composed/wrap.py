@@ -1,4 +1,4 @@
-"""Laws around a law: lagging, at a temperature, and normalised by the load."""
+"""Laws that wrap a law: lagged, temperature-dependent, and normalised by the load."""
 
 from dataclasses import dataclass
 from dataclasses import fields as fields_of
@@ -11,11 +11,11 @@ from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
 
 
 class Wrapper(Law):
-    """A law in another law, with other numbers at a velocity or under another normal force.
+    """Law that wraps another law, with other parameters or another normal force.
 
         F = F_inner(v)(v, load(N), z)
 
-    What a wrapper changes it overrides: `inner`, `inner_at`, `load`, or a method.
+    A wrapper overrides `inner`, `inner_at`, `load`, or a method.
     """
 
     law: Law
@@ -28,93 +28,93 @@ class Wrapper(Law):
 
     @property
     def inner(self) -> Law:
-        """The law inside."""
+        """Wrapped law."""
         return self.law
 
     def inner_at(self, v: Scalar) -> Law:
-        """The law inside, with the numbers it has at the sliding velocity `v`."""
+        """Return the wrapped law, with its parameters at the sliding velocity `v`."""
         return self.inner
 
     def inner_of(self, side: int) -> Law:
-        """The law inside, with the numbers it has on one side of v = 0."""
+        """Return the wrapped law, with its parameters on one side of v = 0."""
         return self.inner
 
     def load(self, N: Scalar) -> Scalar:
-        """The normal force [N] that the law inside sees."""
+        """Return the normal force [N] of the wrapped law."""
         return N
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The states of the law inside."""
+        """States of the wrapped law."""
         return self.inner.states
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of the law inside."""
+        """Further inputs of the wrapped law."""
         return self.inner.inputs
 
     @property
     def velocity_scale(self) -> Scalar:
-        """That of the law inside [m/s]."""
+        """Velocity scale of the wrapped law [m/s]."""
         return self.inner.velocity_scale
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.inner_at(v).force(v, self.load(N), z, **inputs)
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Sliding force [N] of the law inside on one side; of one that lags, when steady."""
+        """Return the steady sliding force [N] of the wrapped law on one side."""
         return self.inner_of(side).sliding(v, self.load(N), side, **inputs)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Largest force [N] at rest of the law inside, on its side."""
+        """Return the largest force [N] of the wrapped law in stick, on its side."""
         return self.inner_of(side).static_level(self.load(N), side, **inputs)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """That of the law inside, on its side."""
+        """Return the bound of the wrapped law, on its side."""
         return self.inner_of(side).most_held(self.load(N), side, **inputs)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rates of the states."""
+        """Return the rates of the states."""
         return self.inner_at(v).rate(v, self.load(N), z, **inputs)
 
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
     ) -> tuple[Switch, ...]:
-        """The changes of mode of the law inside."""
+        """Return the changes of mode of the wrapped law."""
         return self.inner_at(v).switches(v, self.load(N), z, **inputs)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Steady states of the law inside."""
+        """Return the steady states of the wrapped law."""
         return self.inner_at(v).steady_state(v, self.load(N))
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """That of the law inside."""
+        """Return the held step of the wrapped law."""
         return self.inner_at(v).held_step(v, self.load(N), z, h)
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """That of the law inside."""
+        """Return the equilibria of the wrapped law."""
         return self.inner_at(v).held_rest(v, self.load(N), z)
 
     def warnings(self) -> tuple[str, ...]:
-        """Those of the law inside."""
+        """Return the warnings of the wrapped law."""
         return self.inner.warnings()
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Lagged(Wrapper):
-    """A law without states that follows the velocity with a lag (one state).
+    """Law without states that follows the velocity with a lag (one state).
 
         dw/dt = (v - w) / tau_L
         F     = F_law(w, N)
 
-    Gives frictional lag to any static law: while the velocity rises the force is that of a lower
+    It adds frictional lag to any static law: while the velocity rises the force is that of a lower
     velocity, and after a reversal it keeps its sign for about tau_L, so it may push for an instant.
     Limits: the law itself for v that changes slowly against tau_L; tau_L of bearings 1 to 50 ms.
-    As C in float the force is as uncertain as w, 1e-7 of the largest velocity: use double where
-    that is not small against the smoothing velocity.
-    Source: Hess and Soom, ASME J. Tribol. 112(1), 1990 (pure delay); first-order form constructed.
+    As C in float the force is as uncertain as w, 1e-7 of the largest velocity: use double if that
+    is not small against the smoothing velocity. Source: Hess and Soom, ASME J. Tribol. 112(1), 1990
+    (pure delay); first-order form constructed.
     """
 
     facts = Facts(("L",), "that of its law", "constructed", "Hess and Soom 1990")
@@ -127,28 +127,28 @@ class Lagged(Wrapper):
         if self.law.states:
             raise ValueError(
                 "Lagged: expected a law without states, got "
-                f"{type(self.law).__name__}; laws with states have a lag of their own"
+                f"{type(self.law).__name__}; laws with states have their own lag"
             )
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The velocity that the force follows."""
+        """Velocity that the force follows."""
         return (State("w", "m/s", 0.1, doc="velocity that the force follows"),)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.law.force(z[0], N, **inputs)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rate of the velocity that the force follows [m/s^2], shape (1, 1)."""
+        """Return the rate of the velocity that the force follows [m/s^2], shape (1, 1)."""
         return column((v - z[0]) / self.tau_L)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The velocity itself, shape (1, 1)."""
+        """Return the velocity itself, shape (1, 1)."""
         return column(v)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> None:
-        """None: the rate says it all."""
+        """Return None: the rate is sufficient."""
 
 
 @final
@@ -159,8 +159,8 @@ class TemperatureDependent(Wrapper):
         mu(T)      = mu      exp(-k_dry (T - T_0))   every dry level: coefficient or force
         sigma_2(T) = sigma_2 exp(-k_wet (T - T_0))   every viscous coefficient
 
-    Which parameters these are is their `role`, "level" or "viscous". T [K] is a parameter: a
-    number, or a symbol that something else determines.
+    The `role` of a parameter, "level" or "viscous", selects it. T [K] is a parameter: a
+    number, or a symbol of another model.
     Limits: T = T_0 is the law itself. The exponential holds over some ten kelvin, for oils with
     k_wet of 0.02 to 0.05 1/K.
     Source: Reynolds' viscosity equation; for robot joints Bittencourt and Gunnarsson, J. Dyn. Syst.
@@ -191,7 +191,7 @@ class TemperatureDependent(Wrapper):
 
     @property
     def inner(self) -> Law:
-        """The law with the coefficients of the temperature T."""
+        """Law with the coefficients at the temperature T."""
         rise = self.T - self.T_0
         falls = {"level": exp(-self.k_dry * rise), "viscous": exp(-self.k_wet * rise)}
         known = parameters(self.law).items()
@@ -203,19 +203,18 @@ class TemperatureDependent(Wrapper):
 @final
 @dataclass(frozen=True, eq=False)
 class LoadNormalised(Wrapper):
-    """A law under one load, whose force is scaled with the load there is.
+    """Law under one load, whose force is scaled with the actual load.
 
         F     = N / N_0 F_law(v, N_0, z)
         dz/dt = rate_law(v, N_0, z)
 
-    Bristles of laws in newtons deflect with the load; where it falls they keep what they have, and
-    in joints with friction from reactions that ends in no solution. Here the deflection does not
-    depend on the load, the force follows the load at once, and N = 0 gives none.
-    Limits: N = N_0 is the law itself, and so is any N for a law whose force is proportional to the
-    load and without states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force
-    is scaled, viscous friction too. A load that grows over a bent bristle does work.
-    Source: LuGre in coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws
-    constructed.
+    Bristles of laws in newtons deflect with the load; if it falls they keep their force, which in
+    joints with friction from reactions can leave no solution. Here the deflection does not depend
+    on the load, the force follows the load at once, and N = 0 gives zero force. Limits: N = N_0 is
+    the law itself, and so is any N for a law whose force is proportional to the load and without
+    states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force is scaled,
+    including viscous friction. A load that grows over a bent bristle does work. Source: LuGre in
+    coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws constructed.
     """
 
     facts = Facts((), "that of its law", "constructed", "Canudas de Wit and Tsiotras, CDC 1999")
@@ -230,12 +229,12 @@ class LoadNormalised(Wrapper):
         if self.law.inputs:
             raise ValueError(
                 "LoadNormalised: expected a law of v and N, got "
-                f"{type(self.law).__name__}, which needs {self.law.inputs[0].name}; it holds a "
-                "contact at rest whatever the load does"
+                f"{type(self.law).__name__}, which needs {self.law.inputs[0].name}; it carries "
+                "the applied force in stick, independent of the load"
             )
 
     def load(self, N: Scalar) -> Scalar:
-        """N_0 [N], whatever the load is."""
+        """Return N_0 [N], independent of the load."""
         return self.N_0
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -251,5 +250,5 @@ class LoadNormalised(Wrapper):
         return N / self.N_0 * super().static_level(N, side)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """That at N_0, scaled."""
+        """Return the bound at N_0, scaled."""
         return N / self.N_0 * super().most_held(N, side)

@@ -1,4 +1,4 @@
-"""Friction that depends on the path alone: Dahl, Bliman-Sorine and Bouc-Wen."""
+"""Rate-independent friction laws: Dahl, Bliman-Sorine and Bouc-Wen."""
 
 from dataclasses import dataclass
 from math import inf
@@ -47,7 +47,7 @@ class Dahl(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """z: deflection of the contact [m], positive with v."""
+        """Deflection z of the contact [m], positive with v."""
         return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -112,15 +112,15 @@ class BlimanSorine(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The fast and the slow part of the force."""
+        """Fast and slow part of the force."""
         count = range(1, int(self.order) + 1)
         return tuple(State(f"F_{i}", "N", 1.0, doc=f"part {i} of the force") for i in count)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """One path constant a second [m/s]; none without the peak of order 2.
+        """Path constant per second [m/s]; inf without the peak of order 2.
 
-        The force depends on the path alone. But a contact that rings under its peak breaks away
+        The force depends on the path only. However, a contact that rings below its peak breaks away
         by the phase in which it meets the peak, and error control must resolve the ringing.
         """
         return self.s_f if self.order == "2" else inf
@@ -130,7 +130,7 @@ class BlimanSorine(Law):
         return (self.mu_1 if self.order == "1" else self.mu_1 - self.mu_2) * N
 
     def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The height [N] of the peak at the path s_p, which the order 1 does not have."""
+        """Return the height [N] of the peak at the path s_p, which the order 1 does not have."""
         if self.order == "1":
             return self.mu_1 * N
         q = self.eta * self.mu_2 / self.mu_1  # exp(-s_p (1 - eta)/(eta s_f))
@@ -138,7 +138,7 @@ class BlimanSorine(Law):
         return N * (self.mu_1 * (1 - fast) - self.mu_2 * (1 - slow))
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """That of both parts, which point the same way behind a reversal."""
+        """Return the sum of both parts, which have the same sign after a reversal."""
         return N * (self.mu_1 if self.order == "1" else self.mu_1 + self.mu_2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -203,12 +203,12 @@ class BoucWen(Law):
         ):
             raise ValueError(
                 f"BoucWen: expected -beta < gamma <= beta, got gamma = {self.gamma:g} and "
-                f"beta = {self.beta:g}; beyond them the element is unbounded or gives energy"
+                f"beta = {self.beta:g}; otherwise the element is unbounded or generates energy"
             )
 
     @property
     def states(self) -> tuple[State, ...]:
-        """z: the share of the limit that the hysteretic part carries, within -1 ... 1."""
+        """Fraction z of the limit that the hysteretic part carries, within -1 ... 1."""
         return (State("z", "1", 1.0, doc="friction force over its limit"),)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:

@@ -1,4 +1,4 @@
-"""Friction with a memory of the time at rest: Gonthier, Armstrong, and rate and state."""
+"""Friction with memory of the time in stick: Gonthier, Armstrong, and rate and state."""
 
 from dataclasses import dataclass
 from typing import final
@@ -72,7 +72,7 @@ class Gonthier(Levels):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The velocity of full direction [m/s]."""
+        """Velocity of full direction [m/s]."""
         return self.v_d
 
     def _sticking(self, v: Scalar) -> Scalar:
@@ -106,11 +106,11 @@ class Gonthier(Levels):
         return smooth.hold(bristle, self._level(N, z[1]) + rounding, rounding) + self.sigma_2 * v
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Dwell memory s(v), and the deflection at which the force stays.
+        """Return the dwell memory s(v), and the deflection at which the force is constant.
 
-        dz/dt vanishes at sigma_0 z = F_C dir + sigma_1 v s/(1 - s). In creep that is far beyond
-        the level F_C, at which the saturated force is reached: the deflection stands there, and
-        goes on growing without effect on the force but for kappa F_C.
+        dz/dt vanishes at sigma_0 z = F_C dir + sigma_1 v s/(1 - s). In creep that is far above the
+        level F_C, at which the saturated force is reached: the deflection returned is the one at
+        saturation; it continues to grow without effect on the force except for kappa F_C.
         """
         s, x = self._sticking(v), v / self.v_s
         F_C = self._level(N, s)
@@ -136,7 +136,7 @@ class Armstrong(Law):
     tau_L and a dwell clock; here one spring yields, a filter makes the delay, and
     q = t/(t + gamma) counts the rest of duration t, forgotten within tau_r of slip.
     Limits: steady state L(v) sign(v) + sigma_2 v; gamma -> inf, tau_L -> 0, k_t -> inf is the
-    Lorentzian law with the excess mu_a. v_e tells rest from slip; keep it above the creep.
+    Lorentzian law with the excess mu_a. v_e separates rest from slip; keep it above the creep.
     Not valid for N = 0.
     Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, 1083-1138.
     """
@@ -176,11 +176,11 @@ class Armstrong(Law):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The velocity that ends the rest [m/s]."""
+        """Velocity that ends the rest [m/s]."""
         return self.v_e
 
     def level(self, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
-        """The force L > 0 [N] at which the spring yields."""
+        """Return the force L > 0 [N] at which the spring yields."""
         excess = self.mu_a + (self.mu_inf - self.mu_a) * q
         return N * (self.mu_d + excess / (1 + (w / self.v_s) ** 2))
 
@@ -213,18 +213,18 @@ class Armstrong(Law):
         return column(self._yielded(v, N, v, q), v, q)
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """The same with the spring at the level of the filter and the dwell that there are."""
+        """Return the same with the spring at the level of the present filter and dwell."""
         return column(self._yielded(v, N, z[1], z[2]), v, self._balance(v))
 
     def _shares(self, v: Scalar) -> tuple[Scalar, Scalar]:
-        """How much v is rest and how much slip, together 1, each right where it is small."""
+        """Return the shares of rest and slip in v, with sum 1, each accurate if small."""
         x = -((v / self.v_e) ** 2)
         return exp(x), -expm1(x)
 
     def _balance(self, v: Scalar) -> Scalar:
-        """Dwell time at which growth equals loss.
+        """Return the dwell at which growth equals loss.
 
-        The root of what is lost, `slip` gamma, is written with |v|: it has a slope at rest, too.
+        The root of the loss, `slip` gamma, is written with |v|: it has a slope at rest, too.
         """
         rest, slip = self._shares(v)
         grow, lose = rest * self.tau_r, slip * self.gamma
@@ -233,7 +233,7 @@ class Armstrong(Law):
         return 2 * grow / (2 * grow + lose + root)
 
     def _yielded(self, v: Scalar, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
-        """Stretch of the spring at its level."""
+        """Return the stretch of the spring at its level."""
         return self.level(N, w, q) / self.k_t * smooth.sign(v, self.v_eps)
 
 
@@ -306,7 +306,7 @@ class RateAndState(Law):
         return sqrt(v * v + self.v_eps * self.v_eps)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Refused: the steady force follows ln v, and no load is held at rest."""
+        """Raise an error: the steady force follows ln v, and any load causes creep."""
         raise one_sided(self, "it creeps under any load, and ln v has no limit at rest")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -322,11 +322,11 @@ class RateAndState(Law):
         return column(self.v_0 / self.D_c * (exp(-z[0]) - w / self.v_0))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The psi of steady sliding, shape (1, 1); 0, an age of D_c/v_0, below v_eps.
+        """Return the psi of steady sliding, shape (1, 1); 0, an age of D_c/v_0, below v_eps.
 
-        A contact at rest has no steady age. The oldest one, D_c/v_eps, is that of months: a body
-        that is let go under more than such a contact holds leaves it within no time that a step
-        could resolve.
+        A contact at rest has no steady age. The oldest one, D_c/v_eps, would be months old: a body
+        released under more load than such a contact holds would accelerate faster than a step can
+        resolve.
         """
         moves = smooth.magnitude(v, 0.0) >= self.v_eps
         return column(smooth.choose(moves, -log(self._speed(v) / self.v_0), 0.0))

@@ -1,4 +1,4 @@
-"""Parts of laws with states: Stribeck levels, elements side by side, yielding."""
+"""Parts of laws with states: Stribeck levels, parallel elements, yielding."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from symfric.laws.base.law import Law, State, Switch
 
 
 class StribeckLevel(Law):
-    """A law with states that slides at a Stribeck curve.
+    """Law with states that slides at a Stribeck curve.
 
     g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
     """
@@ -26,7 +26,7 @@ class StribeckLevel(Law):
     v_eps: Scalar
 
     def level(self, v: Scalar, N: Scalar) -> Scalar:
-        """The Stribeck curve g(v, N) > 0 [N] that the force of the states tends to."""
+        """Return the Stribeck curve g(v, N) > 0 [N], the limit of the force of the states."""
         falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
         return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
@@ -37,13 +37,13 @@ class StribeckLevel(Law):
 
 
 class Elements(Law):
-    """A law of elements side by side, each a spring whose force F_i is a state.
+    """Law of parallel elements, each a spring whose force F_i is a state.
 
-    In the event form each has a mode, 0 while it sticks and 1 while it slips.
+    In the event form each has a mode, 0 in stick and 1 in slip.
     """
 
     kind: ClassVar[type[Parametric]]
-    """What an element is."""
+    """Class of an element."""
 
     elements: tuple[Any, ...]
     form: str
@@ -60,25 +60,25 @@ class Elements(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The spring forces."""
+        """Spring forces."""
         count = range(1, len(self.elements) + 1)
         return tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
 
     def total(self, parts: Iterable[Scalar]) -> Scalar:
-        """The sum of something of all elements, in their order."""
+        """Return the sum over all elements, in their order."""
         first, *rest = parts
         return sum(rest, start=first)
 
     def springs(self, z: Scalar) -> Scalar:
-        """The sum of the spring forces [N]."""
+        """Return the sum of the spring forces [N]."""
         return self.total(z[i] for i in range(len(self.elements)))
 
     def slip_switches(
         self, v: Scalar, z: Scalar, limits: Sequence[Scalar], resets: Sequence[dict[str, Scalar]]
     ) -> tuple[Switch, ...]:
-        """Slip of each element at its limit [N], stick of all when v changes sign.
+        """Return slip of each element at its limit [N], and stick of all when v changes sign.
 
-        `resets` say what becomes of the states of each element, of its mode last.
+        `resets` are the new states of each element, its mode last.
         """
         direction = smooth.sign(v, 0.0)
         slips = tuple(
@@ -94,13 +94,15 @@ class Elements(Law):
 
 
 def held_columns(parts: Iterable[tuple[Scalar, Scalar, Scalar]]) -> tuple[Scalar, Scalar]:
-    """Columns of ends and means of a held step, from load, mean load and mode of each element."""
+    """Return columns of ends and means of a held step, from load, mean load and mode of each
+    element.
+    """
     ends, means, modes = zip(*parts, strict=True)
     return column(*ends, *modes), column(*means, *modes)
 
 
 TYPICAL, FIRM = 1e-5, 1e5
-"""Deflection of bristles [m], and the force [N] at which stiffer ones have theirs."""
+"""Deflection of bristles [m], and the force [N] that defines that of stiffer ones."""
 
 
 def deflection(sigma_0: Scalar) -> float:
@@ -114,7 +116,7 @@ def deflection(sigma_0: Scalar) -> float:
 
 
 def along(t: Vector, s: Vector) -> Scalar:
-    """Share a of the slip along t that loads what points along s: 1 where t = s, 0 where t = -s.
+    """Return the share a of slip along t that loads along s: 1 for t = s, 0 for t = -s.
 
         a = [1 + c + sqrt(c^2 + w^2) - sqrt(1 + w^2)] / 2,   c = t.s, w the `turn` of s
 
@@ -125,12 +127,14 @@ def along(t: Vector, s: Vector) -> Scalar:
 
 
 def onward(t: Vectors, s: Vectors) -> Vectors:
-    """Twice s where slip along t loads it, 0 where it unloads: t + s, of vectors 2 a s, `along`."""
+    """Return twice s if slip along t loads it, 0 if it unloads: t + s, of vectors 2 a s,
+    `along`.
+    """
     return 2 * along(t, s) * s if isinstance(s, Vector) else t + s
 
 
 def ahead(f: Callable[[Scalar], Scalar], t: Vectors, r: Vectors) -> Scalar:
-    """f(t r) of the load share r ahead of the slip along t.
+    """Return f(t r) of the load share r ahead of the slip along t.
 
     For vectors a f(|r|) + (1 - a) f(-|r|), a = `along` of both: between loading and unloading.
     """
@@ -142,11 +146,11 @@ def ahead(f: Callable[[Scalar], Scalar], t: Vectors, r: Vectors) -> Scalar:
 
 
 def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> Vectors:
-    """What of the slip v along t does not stretch an element with the load share r: v f(t r).
+    """Return the part of the slip v along t that does not stretch an element: v f(t r).
 
-    For vectors |v| r/|r| [a f(|r|) - (1 - a) f(-|r|)], a = `along` of both, that is along r. Then
-    |r| grows at most as fast as in straight slip, so bounds of the scalar law hold in any slip, and
-    what is spent takes energy where it does in straight slip.
+    r is its load share. For vectors it is |v| r/|r| [a f(|r|) - (1 - a) f(-|r|)], a = `along` of
+    both, parallel to r. Then |r| grows at most as fast as in straight slip, so bounds of the scalar
+    law hold in any slip, and this part dissipates energy where it does in straight slip.
     """
     if not isinstance(r, Vector):
         return v * f(t * r)
@@ -164,8 +168,8 @@ class Held:
         way = v h,   s = sign(v)
 
     Attributes:
-        still: whether nothing moves.
-        some: `way`, or where nothing moves a number to divide by.
+        still: True if nothing moves.
+        some: `way`, or a nonzero divisor if nothing moves.
     """
 
     way: Scalar
@@ -175,7 +179,7 @@ class Held:
 
     @classmethod
     def over(cls, v: Scalar, h: Scalar) -> "Held":
-        """A step of `h` [s] at the velocity `v`."""
+        """Return a step of `h` [s] at the velocity `v`."""
         way, still = v * h, v == 0
         return cls(way, smooth.sign(v, 0.0), still, smooth.choose(still, h, way))
 
@@ -188,16 +192,16 @@ class Held:
         slips: Scalar,
         slipped: tuple[Scalar, Scalar],
     ) -> tuple[Scalar, Scalar, Scalar]:
-        """An element with the load F, the mode p and the stiffness k, that slips at +-limit.
+        """Return the step of an element with the load F, the mode p and the stiffness k.
 
-        Its load at the end and in the mean of the step, and its mode at the end:
+        It slips at +-limit. Its load at the end and in the mean of the step, and its mode at the
+        end are:
 
             slips     all along:  F+ and mean as given in `slipped`,               p+ = 1
             reaches   the limit:  F+ = s limit,   mean = F+ - (F+ - F)^2 / (2 k way),  p+ = 1
             sticks:               F+ = F + k way, mean = F + k way / 2,            p+ = 0
 
-        The load rises evenly, so that what the limit cuts off the mean is a triangle. At rest p
-        stays.
+        The load rises linearly, so the limit cuts a triangle off the mean. At rest p is unchanged.
         """
         goal, tried = self.s * limit, F + k * self.way
         reaches = self.s * tried >= limit
@@ -215,22 +219,22 @@ class Held:
     def yielded(
         self, F: Scalar, p: Scalar, k: Scalar, limit: Scalar
     ) -> tuple[Scalar, Scalar, Scalar]:
-        """The same of an element that stays at its limit as long as it slips."""
+        """Return the same for an element that stays at its limit as long as it slips."""
         goal = self.s * limit
         return self.stretched(F, p, k, limit, self.s * F >= limit, (goal, goal))
 
 
 def yielding(v: Scalar, r: Scalar, n: Scalar, v_eps: Scalar, r_eps: Scalar) -> Scalar:
-    """Rate at which an element under slip velocity `v` stretches.
+    """Return the rate at which an element under slip velocity `v` stretches.
 
         v - |v| |r|^n [1 + sign(v r)]/2 sign(r)
 
-    r is its load over its limit. It stretches elastically while unloading and, for n -> inf, up
-    to |r| = 1, where it slips; vectors return radially, by the slip along the load. sign is smooth
+    r is its load over its limit. It stretches elastically while unloading and, for n -> inf, up to
+    |r| = 1, where it slips; vectors return radially, by the slip along the load. sign is smooth
     over v_eps and r_eps, |r| over r_eps; at v = 0 the rate is exactly zero, so that an element at
-    rest keeps its load. At r = 1 it vanishes to rounding for r_eps <= 1e-8. What is spent never
-    drives, so that an element beyond its limit, because the load has dropped, comes back in either
-    direction and however slowly it is moved.
+    rest keeps its load. At r = 1 it vanishes to rounding for r_eps <= 1e-8. The yielding never
+    drives, so an element beyond its limit, because the load has dropped, returns in either
+    direction of motion and at any speed.
     """
     t, s = smooth.sign(v, v_eps), smooth.sign(r, r_eps)
     return v - smooth.overload(r, n, r_eps) / 2 * (v * t) * onward(t, s)

@@ -1,4 +1,4 @@
-"""Bristles that slide at a Stribeck level: LuGre in three forms, and elasto-plastic."""
+"""Bristle laws with a Stribeck level: LuGre in three forms, and elasto-plastic."""
 
 from dataclasses import dataclass
 from math import pi
@@ -14,7 +14,7 @@ from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
 
 @dataclass(frozen=True, eq=False)
 class Bristle(Levels, StribeckLevel):
-    """A bristle of stiffness sigma_0 and damping sigma_1 that slides at a Stribeck level.
+    """Bristle of stiffness sigma_0 and damping sigma_1 that slides at a Stribeck level.
 
         g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
         F = sigma_0 z + sigma_1 dz/dt + sigma_2 v
@@ -32,7 +32,7 @@ class Bristle(Levels, StribeckLevel):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """z: mean deflection of the bristles [m], positive with v."""
+        """Mean deflection z of the bristles [m], positive with v."""
         return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -44,7 +44,7 @@ class Bristle(Levels, StribeckLevel):
         return column(self.level(v, N) / self.sigma_0 * smooth.sign(v, self.v_eps))
 
     def warnings(self) -> tuple[str, ...]:
-        """Return True if the law may push: its passivity needs viscous friction."""
+        """Return a warning if the law is not passive for lack of viscous friction."""
         needed = (self.mu_s - self.mu_d) / self.mu_d * self.sigma_1
         if not is_number(needed) or not is_number(self.sigma_2) or self.sigma_2 >= needed:
             return ()
@@ -183,7 +183,7 @@ class LuGrePassive(Bristle):
         return self.sigma_0 * z[0] + damping * self.rate(v, N, z)[0] + self.sigma_2 * v
 
     def warnings(self) -> tuple[str, ...]:
-        """None: the fading damping replaces the bound of `LuGre`."""
+        """Return no warnings: the fading damping replaces the bound of `LuGre`."""
         return ()
 
 
@@ -246,5 +246,5 @@ class ElastoPlastic(Bristle):
             raise ValueError(
                 "ElastoPlastic: expected z_ba < mu_d N / sigma_0 = "
                 f"{self.mu_d * N / self.sigma_0:g} m, got z_ba = {self.z_ba:g} m; "
-                "the bristle would have to slide before it breaks away"
+                "otherwise the bristle slides before it breaks away"
             )

@@ -1,4 +1,6 @@
-"""Elements side by side: Maxwell-slip, and Leuven and GMS, which add a Stribeck effect and lag."""
+"""Laws of parallel elements: Maxwell-slip, and Leuven and GMS, which add a Stribeck effect and
+lag.
+"""
 
 from dataclasses import dataclass
 from typing import final
@@ -20,14 +22,14 @@ from symfric.laws.dynamic.element import (
 @final
 @dataclass(frozen=True, eq=False)
 class Slider(Parametric):
-    """A spring of stiffness k on a slider that carries mu N."""
+    """Spring of stiffness k on a slider that carries mu N."""
 
     k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
     mu: Scalar = fields.COEFFICIENT(0.1, doc="friction coefficient of the slider", lower=1e-12)
 
 
 SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slider(1e4, 0.025))
-"""Together 1e5 N/m and mu = 0.1, slipping one after the other."""
+"""Four sliders, together 1e5 N/m and mu = 0.1, which slip one after the other."""
 
 
 @final
@@ -73,7 +75,7 @@ class MaxwellSlip(Elements):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The spring forces, and in the event form the modes."""
+        """Spring forces, and in the event form the modes."""
         if self.form == "smooth":
             return super().states
         count, mode = range(1, len(self.elements) + 1), "1 while the element slips"
@@ -89,7 +91,7 @@ class MaxwellSlip(Elements):
         return self.springs(z)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rates of the spring forces [N/s] and, zero, of the modes."""
+        """Return the rates of the spring forces [N/s] and, zero, of the modes."""
         count = len(self.elements)
         if self.form == "event":
             forces = [(1 - z[count + i]) * e.k * v for i, e in enumerate(self.elements)]
@@ -102,14 +104,14 @@ class MaxwellSlip(Elements):
         )
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Sliders at their limits, modes slipping."""
+        """Return sliders at their limits, with modes in slip."""
         direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
         forces = [e.mu * N * direction for e in self.elements]
         modes = [direction**2 for _ in self.elements] if self.form == "event" else []
         return column(*forces, *modes)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Slip of each element at its limit, stick of all when v changes sign."""
+        """Return slip of each element at its limit, and stick of all when v changes sign."""
         if self.form == "smooth":
             return ()
         direction, limits = smooth.sign(v, 0.0), [e.mu * N for e in self.elements]
@@ -120,7 +122,7 @@ class MaxwellSlip(Elements):
         return self.slip_switches(v, z, limits, resets)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Exact in the event form."""
+        """Return the exact step in the event form."""
         if self.form == "smooth":
             return None
         count, held = len(self.elements), Held.over(v, h)
@@ -129,7 +131,9 @@ class MaxwellSlip(Elements):
         )
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
-        """The spring forces after the slip `dx` [m] in one direction, exactly; their sum is F."""
+        """Return the spring forces after the slip `dx` [m] in one direction, exactly; their sum
+        is F.
+        """
         held = [
             smooth.clip(F[i] + e.k * dx, -e.mu * N, e.mu * N) for i, e in enumerate(self.elements)
         ]
@@ -137,7 +141,7 @@ class MaxwellSlip(Elements):
 
 
 LEUVEN_SLIDERS = (Slider(5e4, 0.05), Slider(2.5e4, 0.05), Slider(1.5e4, 0.05), Slider(1e4, 0.05))
-"""Together 1e5 N/m and mu = 0.2, above the static level."""
+"""Four sliders, together 1e5 N/m and mu = 0.2, above the static level."""
 
 
 @final
@@ -189,7 +193,7 @@ class Leuven(StribeckLevel, Elements):
         if all(map(is_number, (*shares, self.mu_s))) and sum(shares) < self.mu_s:
             raise ValueError(
                 f"Leuven: expected elements that carry mu_s = {self.mu_s:g} together, got "
-                f"{sum(shares):g}; the bristle would run away"
+                f"{sum(shares):g}; otherwise the bristle deflection diverges"
             )
 
     def stretching(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
@@ -214,7 +218,7 @@ class Leuven(StribeckLevel, Elements):
         )
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """One of the states whose sum is g sign(v): all elements at the same load share."""
+        """Return one of the states with the sum g sign(v): all elements at the same load share."""
         total = self.total(e.mu for e in self.elements)
         level = self.level(v, N) * smooth.sign(v, self.v_eps)
         return column(*(e.mu / total * level for e in self.elements))
@@ -223,14 +227,14 @@ class Leuven(StribeckLevel, Elements):
 @final
 @dataclass(frozen=True, eq=False)
 class Element(Parametric):
-    """One element: a spring of stiffness k that carries the share alpha of the friction."""
+    """Element: a spring of stiffness k that carries the share alpha of the friction."""
 
     k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
     alpha: Scalar = fields.SHAPE(1.0, doc="share of the friction", lower=1e-12)
 
 
 ELEMENTS = (Element(5e4, 0.25), Element(2.5e4, 0.25), Element(1.5e4, 0.25), Element(1e4, 0.25))
-"""Together 1e5 N/m, slipping one after the other."""
+"""Four elements, together 1e5 N/m, which slip one after the other."""
 
 
 @final
@@ -293,14 +297,14 @@ class GMS(StribeckLevel, Elements):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The spring forces and the modes."""
+        """Spring forces and modes."""
         mode, whole = "0 in stick, 1 in slip", self.form == "event"
         count = range(1, len(self.elements) + 1)
         modes = (State(f"p_{i}", "1", 1.0, even=True, doc=mode, whole=whole) for i in count)
         return (*super().states, *modes)
 
     def shares(self) -> list[Scalar]:
-        """The alpha_i, divided by their sum."""
+        """Return the alpha_i, divided by their sum."""
         total = self.total(e.alpha for e in self.elements)
         return [e.alpha / total for e in self.elements]
 
@@ -334,13 +338,13 @@ class GMS(StribeckLevel, Elements):
         return column(*forces, *modes)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """All elements slipping on the Stribeck curve."""
+        """Return all elements slipping on the Stribeck curve."""
         direction = self._direction(v)
         forces = [alpha * self.level(v, N) * direction for alpha in self.shares()]
         return column(*forces, *(direction**2 for _ in forces))
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Exact in the event form: stick up to the limit, or exponential slip towards it."""
+        """Return the exact step in the event form: stick up to the limit, or exponential slip."""
         if self.form == "smooth":
             return None
         count, g, held = len(self.elements), self.level(v, N), Held.over(v, h)
@@ -357,7 +361,7 @@ class GMS(StribeckLevel, Elements):
         return held_columns(parts)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Slip of each element at its limit, stick of all when v passes through zero."""
+        """Return slip of each element at its limit, and stick of all when v passes through zero."""
         if self.form == "smooth":
             return ()
         g = self.level(v, N)

@@ -1,4 +1,4 @@
-"""Contacts that hold up to a static level: exactly, blended, by a reset integrator, in a plane."""
+"""Laws with true stick up to a static level: exact, blended, by a reset integrator, in a plane."""
 
 from dataclasses import dataclass
 from math import inf
@@ -24,12 +24,12 @@ class ExactCoulomb(Sticking):
 
     F_e is the applied force: what the contact must carry for no acceleration. Sliding ends where
     v passes through zero; the contact sticks there if it can, or slides on to the other side. This
-    is the truth that regularised laws are measured against; needs a scene with events. A load
+    is the reference for regularised laws; it needs a scene with events. A load
     beyond mu_s N from the very start breaks away there. In joints of a mechanism F_e follows from
     the constraints, see `JointFriction`.
     Limits: `Coulomb`, `Stribeck` and others tend to it as their smoothing width tends to zero.
     Between the switches the mode is constant. A run has a relative tolerance of 1e-7 or less,
-    whatever is asked: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
+    whatever the requested one: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
     Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
     """
 
@@ -50,12 +50,12 @@ class ExactCoulomb(Sticking):
 
     @property
     def has_mode(self) -> bool:
-        """Always: stick and slip are modes."""
+        """Always True: stick and slip are modes."""
         return True
 
     @property
     def velocity_scale(self) -> Scalar:
-        """That of the fall [m/s]; what happens at v = 0 is an event."""
+        """Velocity scale of the fall [m/s]; at v = 0 there is an event instead."""
         return self.v_s if self.form == "stribeck" else inf
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -75,12 +75,12 @@ class ExactCoulomb(Sticking):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """The end of sliding, and break-away."""
+        """Return the end of sliding, and break-away."""
         return stick_and_slip(v, z[0], F_e, self.mu_s * N)
 
 
 ROOT_STEPS = 10
-"""Steps of Newton's method that reach a root to rounding for every sharpness allowed."""
+"""Newton steps that reach a root to rounding for every allowed sharpness."""
 
 
 @final
@@ -123,7 +123,7 @@ class StickSlip(Levels):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """D: deformation of the contact while it sticks [m]."""
+        """Deformation D of the contact while it sticks [m]."""
         return (State("D", "m", 1e-6, doc="stiction deformation"),)
 
     def _slipping(self, v: Scalar) -> Scalar:
@@ -155,9 +155,9 @@ class StickSlip(Levels):
         return column((1 - slip) * stretch - slip * forgotten)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Deformation at which growth equals loss, zero beyond v_s, shape (1, 1).
+        """Return the deformation at which growth equals loss, zero beyond v_s, shape (1, 1).
 
-        The root of slip r + (1 - slip) (r^n - 1), convex, by Newton's method from r = 1.
+        It is the root of slip r + (1 - slip) (r^n - 1), convex, by Newton's method from r = 1.
         """
         slip, r = self._slipping(v), 1.0 + 0.0 * v
         for _ in range(ROOT_STEPS):
@@ -210,7 +210,7 @@ class HaessigFriedland(Levels):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The bristle deflection, and in the event form the mode."""
+        """Bristle deflection, and in the event form the mode."""
         slip = State("slip", "1", 1.0, even=True, doc="1 in slip", whole=True)
         bristle = State("z", "m", deflection(self.sigma_0), doc="bristle deflection")
         return (bristle, slip) if self.form == "event" else (bristle,)
@@ -243,13 +243,13 @@ class HaessigFriedland(Levels):
         return stiffness * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Deflection at its limit [m], mode slipping."""
+        """Return the deflection at its limit [m], with the mode in slip."""
         direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
         z = self.mu_d * N / self.sigma_0 * direction
         return column(z, direction**2) if self.form == "event" else column(z)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Exact in the event form; the mode counts as that at the end of the step."""
+        """Return the exact step in the event form; the mode is that at the end of the step."""
         if self.form == "smooth":
             return None
         held = Held.over(v, h)
@@ -257,7 +257,7 @@ class HaessigFriedland(Levels):
         return column(end, slip), column(mean, slip)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Slip at the limit, stick when v changes sign."""
+        """Return slip at the limit, and stick when v changes sign."""
         if self.form == "smooth":
             return ()
         direction = smooth.sign(v, 0.0)
@@ -270,7 +270,7 @@ class HaessigFriedland(Levels):
 
 
 CUBIC_STEPS = 40
-"""Steps of Newton's method that reach a cubic root of 1e-15 of its start."""
+"""Newton steps that reach a cubic root of 1e-15 of its start."""
 
 
 @final
@@ -309,7 +309,7 @@ class Bristle2D(Levels):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """z: deflection of the bristle [m], a vector in a plane."""
+        """Deflection z of the bristle [m], a vector in a plane."""
         return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"),)
 
     def _level(self, v: Scalar, N: Scalar) -> Scalar:
@@ -331,7 +331,7 @@ class Bristle2D(Levels):
         return column((self.force(v, N, z) - self.sigma_0 * z[0]) / self.sigma_1)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Deflection in steady sliding [m], exact to rounding of g.
+        """Return the deflection in steady sliding [m], exact to rounding of g.
 
         Its force F solves F = sat(F + sigma_1 v). With t = (F + sigma_1 v - g) / (2 kappa g) + 1/2,
         the place in the corner of sat, it is the root of t^3 (2 - t) = sigma_1 |v| / (kappa g) in

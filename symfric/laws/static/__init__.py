@@ -1,1 +1,1 @@
-"""Memoryless laws F(v, N): one family a file."""
+"""Memoryless laws F(v, N), one family per file."""

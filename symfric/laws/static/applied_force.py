@@ -1,4 +1,4 @@
-"""Laws that see what the contact must carry: true sticking without an internal state."""
+"""Laws that use the applied force: true sticking without an internal state."""
 
 from dataclasses import dataclass, replace
 from math import inf, pi
@@ -62,12 +62,12 @@ class Karnopp(Sticking):
 
     @property
     def has_mode(self) -> bool:
-        """In the event form."""
+        """True in the event form."""
         return self.form == "event"
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The mode, and 1 on the way out of the band."""
+        """Mode, and 1 while the contact leaves the band."""
         return (
             (
                 *super().states,
@@ -78,12 +78,12 @@ class Karnopp(Sticking):
         )
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """That of the mode [1/s], and zero."""
+        """Return the rate of the mode [1/s], and zero."""
         own = super().rate(v, N, z, F_e=F_e)
         return column(own[0], 0.0 * v) if self.has_mode else own
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The direction of sliding; within the band, moving, it is leaving."""
+        """Return the direction of sliding; moving within the band, the contact is leaving it."""
         own = super().steady_state(v, N)
         if not self.has_mode:
             return own
@@ -92,7 +92,7 @@ class Karnopp(Sticking):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The half width of the band [m/s]; none in the event form, where it is an event."""
+        """Half width of the band [m/s]; inf in the event form, where it is an event."""
         return inf if self.has_mode else self.D_v
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -115,7 +115,9 @@ class Karnopp(Sticking):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """Those of a contact that sticks; the band ends a slide, and its edge jumps the force."""
+        """Return the switches of a contact that sticks; the band ends sliding, and its edge
+        jumps the force.
+        """
         if not self.has_mode:
             return ()
         edge = smooth.choose(rests(z[0]), -1.0, z[0] * v - self.D_v)
@@ -166,7 +168,7 @@ class Awrejcewicz(Levels, StaticLaw):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The applied force F_e [N], which rest has to carry."""
+        """Applied force F_e [N], which is carried in stick."""
         return (APPLIED_FORCE,)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -224,17 +226,17 @@ class LeineSwitch(Sticking):
 
     @property
     def has_mode(self) -> bool:
-        """In the event form."""
+        """True in the event form."""
         return self.form == "event"
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The applied force, but not in the smooth form."""
+        """Applied force, except in the smooth form."""
         return () if self.form == "smooth" else (APPLIED_FORCE,)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smoothing velocity, or the half width of the band [m/s]; none in the event form."""
+        """Smoothing velocity, or half width of the band [m/s]; inf in the event form."""
         return {"smooth": self.v_eps, "original": self.eta, "event": inf}[self.form]
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -257,7 +259,7 @@ class LeineSwitch(Sticking):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """The end of sliding, and break-away."""
+        """Return the end of sliding, and break-away."""
         if not self.has_mode:
             return ()
         return stick_and_slip(v, z[0], F_e, self.mu_s * N)
@@ -301,16 +303,16 @@ class Wojewoda(Levels, StaticLaw):
         if is_number(self.mu_s) and is_number(self.mu_d) and self.mu_s > 2 * self.mu_d:
             raise ValueError(
                 f"Wojewoda: mu_s: expected mu_s <= 2 mu_d = {2 * self.mu_d:g}, got {self.mu_s:g}; "
-                "beyond, friction drives a body that slows down"
+                "otherwise friction drives a body that slows down"
             )
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The sliding acceleration dv/dt [m/s^2]."""
+        """Sliding acceleration dv/dt [m/s^2]."""
         return (Input("dv", "m/s^2", "sliding acceleration"),)
 
     def outside(self, speed: Scalar, N: Scalar, *, dv: Scalar = 0.0) -> Scalar:
-        """Refused: the branch that a slide begins or ends on follows from dv."""
+        """Raise an error: the branch at the start or end of sliding depends on dv."""
         raise one_sided(self, "its branches change with the sign of v dv/dt")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:

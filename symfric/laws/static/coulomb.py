@@ -29,7 +29,7 @@ SHAPES: dict[str, Callable[[Scalar], Scalar]] = {
     "saturation": lambda u: smooth.clip(u, -1.0, 1.0),
     "quadratic": _quadratic,
 }
-"""Stand-ins for sign(u): odd, rising, -1 to 1."""
+"""Approximations of sign(u): odd, increasing, -1 to 1."""
 
 
 @final
@@ -125,7 +125,7 @@ class PowerLawViscous(StaticLaw):
         return inf if equals(self.d, 1.0) else self.v_eps
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """The force itself [N]: it does not jump at rest."""
+        """Return the force itself [N]: it does not jump at rest."""
         return self.force(speed, N)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -187,7 +187,7 @@ class Table(StaticLaw):
         return N * mu * smooth.sign(v, self.v_eps)
 
     def coefficient(self, speed: Scalar) -> Scalar:
-        """The coefficient mu at a speed >= 0."""
+        """Return the coefficient mu at a speed >= 0."""
         mu = self.coefficients[0]
         pieces = zip(pairwise(self.speeds), pairwise(self.coefficients), self._slopes, strict=True)
         for (a, b), (low, high), (left, right) in pieces:

@@ -236,10 +236,10 @@ class SteadyStateLuGre(Curve):
 
     @classmethod
     def pilot(cls) -> "SteadyStateLuGre":
-        """The set of the pilot plant, table 5.1; it is the default."""
+        """Return the set of the pilot plant, table 5.1, which is the default."""
         return cls()
 
     @classmethod
     def main(cls) -> "SteadyStateLuGre":
-        """The set of the main plant, table 5.2."""
+        """Return the set of the main plant, table 5.2."""
         return cls(F_S=4.2672, F_C=2.6063, v_s=4.9e-3, sigma_2=5.0, delta=3.2)

@@ -1,4 +1,4 @@
-"""Friction of machines with formulas of their own: joints of robots, ropes, a quarter-car rig."""
+"""Friction of special machines: robot joints, ropes, a quarter-car rig."""
 
 from dataclasses import dataclass
 from math import pi
@@ -157,7 +157,7 @@ class BAM(StaticLaw):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The torques on both sides of the gear, where a coefficient asks for them."""
+        """Torques on both sides of the gear, if a coefficient needs them."""
         of_load = (self.K_e, self.K_m, self.K_es, self.K_ms, self.Q_e, self.Q_m)
         if all(equals(coefficient, 0.0) for coefficient in of_load):
             return ()

@@ -1,4 +1,4 @@
-"""Smooth laws with a peak or a fall that is no exponential."""
+"""Smooth laws with a peak or a fall that is not exponential."""
 
 from dataclasses import dataclass
 from math import e, sqrt

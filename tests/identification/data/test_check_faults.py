@@ -180,7 +180,7 @@ def test_findings_print_and_count(stage_data: Dataset) -> None:
     assert (len(found), len(found.errors), found[0].record) == (1, 1, 1)
     assert "error: data: force brakes the motion that it drives" in str(found)
     assert found[0].to_dict()["kind"] == "sign"
-    assert "nothing doubtful found" in str(stage_data.check())
+    assert "no problems found" in str(stage_data.check())
 
 
 def test_odd_signals_are_checked_without_a_crash() -> None:

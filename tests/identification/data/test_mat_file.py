@@ -92,8 +92,8 @@ def test_vectors_of_structs_and_equal_structs_are_several_records(tmp_path: Path
         ({**RUN, "x": T[:7]}, {}, "column 'x', expected 100 numbers as in the others, got 7"),
         (b"\x89HDF\r\n" + bytes(500), {}, "got version 7.3"),
         (b"MATLAB 7.3".ljust(124) + b"\x00\x02IM" + bytes(9), {}, r"7.3 \(HDF5\); save it with"),
-        (b"hello world", {}, "damaged or none: the first bytes"),
-        (saved(RUN)[:900], {}, "damaged or none: an element is longer"),
+        (b"hello world", {}, "a damaged or another file: the first bytes"),
+        (saved(RUN)[:900], {}, "a damaged or another file: an element is longer"),
     ],
 )
 def test_what_cannot_be_read_is_told(
@@ -112,7 +112,7 @@ def test_numpy_files(tmp_path: Path) -> None:
         data = Dataset.read(tmp_path / name, units="m, N", **said)
         np.testing.assert_array_equal(data[0]["force"], np.cos(T))
     (tmp_path / "d.npz").write_bytes(b"PK\x03\x04 nonsense")
-    with pytest.raises(ValueError, match="expected a NumPy file of numbers, got one that is damag"):
+    with pytest.raises(ValueError, match="expected a NumPy file of numbers, got a damaged"):
         Dataset.read(tmp_path / "d.npz")
 
 

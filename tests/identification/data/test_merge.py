@@ -62,7 +62,7 @@ def test_shift_is_found_to_a_fraction_of_a_sample(
 def test_drift_of_the_clocks_is_refused_or_estimated() -> None:
     first, second = pair(lively(1), 0.7654, (500, 200), drift=2e-4, noise=0.02, end=60.0)
     with pytest.raises(
-        ValueError, match=r"got a drift of 20\d ppm, 0\.012 s over the record; write"
+        ValueError, match=r"got a drift of 20\d ppm, 0\.012 s over the record; pass"
     ):
         first.merged(second, on=("x", "y"))
     record = first.merged(second, on=("x", "y"), drift="estimate")[0]
@@ -73,8 +73,13 @@ def test_drift_of_the_clocks_is_refused_or_estimated() -> None:
     ("f", "noise", "gain", "message"),
     [
         (lambda t: np.sin(5 * t), 0.01, 1.0, "expected one delay, got a second one .* s away"),
-        (lambda t: t, 0.01, 1.0, "expected signals that tell their delay, got .* shifts of 0.002"),
-        (lively(1), 3.0, 1.0, "expected two recordings of one thing, got a correlation of"),
+        (
+            lambda t: t,
+            0.01,
+            1.0,
+            "expected signals that determine their delay, got .* shifts of 0.002",
+        ),
+        (lively(1), 3.0, 1.0, "expected two recordings of one quantity, got a correlation of"),
         (lambda t: np.sin(0.3 * t * t), 0.0, -1.0, "one of them has the opposite sign"),
         (lambda t: 0 * t, 0.0, 1.0, "expected a signal 'x' that changes"),
     ],
@@ -98,7 +103,7 @@ def test_names_and_times_must_fit() -> None:
     first, second = pair(lively(0), 0.1)
     with pytest.raises(ValueError, match="signals of different names, got x in both"):
         first.merged(second.renamed({"z": "x"}), on=("x", "y"))
-    with pytest.raises(ValueError, match="expected a time that both have in common"):
+    with pytest.raises(ValueError, match="expected a common time of both"):
         first.merged(second, on=("x", "y"), shift=100.0)
     with pytest.raises(ValueError, match="expected a signal 'q', got x"):
         first.merged(second, on=("q", "y"))

@@ -101,10 +101,10 @@ def test_headerless_files_are_named_by_the_call(tmp_path: Path) -> None:
 def test_time_comes_from_the_step_where_there_is_none(tmp_path: Path) -> None:
     same(read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]), step=0.01))
     with pytest.raises(
-        ValueError, match=r"expected a column of time.*give step= .* or points=True"
+        ValueError, match=r"expected a column of time.*pass step= .* or points=True"
     ):
         read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]))
-    with pytest.raises(ValueError, match="step= only where there is no time"):
+    with pytest.raises(ValueError, match="step= only without a time"):
         read(tmp_path, text(",".join(HEADER)), step=0.01)
 
 
@@ -169,7 +169,7 @@ ROWS = text("").splitlines()
         (
             "t,x [m],force [N]",
             None,
-            "column 't': expected a unit of s, ms.*none; say it in the call",
+            "column 't': expected a unit of s, ms.*none; pass units='m, N'",
         ),
         ("t [s],x,force", None, r"'x': expected a unit .*'force': expected a unit"),
         ("t [s],x [m],x [mm]", None, r"expected one column for x, got 'x \[m\]', 'x \[mm\]'"),
@@ -179,7 +179,7 @@ ROWS = text("").splitlines()
         (",".join(HEADER), [*ROWS[:5], "0.05,1_0,1", *ROWS[6:]], "row 7: expected a number.*1_0"),
         (",".join(HEADER), [*ROWS[:5], "0,05,1,2", *ROWS[6:]], "row 7: expected 3 cells.*decimal"),
         (",".join(HEADER), [*ROWS[:5], ROWS[4], *ROWS[6:]], "column t, row 7: .*increasing times"),
-        (",".join(HEADER), [*ROWS, *ROWS], "row 102: .*time starts again: one file for each"),
+        (",".join(HEADER), [*ROWS, *ROWS], "row 102: .*time restarts: use one file for each"),
         (",".join(HEADER), [*ROWS[:9], ",".join(HEADER), *ROWS[9:]], "row 11: .*got 't"),
         (",".join(HEADER), ["0,0,0"], "at least two samples, got 1"),
         (",".join(HEADER), [], "expected rows of numbers, got a header alone"),
@@ -212,7 +212,7 @@ def test_paths_that_mean_nothing_are_named(tmp_path: Path) -> None:
     for path, message in (
         (tmp_path / "none.csv", r"none\.csv'.*got nothing there"),
         (tmp_path, "expected a file, got a folder"),
-        (str(tmp_path / "run*.csv"), "got none that fit the pattern"),
+        (str(tmp_path / "run*.csv"), "got none that match the pattern"),
         ([], "expected paths of files, got none"),
     ):
         with pytest.raises(ValueError, match=message):

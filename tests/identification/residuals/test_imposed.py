@@ -84,7 +84,7 @@ def test_the_step_is_of_second_order_in_the_sample_time() -> None:
 
 
 def test_laws_that_only_a_simulation_follows_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"act on each other; use Shooting\(\)"):
+    with pytest.raises(ValueError, match=r"are coupled; use Shooting\(\)"):
         error(law_from_text("leuven"))
 
 

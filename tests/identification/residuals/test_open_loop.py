@@ -202,4 +202,4 @@ def test_friction_that_jumps_down_with_speed_is_not_stepped_in_silence() -> None
     force = 0.6 * np.sin(6 * t) * t
     said = sampled_motion(model, t, force, np.zeros(0), np.zeros(2))
     assert isinstance(said, str)
-    assert "steps were not solved" in said
+    assert "steps did not converge" in said

@@ -125,7 +125,7 @@ def test_the_text_fits_80_columns_and_holds_every_number(good: Fitted, wrong: Fi
 
 def test_what_is_not_told_has_no_interval() -> None:
     e = Estimate(8.2e-12, "N", 2.5, low=4.2e-142, high=1.593819374e119)
-    assert interval(e) == "not told"
+    assert interval(e) == "not identifiable"
     assert percent(e.relative_error) == "> 10000 %"
 
 

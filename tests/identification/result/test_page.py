@@ -64,7 +64,7 @@ def test_the_page_has_every_part_and_needs_nothing_from_elsewhere(fit: Fitted) -
     found = read(page)
     assert [h for h in found.headings if h] == [
         "stribeck", "Parameters", "Data and fit", "Force against velocity", "Residuals", "Starts",
-        "Ranking of laws", "What is doubtful in the data", "How it was made",
+        "Ranking of laws", "Data warnings", "How it was made",
     ]  # fmt: skip
     assert all(address.startswith("#") for address in found.addresses)
     assert not {"script", "img", "link", "iframe"} & set(found.tags)
@@ -83,7 +83,7 @@ def test_tables_have_captions_and_heads(fit: Fitted) -> None:
 def test_errors_in_the_data_stand_first() -> None:
     finding = Finding("frozen", 0, "x", "x stands still.", 0.0, 1.0, "error")
     page = page_of(make(records=1, starts=1, n=300, findings=(finding,)))
-    assert page.index("What is doubtful in the data") < page.index("<h2>Parameters")
+    assert page.index("<h2>Data warnings") < page.index("<h2>Parameters")
 
 
 def test_a_page_of_long_records_stays_small() -> None:

@@ -71,7 +71,7 @@ def test_what_needs_data_says_so(file: Path) -> None:
         ('{"a": 1}', "something else"),
         ("[1]", "something else"),
         ('{"file": "symfric fit", "format": 99}', "expected format 1, got 99"),
-        ('{"file": "symfric fit", "format": 1}', "changed"),
+        ('{"file": "symfric fit", "format": 1}', "modified"),
     ],
 )
 def test_other_files_are_refused_in_a_sentence(
@@ -90,7 +90,7 @@ def test_a_damaged_part_is_refused(key: str, file: Path) -> None:
     data = json.loads(file.read_text())
     data[key] = {"kind": "stribeck", "mu_d": -1.0} if key == "law_data" else [3]
     file.write_text(json.dumps(data))
-    with pytest.raises(ValueError, match="expected what fit"):
+    with pytest.raises(ValueError, match="expected the output of fit"):
         Fitted.from_json(file)
 
 

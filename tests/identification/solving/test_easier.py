@@ -7,7 +7,7 @@ import pytest
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.shooting import Shooting
-from identification.solving.descent import descend_by_way
+from identification.solving.descent import descend_easier_first
 from symfric import Model, simulate
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
@@ -37,8 +37,8 @@ def test_a_start_far_off_needs_the_windows() -> None:
     task, first = prepared.task, prepared.centre
     (easier,) = task.easier
     assert len(easier.unknowns.fitted) > len(task.unknowns.fitted)
-    straight = descend_by_way(task, first, 0, 200)
-    around = descend_by_way(task, first, 1, 200)
+    straight = descend_easier_first(task, first, 0, 200)
+    around = descend_easier_first(task, first, 1, 200)
     assert around.status is Status.SOLVED
     assert task.unknowns.named(around.w)["w"] == pytest.approx(9.0, rel=1e-3)
     assert straight.objective > around.objective + 1000

@@ -64,7 +64,7 @@ def test_slopes_of_the_stretches_by_differences() -> None:
 
 
 def test_force_against_the_path_is_refused() -> None:
-    with pytest.raises(ValueError, match="is its sign that of the sliding"):
+    with pytest.raises(ValueError, match="check that its sign is that of the sliding"):
         fit_elements(Measured(V, -np.sign(V), X, T), 3, offset=False)
 
 
@@ -85,7 +85,7 @@ def test_break_away_of_ramps_and_how_it_depends_on_their_rate() -> None:
     assert np.allclose([e.rate for e in found.events], [1, 3, 10, 30], rtol=1e-6)
     assert found.per_decade is not None
     assert abs(found.per_decade + 0.2) < 1e-9
-    assert "falls" in found.note
+    assert "decreases" in found.note
 
 
 def test_ramps_of_one_rate_say_nothing_about_it() -> None:

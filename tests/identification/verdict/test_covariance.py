@@ -31,13 +31,13 @@ def covariance(names: str, values: tuple[float, ...], *columns: np.ndarray) -> C
 @pytest.mark.parametrize(
     ("names", "values", "columns", "sentence"),
     [
-        ("a b", (2.0, 5.0), (C, 0 * C), "b has no influence on what was measured."),
-        ("mu_s mu_d", (2.0, 5.0), (C, -C), "Only the difference mu_s - mu_d is told"),
-        ("a b", (2.0, 5.0), (C, C), "Only the sum a + b is told, not a and b each."),
-        ("mu N", (2.0, 5.0), (5 * C, 2 * C), "Only the product mu N is told, not mu and N each."),
-        ("k m", (2.0, 5.0), (5 * C, -2 * C), "Only the ratio k / m is told, not k and m each."),
-        ("a b c", (2.0, 5.0, 3.0), (15 * C, 6 * C, 10 * C), "Only the product a b c is told, not"),
-        ("a b c", (2.0, 5.0, 3.0), (C, V, C + 2 * V), "Of a, b and c only 2 combinations are told"),
+        ("a b", (2.0, 5.0), (C, 0 * C), "b has no influence on the measured signals."),
+        ("mu_s mu_d", (2.0, 5.0), (C, -C), "Only the difference mu_s - mu_d is identifiable"),
+        ("a b", (2.0, 5.0), (C, C), "Only the sum a + b is identifiable, not a and b each."),
+        ("mu N", (2.0, 5.0), (5 * C, 2 * C), "Only the product mu N is identifiable, not mu and N"),
+        ("k m", (2.0, 5.0), (5 * C, -2 * C), "Only the ratio k / m is identifiable, not k and m"),
+        ("a b c", (2.0, 5.0, 3.0), (15 * C, 6 * C, 10 * C), "Only the product a b c is identif"),
+        ("a b c", (2.0, 5.0, 3.0), (C, V, C + 2 * V), "Of a, b and c only 2 combinations are iden"),
     ],
 )  # fmt: skip
 def test_what_is_not_told_is_said(
@@ -66,7 +66,7 @@ def test_difference_is_told_where_the_coordinate_is_the_excess() -> None:
     made = fitted(J, ar1(N, 0.0, 1), unknowns("mu_d", "mu_s"))
     made = replace(made, values=np.array([2.0, 5.0]), slope=np.array([[1.0, 0.0], [1.0, 1.0]]))
     found = covariance_of(made, lambda p: float(np.linalg.norm((p[1] - p[0] - 3) * C)))
-    assert found.sentences[0].startswith("Only the difference mu_d - mu_s is told")
+    assert found.sentences[0].startswith("Only the difference mu_d - mu_s is identifiable")
     assert np.isnan(found.standard_errors).all()
 
 
@@ -79,7 +79,7 @@ def test_bounds_count_as_known_and_logarithms_keep_their_sign() -> None:
     assert np.isnan(found.standard_errors[1])
     assert found.low[0] > 0
     assert found.low[0] * found.high[0] == pytest.approx(0.25)
-    assert found.sentences[0].startswith("v_s is hardly told: between ")
+    assert found.sentences[0].startswith("v_s is poorly identified: between ")
 
 
 def test_half_of_itself_is_hardly_told() -> None:
@@ -88,7 +88,7 @@ def test_half_of_itself_is_hardly_told() -> None:
     for share, told in ((0.45, True), (0.55, False)):
         found = covariance_of(replace(made, values=np.array([error / share])), lambda _: 0.0)
         assert (found.sentences == ()) == told
-        assert told or found.sentences[0].startswith("F_C is hardly told: between ")
+        assert told or found.sentences[0].startswith("F_C is poorly identified: between ")
 
 
 @pytest.mark.parametrize("logarithmic", [True, False])
@@ -101,7 +101,7 @@ def test_what_could_be_nearly_anything_has_no_interval(logarithmic: bool) -> Non
         assert np.isnan(lost).tolist() == [True, False]
     assert set(found.notes) == {"k"}
     assert [s for s in found.sentences if "k " in s] == [
-        "k is not told: what it does to what was measured is lost in the noise."
+        "k is not identifiable: its effect on the measurements is below the noise."
     ]
 
 
@@ -113,9 +113,10 @@ def test_a_level_far_above_every_force_is_not_told() -> None:
     found = covariance_of(made, lambda _: 0.0, Levels({"mu_s": 2.0, "mu_d": 2.0}, 0.6))
     assert np.isnan(found.standard_errors).tolist() == [True, False, False]
     assert found.sentences[0] == (
-        "mu_s is not told: no friction force in the data comes near 506 N, the largest is 0.6 N."
+        "mu_s is not identifiable: no friction force in the data is near 506 N, "
+        "the largest is 0.6 N."
     )
-    assert "mu_s is hardly" not in " ".join(found.sentences)
+    assert "mu_s is poorly" not in " ".join(found.sentences)
 
 
 def test_tied_values_follow() -> None:
@@ -175,4 +176,4 @@ def test_a_level_whose_excess_has_no_effect_does_not_borrow_the_error_of_the_low
     at = replace(at, values=values, slope=slope)
     found = covariance_of(at, lambda there: 1.0)
     assert np.isnan(found.standard_errors).tolist() == [True, False, False]
-    assert found.sentences[0] == "mu_s has no influence on what was measured."
+    assert found.sentences[0] == "mu_s has no influence on the measured signals."

@@ -26,7 +26,7 @@ def test_right_models_are_seldom_doubted(rho: float) -> None:
     ("missing", "named"),
     [
         (lambda m: np.sign(m["v"]) * np.exp(-np.abs(m["v"] / 0.1)), "speed"),  # Stribeck
-        (lambda m: np.cos(2 * np.pi * m["x"] / np.ptp(m["x"]) * 2), "place"),  # ripple
+        (lambda m: np.cos(2 * np.pi * m["x"] / np.ptp(m["x"]) * 2), "position"),  # ripple
         (lambda m: np.roll(m["force"], 8), "force"),  # a delay
     ],
 )

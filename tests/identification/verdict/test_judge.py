@@ -44,7 +44,7 @@ def test_wrong_model_is_doubtful() -> None:
     assert verdict.status(Status.MAX_ITERATIONS, gain=0.05) is Status.DOUBTFUL
     assert verdict.status(Status.MAX_ITERATIONS, gain=0.5) is Status.MAX_ITERATIONS
     assert verdict.status(Status.NO_DESCENT, gain=0.05) is Status.NO_DESCENT
-    assert "depend on force" in verdict.sentences[0]
+    assert "past of force" in verdict.sentences[0]
 
 
 @pytest.mark.parametrize(("noise", "at_bound", "good"), [

@@ -20,7 +20,7 @@ from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prism
 
 FAILURES = (
     RuntimeError("variables [z] are free"),
-    SolveError("nobody can decide", Status.SOLVER_FAILED),
+    SolveError("no unique mode", Status.SOLVER_FAILED),
 )
 
 

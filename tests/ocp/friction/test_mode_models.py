@@ -225,7 +225,7 @@ def test_what_cannot_be_is_refused_by_name() -> None:
     some = {c.name: int(c.name == "theta_crank") for c in bar.contacts}
     with pytest.raises(ValueError, match=r"all or none of theta_crank, .* at rest, .* got theta_"):
         mode_model(bar, some)
-    assert "theta_crank, theta_coupler, theta_rocker, which do so together" in restless(bar)
+    assert "theta_crank, theta_coupler, theta_rocker, which stick together" in restless(bar)
     assert restless(model) == ""
     with pytest.raises(ValueError, match=r"got arm, slide at rest together; in a loop of few"):
         mode_model(driven_twice(), {"arm": 0, "slide": 0})

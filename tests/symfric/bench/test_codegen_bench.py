@@ -5,7 +5,7 @@ from cortex import on_target
 
 from symfric.bench import codegen
 from symfric.bench.codegen import CodegenBenchmark, bench_codegen, bench_embedded
-from symfric.bench.table import Goal, Section
+from symfric.bench.table import Goal, Table
 from symfric.embedded import Absent
 
 
@@ -43,7 +43,7 @@ def test_absent_tools_are_named_and_nothing_fails(monkeypatch):
 def test_goals_are_met_on_their_own_side_and_never_by_a_number_that_is_not_there(tmp_path):
     goals = [Goal("a", 1.0, 2.0), Goal("b", 1.0, 2.0, ">="), Goal("c", nan, 2.0)]
     assert [goal.met for goal in goals] == [True, False, False]
-    section = Section("title", ("name", "x"), (("a", 1.0), ("c", nan)), goals)
+    section = Table("title", ("name", "x"), (("a", 1.0), ("c", nan)), goals=goals)
     result = CodegenBenchmark({"made up": section})
     assert result.to_dict()["made up"]["rows"][1] == {"name": "c", "x": None}
     bars = result.plot(tmp_path / "goals.png").axes[0].patches

@@ -2,11 +2,12 @@ from math import nan
 
 import pytest
 
-from symfric.bench.identification import IdentificationBenchmark, Row, bench_identification
+from symfric.bench.identification import IdentificationBenchmark, bench_identification
+from symfric.bench.table import Goal
 
 
-def row(value: float, better: str = "<=") -> Row:
-    return Row("emps", "x [%]", value, 2.0, better, 0.1)
+def row(value: float, better: str = "<=") -> Goal:
+    return Goal("x [%]", value, 2.0, better, 0.1)
 
 
 def test_a_goal_is_met_on_its_own_side_and_never_by_a_number_that_is_not_there() -> None:

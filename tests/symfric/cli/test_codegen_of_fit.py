@@ -28,7 +28,7 @@ def test_compiled_c_gives_the_numbers_of_the_fitted_law(
     fit: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["codegen", str(fit), "--out", str(tmp_path), "--real", "double"]) == 0
-    assert "mu_s, mu_d: forces, fitted under a load of 1 N" in capsys.readouterr().err
+    assert "mu_s, mu_d: fitted as forces under a load of 1 N" in capsys.readouterr().err
     library = tmp_path / "law.so"
     source = str(tmp_path / "stribeck_f64.c")
     subprocess.run(
@@ -89,4 +89,4 @@ def test_a_fit_that_is_doubtful_becomes_c_with_a_word(
         changed["status"] = status
         (tmp_path / "f.json").write_text(json.dumps(changed), encoding="utf-8")
         main([*line, str(tmp_path / "f.json")])
-        assert ("the fit ended DOUBTFUL" in " ".join(capsys.readouterr().err.split())) is said
+        assert ("status of the fit DOUBTFUL" in " ".join(capsys.readouterr().err.split())) is said

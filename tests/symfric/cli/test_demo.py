@@ -28,6 +28,7 @@ def test_without_data_it_simulates_its_own_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
     assert main(["demo"]) == 0
     out, err = capsys.readouterr()
     assert "a simulated record (no measured one found" in err

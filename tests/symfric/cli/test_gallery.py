@@ -13,7 +13,10 @@ from symfric.gallery.rendering import Gallery
 NAME = "self_tuning/fig_07_shape_factor"
 
 
-def test_it_lists_the_figures_by_paper(capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_lists_the_figures_by_paper(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     assert main(["gallery", "--list"]) == 0
     told = capsys.readouterr().out
     assert "self_tuning/fig_07" in told

@@ -12,12 +12,34 @@ from symfric.cli.app import sentence
 
 
 def test_tables_align_numbers_and_stay_within_80_columns(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     output.show_table(["name", "value", "note"], [("a", 1.0, "long " * 40), ("b", 123456.0, "")])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert lines[2].index("1") + 1 == lines[-1].index("123456") + 6
+
+
+def test_no_word_is_cut_and_every_row_is_a_line_where_there_is_no_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    words = " ".join(f"word{k}" for k in range(40))
+    output.show_table(["name", "time per call [us]", "note"], [("a", 1.0, words), ("b", 2.0, "")])
+    head, rule, *rows = capsys.readouterr().out.splitlines()
+    assert "time per call [us]" in head
+    assert len(rule) > 200
+    assert len(rows) == 2
+    assert words in rows[0]
+    assert not rows[1].endswith(" ")
+
+
+def test_words_are_whole_where_columns_share_a_narrow_terminal() -> None:
+    rows = [["task", "time per call [us]"], ["words of several lengths", "1.5"]]
+    assert output.column_widths(rows, 80) == [24, 18]
+    assert output.column_widths(rows, 25) == [13, 9]
+    assert output.column_widths(rows, 5) == [7, 4]
 
 
 def test_brackets_of_units_are_not_taken_for_markup(capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,4 +96,4 @@ def test_a_full_disk_is_told_with_the_way_out() -> None:
     for file in (("run.npz",), ()):
         told = sentence(OSError(ENOSPC, "No space left on device", *file))
         place = " for 'run.npz'" if file else ""
-        assert told.startswith(f"expected room on the disk, got none left{place}; free some")
+        assert told.startswith(f"expected free disk space, got none{place}; free some")

@@ -215,7 +215,7 @@ def test_a_mechanism_is_told_short_with_its_books(capsys: pytest.CaptureFixture[
     rows = [line.split()[0] for line in out.splitlines()[3:] if line]
     assert {"x1", "x1_rate", "x1_N", "x1_friction", "energy"} <= set(rows)
     assert not {"x1_slip", "x1_power", "rod_12_lambda", "constraint_position"} & set(rows)
-    assert "Constraints hold to: position " in out
+    assert "Largest constraint violations: position " in out
     assert "J, friction -" in out
     assert "unexplained at most" in out
     assert max(map(len, out.splitlines())) <= 80

@@ -65,7 +65,7 @@ def test_a_scene_says_all_that_it_takes_and_gives(
     for group in (kind.places(), kind.presets, kind.structures(), model.outputs):
         for one in group:
             assert f"\n{one} " in out
-    assert f"{name} is shown over {kind.t_end:g} s." in words
+    assert f"Default end time: {kind.t_end:g} s." in words
 
 
 def test_parameters_are_shown_to_the_last_digit(capsys: pytest.CaptureFixture[str]) -> None:

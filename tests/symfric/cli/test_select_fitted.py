@@ -43,5 +43,5 @@ def test_fits_are_handed_over_with_their_errors_as_shares(
     assert misfits == {"lugre": 0.025}
     assert "dahl: no motion" in capsys.readouterr().err
     rows.pop(0)
-    with pytest.raises(ValueError, match="--data: expected data that a law can be fitted to"):
+    with pytest.raises(ValueError, match="--data: expected data that some law fits"):
         command.fitted(given, read, [], "inverse", 1.0)

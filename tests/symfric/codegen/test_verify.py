@@ -218,7 +218,7 @@ def test_without_a_compiler_it_says_so(monkeypatch, tmp_path):
 def test_a_compiler_named_by_the_environment_and_not_there_is_named(monkeypatch, tmp_path):
     made = generate(LuGre(), tmp_path, kit=False)
     monkeypatch.setenv("CC", "/no/such")
-    assert "$CC is '/no/such', which is not there" in verify(made).status
+    assert "$CC is '/no/such', which does not exist" in verify(made).status
 
 
 def test_c_that_does_not_compile_is_no_proof(compiler, tmp_path):

@@ -25,7 +25,7 @@ def test_without_any_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert find_compiler() is None
-    assert "found none; use backend='vm'" in str(no_compiler())
+    assert "found none; install one, or pass backend='vm'" in str(no_compiler())
 
 
 def test_cc_comes_first_with_its_options_and_is_looked_at_each_time(

@@ -65,7 +65,7 @@ def test_a_data_uri_holds_the_picture_and_needs_no_file() -> None:
 
 
 def test_a_window_is_refused_where_there_is_none() -> None:
-    with pytest.raises(ValueError, match=r"backend with windows, got 'agg'; give plot\(\) a path="):
+    with pytest.raises(ValueError, match=r"backend with windows, got 'agg'; pass path= to plot"):
         blank().show()
     assert plt.get_fignums() == []
 

@@ -99,7 +99,7 @@ def test_a_misspelt_unit_is_warned_of_once_in_the_line_that_has_it() -> None:
         v = Variable("v", "m/seconds")
     assert told[0].filename == __file__
     replace(v, start=1.0)  # a second warning would be an error here
-    with pytest.warns(UserWarning, match="Output: .*got 'smoots'; write '1' for what counts"):
+    with pytest.warns(UserWarning, match="Output: .*got 'smoots'; write '1' for counts"):
         Output(v, "smoots")
 
 

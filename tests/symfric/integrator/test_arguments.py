@@ -86,7 +86,7 @@ def test_automatic_choice_takes_the_careful_method_at_loose_tolerances(
     [
         ("rodas5", "here: method: expected one of auto, rodas5p.* did you mean rodas5p"),
         ("backward_euler", "here: method: expected one with error control.* which has fixed steps"),
-        ("exponential", "it is for flow and for the C of plants"),
+        ("exponential", "use it with flow or in the C of plants"),
     ],
 )
 def test_what_cannot_control_its_error_is_refused(name: str, message: str) -> None:

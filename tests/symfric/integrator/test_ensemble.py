@@ -207,7 +207,7 @@ def test_failed_member_is_named_and_the_others_are_not_lost(executor: str, backe
     assert np.isnan(many["x"][[1, 3], 1]).all()
     assert many.reached == pytest.approx([1.0, 0.5, 1.0, 0.25, 1.0], rel=1e-5)
     assert many.failed[1].startswith(Status.STEP_TOO_SMALL.value)
-    assert "It stands at t = 0.5 s" in many.failed[1]
+    assert "Stopped at t = 0.5 s" in many.failed[1]
 
 
 @each_engine

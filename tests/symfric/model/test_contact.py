@@ -149,7 +149,7 @@ def test_a_load_may_follow_from_the_friction_of_another_contact() -> None:
     both = first + BrownMcPhee().force(1.0, 5.0 + first)
     assert float(model.function("ode")(0.0, [0.0, 1.0], [], [], [])[1]) == pytest.approx(-both)
     loop = replace(one, N=10.0 + two.force)
-    with pytest.raises(ValueError, match="contacts: expected friction forces that do not need"):
+    with pytest.raises(ValueError, match="contacts: expected friction forces that do not depend"):
         Model("loop", x=(x, v), ode=ca.vertcat(v.symbol, -one.force - two.force),
               contacts=(loop, two))  # fmt: skip
 
@@ -176,11 +176,11 @@ def test_contacts_and_forces_that_cannot_be_are_refused() -> None:
         (lambda: Contact("g", v, 1.0, "lugre"), "contact 'g': law: expected a law of a scalar"),
         (lambda: Contact("g", v, 1.0, PlanarSlip(LuGre())), "contact 'g': law: expected a law"),
         (lambda: Contact("g", ca.vertcat(v, v), 1.0, LuGre()), "contact 'g': slip: expected one"),
-        (lambda: Contact("g", v, 1.0, Wojewoda()), "Wojewoda needs besides v and N, got no dv"),
+        (lambda: Contact("g", v, 1.0, Wojewoda()), "all inputs of Wojewoda, got no dv"),
         (lambda: model.with_forces({"belt": 1.0}), "with_forces: expected .*guide.*got belt"),
         (lambda: model.with_forces({}), "expected a force for each contact, got none for guide"),
         (lambda: replace(model, contacts=(1,)), "contacts: expected contacts made by Contact"),
-        (lambda: replace(model, u=(*model.u, Variable("w", "1"))).open, "as they were made"),
+        (lambda: replace(model, u=(*model.u, Variable("w", "1"))).open, "unchanged states"),
     ]  # fmt: skip
     for call, message in cases:
         with pytest.raises(ValueError, match=message):

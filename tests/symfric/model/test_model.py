@@ -109,7 +109,7 @@ BAD = {
             "x": (Variable("a", "1", symbol=stray, start=x.symbol), replace(x, start=2 * stray)),
             "ode": ca.SX(2, 1),
         },
-        r"start: expected start values that need no other in a circle, got a, x",
+        r"start: expected start values without circular dependencies, got a, x",
     ),
     "row for a column": ({"x": (x, Variable("y", "1")), "ode": ca.SX(1, 2)}, r"ode: .* got a row"),
     "symbol of the same name": (

@@ -106,7 +106,7 @@ def test_a_mechanism_has_one_source_of_its_equations() -> None:
     # `simulate` read `holonomic` and `ocp` read `ode`: zeros put there moved one and not the other
     model = FourBar(BrownMcPhee()).model()
     for part in ("ode", "alg"):
-        with pytest.raises(ValueError, match=rf"{part}: expected none beside `holonomic`"):
+        with pytest.raises(ValueError, match=rf"{part}: expected none with `holonomic`"):
             replace(model, **{part: ca.SX.zeros(getattr(model, part).shape)})
     more = replace(model, outputs={})
     assert ca.is_equal(more.ode, model.ode)

@@ -189,7 +189,7 @@ def test_command_line_takes_presets_and_laws_of_places(capsys: pytest.CaptureFix
         assert main([*["run", "pendulum_box", "--law", "lugre"], *options.split()]) == 2
         assert message in capsys.readouterr().err
     assert main(["run", "rabinowicz", "--law", "lugre", "--law-of", "hinge=dahl"]) == 2
-    assert "--law is the law of what rubs there" in capsys.readouterr().err
+    assert "--law is the law of the main contact" in capsys.readouterr().err
 
 
 @pytest.mark.heavy

@@ -102,7 +102,7 @@ def test_float_of_a_drive_is_verified(compiler: Compiler, tmp_path: Path) -> Non
 @pytest.mark.parametrize("method", [m for m in METHODS if METHODS[m].order > 1])
 def test_plant_follows_the_adaptive_simulation(method: str) -> None:
     model = drive(Viscous(sigma_2=2.0), m=0.5, offset=0.3)
-    found = advanced(plant_block(model, h=1e-2, method=method), 100, 2.0)
+    found = advanced(plant_block(model, h=5e-3, method=method), 200, 2.0)
     exact = simulate(model, 1.0, u={"force": 2.0}, rtol=1e-11).final
     assert found == pytest.approx({name: exact[name] for name in found}, rel=2e-7)
 

@@ -54,7 +54,7 @@ def test_without_cupy_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize(
-    ("devices", "why"), [(0, "it counts none"), (-1, "CUDA driver version is insufficient")]
+    ("devices", "why"), [(0, "no device found"), (-1, "CUDA driver version is insufficient")]
 )
 def test_without_a_device_it_says_so(
     devices: int, why: str, monkeypatch: pytest.MonkeyPatch

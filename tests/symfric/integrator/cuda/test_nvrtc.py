@@ -85,7 +85,7 @@ def test_registers_are_few(name: str, most: int) -> None:
 
 @needs_nvrtc
 def test_what_is_no_cuda_is_refused_with_its_first_error() -> None:
-    with pytest.raises(DeviceError, match=r"refused the kernel: .*error: .*nonsense"):
+    with pytest.raises(DeviceError, match=r"rejected the kernel: .*error: .*nonsense"):
         device.build("nonsense x;")
 
 

@@ -199,7 +199,7 @@ def with_events() -> Model:
         ({"real": "float"}, "rtol: expected at least 1e-05 with real='float', got 1e-06"),
         (
             {"real": "float", "backend": "auto"},
-            "real: expected double, which is what processors compute in, got float",
+            "real: expected double for this backend, got float",
         ),
     ],
 )

@@ -102,7 +102,7 @@ def test_a_search_behind_a_jump_does_not_disturb_the_others(
 def test_signals_of_members_are_for_ensembles() -> None:
     u = Linear([0.0, 1.0], [[0.0, 1.0], [1.0, 2.0]])
     with pytest.raises(
-        ValueError, match=r"input 'u': expected samples of one signal, got those of 2"
+        ValueError, match=r"input 'u': expected samples of one signal, got samples of 2"
     ):
         simulate(oscillator(), 1.0, u={"u": u})
 

@@ -293,7 +293,7 @@ def test_damage_is_told_and_the_results_are_right(tmp_path: Path) -> None:
     first = run()
     (folder,) = tmp_path.iterdir()
     (folder / "x.npy").unlink()
-    with pytest.warns(UserWarning, match="out: 3 of 3 chunks in .* are not what was written"):
+    with pytest.warns(UserWarning, match="out: 3 of 3 chunks in .* have been deleted"):
         assert_same(run(), first)
     assert_same(run(), first)
 
@@ -311,13 +311,15 @@ def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, before[1]))
-        with pytest.raises(ValueError, match=r"out: expected 8 MB of room for '.*a.npy', got File"):
+        with pytest.raises(
+            ValueError, match=r"out: expected 8 MB of disk space for '.*a.npy', got File"
+        ):
             Store(tmp_path / "large", ["a"], 10_000, 100, 1)
         small = Store(tmp_path / "small", ["a", "b"], 6, 3, 1)
         small.put(0, solved(0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
         with pytest.raises(
-            ValueError, match=r"expected room for members from 2 on .* got File too large"
+            ValueError, match=r"expected disk space for members from 2 on .* got File too large"
         ):
             small.put(2, solved(2))
     finally:

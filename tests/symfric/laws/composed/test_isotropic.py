@@ -342,9 +342,9 @@ def test_elasto_plastic_returns_from_any_side_below_break_away() -> None:
 @pytest.mark.parametrize(
     ("law", "reason"),
     [
-        (Asymmetric(LuGre(), LuGre(mu_s=0.3)), "tells forward from backward"),
-        (LoadDependent(Asymmetric(Coulomb(), Coulomb(mu_d=0.3))), "tells forward"),
-        (Capstan(), "tells forward from backward"),
+        (Asymmetric(LuGre(), LuGre(mu_s=0.3)), "distinguishes forward from backward"),
+        (LoadDependent(Asymmetric(Coulomb(), Coulomb(mu_d=0.3))), "distinguishes forward"),
+        (Capstan(), "distinguishes forward from backward"),
         (GMS(form="event"), "modes change where v passes through zero"),
         (ExactCoulomb(), "modes change where v passes through zero"),
         (Karnopp(form="event"), "modes change where v passes through zero"),

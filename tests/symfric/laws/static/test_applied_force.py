@@ -107,7 +107,7 @@ def test_wojewoda_without_acceleration_is_smooth_coulomb(v: float) -> None:
 
 
 def test_wojewoda_refuses_a_static_level_that_would_drive() -> None:
-    with pytest.raises(ValueError, match=r"mu_s <= 2 mu_d = 0.2, got 0.25; beyond, friction"):
+    with pytest.raises(ValueError, match=r"mu_s <= 2 mu_d = 0.2, got 0.25; otherwise friction"):
         Wojewoda(mu_s=0.25, mu_d=0.1)
 
 
