@@ -260,7 +260,7 @@ def test_the_text_holds_the_equations_of_all_parts_once():
     block = law_block(law_from_text("asymmetric(coulomb+viscous)"))
     assert block.equations.count("F = mu_d N s(v / v_eps)") == 1
     assert block.equations.count("F = sigma_2 v") == 1
-    assert block.doc.startswith("One law with different parameters")
+    assert block.doc.startswith("Law with different parameters")
 
 
 def operations(**options) -> int:
