@@ -1,10 +1,31 @@
 """Compilers that the tests of generated C run with; a test is skipped where one is missing."""
 
 import shutil
+from collections.abc import Iterator
 
 import pytest
 
+from symfric.codegen import verification
 from symfric.foundation.programs import Compiler, find_compiler
+
+
+@pytest.fixture(scope="session", autouse=True)
+def fewer_steps_verified() -> Iterator[None]:
+    """Verify generated C over 50 stretches of inputs; CasADi's share of 200 costs seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verification, "STEPS", 5000)
+        patch.setattr(verification, "FEWER", 1000)
+        yield
+
+
+STEPS = {"STEPS": verification.STEPS, "FEWER": verification.FEWER}
+
+
+@pytest.fixture
+def all_steps_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verify as many steps as users do."""
+    for name, steps in STEPS.items():
+        monkeypatch.setattr(verification, name, steps)
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from ocp import TIME, Free, Ipopt, Phase, Problem, integral, solve
 from ocp.formulation.problem import cost_size, sized
 from symfric import BrownMcPhee, Model, Variable, drive
 
-SIZES = [1e-9, 1e-6, 1e-3, 0.1, 1.0, 1e3, 1e6]
+SIZES = [1e-9, 1e-5, 1.0, 1e6]
 
 
 def move(size: float, nominal: float = 1.0, **more: object) -> Problem:
@@ -28,8 +28,8 @@ def test_least_effort_has_its_closed_form_at_every_size() -> None:
     found = [solve(move(size), intervals=30) for size in SIZES]
     costs = [one.cost / (48.0 * size**2) for one, size in zip(found, SIZES, strict=True)]
     assert all(one.verified for one in found)
-    assert costs == pytest.approx([costs[4]] * len(SIZES), rel=1e-9)
-    assert costs[4] == pytest.approx(1.0, rel=1e-4)
+    assert costs == pytest.approx([costs[2]] * len(SIZES), rel=1e-9)
+    assert costs[2] == pytest.approx(1.0, rel=1e-4)
     assert len({one.iterations for one in found}) == 1
 
 

@@ -66,7 +66,7 @@ def test_a_failure_of_exact_friction_is_said(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_failure_of_verification_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(strategies, "verified", raising(RuntimeError("variables [z] are free")))
-    found = solve(out_and_back(v_t=0.05), throw=False, intervals=FINE, friction="smooth")
+    found = solve(out_and_back(v_t=0.05), throw=False, intervals=20, friction="smooth")
     assert found.ok and not found.verified
     assert "It was not verified: internal error, RuntimeError: variables" in found.message
 

@@ -5,6 +5,7 @@ import pytest
 
 from ocp import solve
 from ocp.problems import out_and_back
+from symfric.bench import ocp as bench
 from symfric.bench.ocp import NEAR, attempt_of, bench_ocp, landed, starts_of
 from symfric.bench.ocp_contenders import Attempt, opti
 from symfric.bench.ocp_costs import size_rows
@@ -33,7 +34,8 @@ def test_starts_are_the_default_and_others() -> None:
     assert np.abs(second["x"] - first["x"]).max() > 0.01
 
 
-def test_rows_say_what_was_found() -> None:
+def test_rows_say_what_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "INTERVALS", 50)
     result = bench_ocp(quick=True, cases=["bryson_denham"])
     ours, other = result.rows
     assert (ours.solver, other.solver) == ("symfric", "Opti")

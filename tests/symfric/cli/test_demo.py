@@ -4,10 +4,12 @@ import json
 import re
 from math import hypot
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from symfric.cli import main
+from symfric.cli.demo import identified, load_records, numbers_of
 
 EMPS = Path(__file__).parents[4] / "shared" / "data" / "EMPS"
 
@@ -44,6 +46,7 @@ def test_without_data_it_simulates_its_own_and_says_so(
     assert moves["minimum time"]["T"] < moves["minimum effort"]["T"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.is_dir(), reason="needs the EMPS benchmark in ../shared/data")
 def test_with_data_it_identifies_the_measured_stage(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -53,6 +56,18 @@ def test_with_data_it_identifies_the_measured_stage(
     check_folder(tmp_path / "o")
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     found = summary["Identification of a positioning drive"]["coulomb+viscous"]["parameters"]
+    as_published(found)
+
+
+@pytest.mark.skipif(not EMPS.is_dir(), reason="needs the EMPS benchmark in ../shared/data")
+def test_the_measured_stage_has_its_published_parameters() -> None:
+    records, laws, origin = load_records(EMPS)
+    assert origin == f"the measured EMPS stage in {EMPS}"
+    assert laws == ("coulomb+viscous", "asymmetric(coulomb+viscous)")
+    as_published(numbers_of(identified(records, laws[0]))["parameters"])
+
+
+def as_published(found: dict[str, Any]) -> None:
     # published least squares: value and standard error as if residuals were white, which they are
     # not: ours is twice that
     published = {"m": (95.1089, 0.109), "mu_d": (20.3935, 0.101), "sigma_2": (203.5034, 1.146)}

@@ -9,6 +9,8 @@ import pytest
 from symfric import law_from_text, parameters
 from symfric.cli import main
 from symfric.cli.laws import parts
+from symfric.figures import pictures
+from symfric.figures.pictures import plot_catalogue
 from symfric.laws import ALL_LAWS, POPULATIONS
 
 EVERY = ALL_LAWS | POPULATIONS
@@ -100,11 +102,31 @@ def test_cost_is_shown_as_instructions_of_value_and_gradient(
     assert cost["value"] > cost["gradient"] > 0
 
 
-@pytest.mark.parametrize("arguments", [["lugre"], [], ["asymmetric(stribeck)"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["lugre"], pytest.param([], marks=pytest.mark.slow), ["asymmetric(stribeck)"]],
+)
 def test_the_picture_is_a_png(arguments: list[str], tmp_path: Path) -> None:
     path = tmp_path / "laws.png"
     assert main(["laws", *arguments, "--plot", str(path)]) == 0
     assert path.read_bytes().startswith(PNG)
+
+
+def test_the_picture_of_the_list_has_a_panel_for_each_law(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {name: ALL_LAWS[name] for name in ("coulomb", "lugre")}
+    drawn = list[str]()
+
+    def draw(laws: dict[str, Any], load: float, path: Path) -> None:
+        drawn.extend(laws)
+        plot_catalogue({name: laws[name] for name in few}, load, path)
+
+    monkeypatch.setattr(pictures, "plot_catalogue", draw)
+    path = tmp_path / "laws.png"
+    assert main(["laws", "--plot", str(path)]) == 0
+    assert path.read_bytes().startswith(PNG)
+    assert drawn == list(EVERY)
 
 
 LISTED = {

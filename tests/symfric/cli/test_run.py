@@ -11,6 +11,7 @@ from robots import SMALL
 
 from symfric import Linear, LuGre, drive, rabinowicz, simulate
 from symfric.cli import main
+from symfric.results import animation
 from symfric.scenes import ALL_SCENES, Robot
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -233,9 +234,12 @@ def test_the_books_of_a_mechanism_are_in_the_json(capsys: pytest.CaptureFixture[
     assert "energy_balance" not in found(capsys, *line.split())
 
 
-def test_a_film_is_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_film_is_written_and_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(animation, "SHOWN", 0.2)
     path = tmp_path / "motion.gif"
-    line = "run pendulum --law brown_mcphee --t-end 2 --animate"
+    line = "run pendulum --law brown_mcphee --t-end 0.2 --animate"
     assert main([*line.split(), str(path)]) == 0
     assert path.read_bytes().startswith(b"GIF89a")
     assert capsys.readouterr().err == f"wrote {path}\n"

@@ -34,7 +34,7 @@ GIVEN: dict[str, tuple[list[float], int]] = {
 @pytest.mark.parametrize("flags", ["-O2", "-O2 -ffast-math", "-O0"])
 @pytest.mark.parametrize("law", [LuGre(), BrownMcPhee()], ids=["lugre", "brown_mcphee"])
 def test_every_repair_is_flagged(law: Law, flags: str, compiler: Compiler, tmp_path: Path) -> None:
-    block, made = law_block(law), generate(law, tmp_path, real="float")
+    block, made = law_block(law), generate(law, tmp_path, real="float", kit=False)
     (tmp_path / "main.c").write_text(program(block, FLOAT))
     parts = map(str, (tmp_path / "main.c", made.source("float")))
     executable = tmp_path / "main"

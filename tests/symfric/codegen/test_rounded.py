@@ -67,7 +67,7 @@ def test_steps_without_rounding_come_out_alike_and_others_do_not() -> None:
 
 
 @pytest.mark.heavy
-def test_a_mode_that_ties_is_counted_and_no_fault(compiler, tmp_path) -> None:
+def test_a_mode_that_ties_is_counted_and_no_fault(compiler, tmp_path, all_steps_verified) -> None:
     found = verify(generate(SPRINGS, tmp_path, kit=False, real="float"))
     (check,) = found.checks
     assert found.ok, found.table()

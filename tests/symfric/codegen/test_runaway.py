@@ -48,15 +48,15 @@ def test_no_step_is_promised_where_none_is_found() -> None:
 
 
 def test_the_status_says_how_long_a_step_may_be(compiler: Compiler, tmp_path: Path) -> None:
-    found = verify(generate(decay(4e-3), tmp_path, real="double"), adjustable=decay)
+    found = verify(generate(decay(4e-3), tmp_path, real="double", kit=False), adjustable=decay)
     assert not found.ok
     assert found.status.startswith("failed: after ")
     assert "steps of 0.004 s it runs away, in CasADi as in C: that step is too long" in found.status
     assert found.status.endswith(", 0.002 s is not")
-    alone = verify(generate(decay(4e-3), tmp_path, real="double"))
+    alone = verify(generate(decay(4e-3), tmp_path, real="double", kit=False))
     assert alone.status.endswith("try a shorter one, or the method backward_euler, which is the "
                                  "most robust")  # fmt: skip
-    assert verify(generate(decay(2e-3), tmp_path, real="double")).ok
+    assert verify(generate(decay(2e-3), tmp_path, real="double", kit=False)).ok
 
 
 @pytest.mark.heavy

@@ -30,7 +30,7 @@ QUICK = {
     [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in LAWS],
 )
 def test_every_law_is_verified(name, compiler, tmp_path):
-    found = verify(generate(LAWS[name], tmp_path))
+    found = verify(generate(LAWS[name], tmp_path, kit=False))
     double, single = found.checks
     assert found.ok or name in STEEP, found.table()
     assert (double.ulp, double.error, double.warnings) == (0, 0.0, ())
@@ -40,14 +40,14 @@ def test_every_law_is_verified(name, compiler, tmp_path):
 
 
 def test_with_each_compiler(each_compiler, tmp_path):
-    found = verify(generate(LuGre(), tmp_path), compiler=each_compiler)
+    found = verify(generate(LuGre(), tmp_path, kit=False), compiler=each_compiler)
     assert found.ok, found.table()
     assert found.compiler == each_compiler
 
 
 @pytest.mark.parametrize("options", [{"free": ()}, {"h": 1e-4}, {"free": (), "h": 1e-4}])
 def test_folded_parameters_are_verified(options, compiler, tmp_path):
-    assert verify(generate(LuGre(), tmp_path, **options)).ok
+    assert verify(generate(LuGre(), tmp_path, **options, kit=False)).ok
 
 
 def test_inputs_hold_zeros_reversals_tiny_and_large_velocities():
@@ -88,19 +88,24 @@ def test_other_parameters_hold_step_sizes_over_three_decades():
 def test_a_law_that_dies_in_float_after_a_load_fell_is_found(name, compiler, monkeypatch, tmp_path):
     """So did both before |r|^n was bounded, and were called verified."""
     monkeypatch.setattr(smooth, "overload", smooth.power)
-    found = verify(generate(LAWS[name], tmp_path, real="float"))
+    found = verify(generate(LAWS[name], tmp_path, real="float", kit=False))
     assert found.status.startswith("failed in float: ")
-    assert verify(generate(LAWS[name], tmp_path, real="float", guards=False)).checks[0].error > 1
+    assert (
+        verify(generate(LAWS[name], tmp_path, real="float", guards=False, kit=False))
+        .checks[0]
+        .error
+        > 1
+    )
 
 
 def test_a_guard_that_does_nothing_is_found(compiler, tmp_path):
-    made = generate(LuGre(), tmp_path, real="double")
+    made = generate(LuGre(), tmp_path, real="double", kit=False)
     found = tampered(made, "double", "*status |= clamped;", "")
     assert found.status.startswith("failed in double: status differs")
 
 
 def test_a_guard_that_alters_valid_inputs_is_found(compiler, tmp_path):
-    made = generate(BrownMcPhee(), tmp_path, real="double")
+    made = generate(BrownMcPhee(), tmp_path, real="double", kit=False)
     made.source("double").write_text(
         made.source("double").read_text().replace("_beyond(v, 1000000.0)", "_beyond(v, 1e-3)")
     )
@@ -110,7 +115,7 @@ def test_a_guard_that_alters_valid_inputs_is_found(compiler, tmp_path):
 
 
 def test_the_worst_signal_is_named(compiler, tmp_path):
-    made = generate(LuGre(), tmp_path, real="float")
+    made = generate(LuGre(), tmp_path, real="float", kit=False)
     found = tampered(made, "float", "out->F_end = ", "out->F_end = 1.0f + ")
     (check,) = found.checks
     assert check.worst == "F_end"
@@ -130,7 +135,7 @@ def test_rounding_is_told_from_a_wrong_formula(compiler, tmp_path):
         "belt", states=(x,), inputs=(v, N), next=moved,
         outputs={"F": Output(ca.substitute(force, v.symbol, moved), "N")},
     )  # fmt: skip
-    found = verify(generate(block, tmp_path, real="float"))
+    found = verify(generate(block, tmp_path, real="float", kit=False))
     assert found.status.startswith("failed in float: F is off by ")
     assert ", by rounding: float moves it by " in found.status
 
@@ -140,7 +145,7 @@ def test_what_is_left_of_a_difference_is_judged_by_its_terms(compiler, tmp_path)
     a = Variable("a", "m", nominal=0.3)
     left = (a.symbol + 1.1) * (a.symbol - 1.1) - a.symbol**2 + 1.21
     outputs = {"gap": Output(left, "m"), "two": Output(2.0 * a.symbol, "m")}
-    made = generate(Block("loop", inputs=(a,), outputs=outputs), tmp_path, real="float")
+    made = generate(Block("loop", inputs=(a,), outputs=outputs), tmp_path, real="float", kit=False)
     (check,) = verify(made).checks
     assert check.ok
     assert check.worst == "gap"
@@ -164,17 +169,17 @@ def test_a_wrong_last_bit_is_found(compiler, tmp_path):
 
 
 def test_a_wrong_default_is_found(compiler, tmp_path):
-    made = generate(BrownMcPhee(), tmp_path, real="float")
+    made = generate(BrownMcPhee(), tmp_path, real="float", kit=False)
     assert not tampered(made, "float", "0.15f, ", "0.16f, ").ok
 
 
 def test_a_wrong_reset_is_found(compiler, tmp_path):
-    made = generate(LuGre(), tmp_path, real="double")
+    made = generate(LuGre(), tmp_path, real="double", kit=False)
     assert not tampered(made, "double", "state->z = N * t2 /", "state->z = 2.0 * N * t2 /").ok
 
 
 def test_a_warning_is_found(compiler, tmp_path):
-    made = generate(BrownMcPhee(), tmp_path, real="float")
+    made = generate(BrownMcPhee(), tmp_path, real="float", kit=False)
     found = tampered(
         made, "float", "const float t1 =", "const float unused = 1.0; const float t1 ="
     )
@@ -183,7 +188,7 @@ def test_a_warning_is_found(compiler, tmp_path):
 
 
 def test_double_functions_in_float_code_are_found(compiler, tmp_path):
-    made = generate(BrownMcPhee(), tmp_path, real="float")
+    made = generate(BrownMcPhee(), tmp_path, real="float", kit=False)
     found = tampered(made, "float", "SF_TANHF tanhf", "SF_TANHF (float)tanh")
     if found.checks[0].foreign is None:
         pytest.skip("no nm on this machine")
@@ -192,14 +197,14 @@ def test_double_functions_in_float_code_are_found(compiler, tmp_path):
 
 
 def test_not_a_number_is_found(compiler, tmp_path):
-    made = generate(BrownMcPhee(), tmp_path, real="double")
+    made = generate(BrownMcPhee(), tmp_path, real="double", kit=False)
     found = tampered(made, "double", "return ", "return 0.0 * HUGE_VAL + ")
     assert not found.ok
     assert found.checks[0].error == np.inf
 
 
 def test_without_a_compiler_it_says_so(monkeypatch, tmp_path):
-    made = generate(LuGre(), tmp_path)
+    made = generate(LuGre(), tmp_path, kit=False)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     found = verify(made)
@@ -211,13 +216,15 @@ def test_without_a_compiler_it_says_so(monkeypatch, tmp_path):
 
 
 def test_a_compiler_named_by_the_environment_and_not_there_is_named(monkeypatch, tmp_path):
-    made = generate(LuGre(), tmp_path)
+    made = generate(LuGre(), tmp_path, kit=False)
     monkeypatch.setenv("CC", "/no/such")
     assert "$CC is '/no/such', which does not exist" in verify(made).status
 
 
 def test_c_that_does_not_compile_is_no_proof(compiler, tmp_path):
-    found = tampered(generate(LuGre(), tmp_path), "double", "const double", "konst double")
+    found = tampered(
+        generate(LuGre(), tmp_path, kit=False), "double", "const double", "konst double"
+    )
     assert not found.ok
     assert found.status.startswith("not verified: ")
     assert "konst" in found.status
@@ -225,11 +232,11 @@ def test_c_that_does_not_compile_is_no_proof(compiler, tmp_path):
 
 def test_an_unknown_compiler_is_bad_input(tmp_path):
     with pytest.raises(ValueError, match="got 'no-such-compiler'"):
-        verify(generate(LuGre(), tmp_path), compiler="no-such-compiler")
+        verify(generate(LuGre(), tmp_path, kit=False), compiler="no-such-compiler")
 
 
-def test_the_result_goes_to_json_and_to_a_table(compiler, tmp_path):
-    found = verify(generate(law_from_text("coulomb+viscous"), tmp_path))
+def test_the_result_goes_to_json_and_to_a_table(compiler, tmp_path, all_steps_verified):
+    found = verify(generate(law_from_text("coulomb+viscous"), tmp_path, kit=False))
     content = json.loads(json.dumps(found.to_dict()))
     assert content["ok"] is True
     assert [check["real"] for check in content["checks"]] == ["double", "float"]

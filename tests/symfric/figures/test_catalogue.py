@@ -1,5 +1,7 @@
 """Every figure of every law is drawn from finite numbers, or refused in a sentence."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import pytest
 
@@ -30,6 +32,15 @@ OTHER_INPUTS = {"quarter_car_general", "bam"}
 """Laws that need more than a pushed block offers."""
 
 
+SLOW = ("break_away", "drift")
+"""Figures of a second for some laws."""
+LED = {
+    *("coulomb", "stribeck", "karnopp", "dahl", "lugre", "gms", "bristle_2d", "exact_coulomb"),
+    *OTHER_INPUTS, "wojewoda",
+}  # fmt: skip
+"""Laws without and with states and events, and those that are refused: drawn in every suite."""
+
+
 def shows(law: str, name: str) -> bool:
     if name in NEEDS:
         return law in NEEDS[name]
@@ -40,7 +51,17 @@ def shows(law: str, name: str) -> bool:
 
 @pytest.mark.parametrize("law", ALL_LAWS)
 def test_every_figure_has_finite_columns_of_one_length_or_is_refused(law: str) -> None:
-    for name in FIGURES:
+    every_figure_is_finite_or_refused(law, [n for n in FIGURES if law in LED or n not in SLOW])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [law for law in ALL_LAWS if law not in LED])
+def test_long_figures_of_the_other_laws_are_finite_or_refused(law: str) -> None:
+    every_figure_is_finite_or_refused(law, SLOW)
+
+
+def every_figure_is_finite_or_refused(law: str, names: Iterable[str]) -> None:
+    for name in names:
         if not shows(law, name):
             with pytest.raises(ValueError, match=r"expected a law (that|with)"):
                 figure(law_from_text(law), name)

@@ -61,7 +61,7 @@ def test_reset_integrator_gives_back_no_more_than_it_stored(form: str) -> None:
     rng = np.random.default_rng(4)
     h, z, slip, work = 1e-8, 0.0, 0.0, [0.0]
     limit = 0.1 * N / 1e5
-    v = np.repeat(rng.choice([-1.0, 1.0], 60), rng.integers(20, 2000, 60))
+    v = np.repeat(rng.choice([-1.0, 1.0], 20), rng.integers(20, 2000, 20))
     for before, now in zip(np.r_[0.0, v[:-1]], v, strict=True):
         if form == "event":
             slip = 0.0 if now != before else slip

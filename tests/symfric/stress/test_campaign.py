@@ -11,12 +11,14 @@ from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 
 COSTLY = ("arm", "four_bar", "double_pendulum")
 """Scenes of which the suite takes no case."""
+LONG = (2, 18)
+"""Cases of seconds."""
 SEEDS = (20261, 20262, 20263, 20264)
 
 
 def test_of_a_few_random_cases_none_is_silently_wrong_or_ends_badly() -> None:
     """The suite's share of `symfric stress`."""
-    numbers = [n for n in range(60) if draw(1, n).scene not in COSTLY][:24]
+    numbers = [n for n in range(20) if draw(1, n).scene not in COSTLY and n not in LONG]
     report = campaign(numbers, work=12_000)
     failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert not failing
@@ -37,8 +39,8 @@ def test_of_500_random_cases_none_is_silently_wrong_and_few_are_undecided(seed: 
 
 
 def test_workers_do_not_change_what_is_found() -> None:
-    report = campaign(4, seed=3, workers=2)
-    assert [report.verdicts[n] for n in range(4)] == [judge(draw(3, n)) for n in range(4)]
+    report = campaign(4, seed=7, workers=2)
+    assert [report.verdicts[n] for n in range(4)] == [judge(draw(7, n)) for n in range(4)]
 
 
 def test_an_interrupt_keeps_what_there_is() -> None:

@@ -19,7 +19,6 @@ def outcomes(work: object, tasks: list[object], limit: float = 60.0) -> dict[int
 
 
 def test_results_exceptions_exits_and_signals_are_distinguished() -> None:
-    assert outcomes(abs, [-1, 2, -3]) == {0: 1, 1: 2, 2: 3}
     found = outcomes(abs, [-1, "text", -3])
     assert found[1] == Crashed("exit status 1", "TypeError: bad operand type for abs(): 'str'")
     assert (found[0], found[2]) == (1, 3)
@@ -30,8 +29,8 @@ def test_results_exceptions_exits_and_signals_are_distinguished() -> None:
 
 
 def test_an_endless_loop_in_compiled_code_is_stopped_by_its_processor_time() -> None:
-    found = outcomes(sum, [range(10**12), (1, 2)], limit=2.0)
-    assert found == {0: TimedOut(2.0), 1: 3}
+    found = outcomes(sum, [range(10**12), (1, 2)], limit=1.0)
+    assert found == {0: TimedOut(1.0), 1: 3}
 
 
 def test_a_task_that_waits_is_not_stopped_at_its_limit() -> None:

@@ -128,7 +128,7 @@ SLOW = ("gms of 40", "asymmetric", "gms twice")
 )
 def test_loops_have_the_bits_of_casadi(name: str, fold: bool, compiler, tmp_path) -> None:
     block = law_block(CASES[name](), name="law", free=[] if fold else None)
-    made = generate(block, tmp_path, real="double", guards=False)
+    made = generate(block, tmp_path, real="double", guards=False, kit=False)
     (tmp_path / "main.c").write_text(program(block, DOUBLE, guards=False))
     link_program(
         compiler, [tmp_path / "main.c", made.source("double")], tmp_path, tmp_path / "main"

@@ -39,12 +39,10 @@ def rolled(block, velocities, h, load=LOAD, state=None):
     """States after each step and forces, columns."""
     p = [float(v.start) for v in block.parameters if v.name != "h"] + [h]
     z = ca.DM.zeros(len(block.states)) if state is None else ca.DM(state)
-    states, forces = [], []
-    for v in velocities:
-        z, y = block.step(z, p, [v, load])
-        states.append(z.full().ravel())
-        forces.append(float(y[0]))
-    return np.array(states), np.array(forces)
+    steps = block.step.mapaccum("steps", len(velocities), {"base": 10})
+    inputs = np.stack([velocities, np.full(len(velocities), load)])
+    states, outputs = steps(z, np.tile(p, (len(velocities), 1)).T, inputs)
+    return states.full().T, outputs.full()[0]
 
 
 def level(v, mu_s=0.15, mu_d=0.1, v_s=1e-3, load=LOAD):
@@ -262,7 +260,7 @@ def test_the_text_holds_the_equations_of_all_parts_once():
     block = law_block(law_from_text("asymmetric(coulomb+viscous)"))
     assert block.equations.count("F = mu_d N s(v / v_eps)") == 1
     assert block.equations.count("F = sigma_2 v") == 1
-    assert block.doc.startswith("One law with different parameters")
+    assert block.doc.startswith("Law with different parameters")
 
 
 def operations(**options) -> int:

@@ -64,7 +64,7 @@ def test_double_is_equal_to_the_bit(
     if model.z and not METHODS[method].dae:
         pytest.skip("a method for ODEs")
     block = plant_block(model, h=1e-4, method=method)
-    found = verify(generate(block, tmp_path, real="double"))
+    found = verify(generate(block, tmp_path, real="double", kit=False))
     assert found.ok, found.table()
 
 
@@ -72,7 +72,7 @@ def test_a_joint_that_rubs_by_its_reactions_is_verified(compiler: Compiler, tmp_
     model = DoublePendulum(BrownMcPhee(v_t=0.05)).model()
     block = plant_block(model, h=1e-3)
     assert sum(v.name.endswith("_N") for v in block.states) == 2
-    assert verify(generate(block, tmp_path, real="double")).ok
+    assert verify(generate(block, tmp_path, real="double", kit=False)).ok
     after, exact = advanced(block, 200), simulate(model, 0.2, rtol=1e-9).final
     for name in ("phi_1", "phi_2"):
         assert after[name] == pytest.approx(exact[name], abs=0.01)  # order 1
@@ -88,7 +88,7 @@ def test_arm_with_friction_from_reactions_in_every_joint_is_verified(
         f"q{k}_N" for k in range(1, 7)
     ]
     assert [v.name for v in block.inputs] == [f"tau{k}" for k in range(1, 7)]
-    found = verify(generate(block, tmp_path, real="double"))
+    found = verify(generate(block, tmp_path, real="double", kit=False))
     assert found.ok, found.table()
     after, exact = advanced(block, 200, *[0.0] * 6), simulate(model, 0.2, rtol=1e-9).final
     for k in range(1, 7):
@@ -96,7 +96,7 @@ def test_arm_with_friction_from_reactions_in_every_joint_is_verified(
 
 
 def test_float_of_a_drive_is_verified(compiler: Compiler, tmp_path: Path) -> None:
-    assert verify(generate(plant_block(PLANTS["drive lugre"], h=1e-3), tmp_path)).ok
+    assert verify(generate(plant_block(PLANTS["drive lugre"], h=1e-3), tmp_path, kit=False)).ok
 
 
 @pytest.mark.parametrize("method", [m for m in METHODS if METHODS[m].order > 1])

@@ -40,14 +40,14 @@ int main(void)
     [(GenericAsperity(), "double"), (RandomBristles(), "double"), (RandomBristles(), "float")],
 )
 def test_a_contact_is_verified(law, real, compiler, tmp_path):
-    found = verify(generate(law, tmp_path, real=real))
+    found = verify(generate(law, tmp_path, real=real, kit=False))
     assert found.ok, found.table()
 
 
 @pytest.mark.heavy
 def test_float_does_not_hold_the_phase_of_an_asperity_at_its_ends(compiler, tmp_path):
     """Where an asperity leaves, its stiffness and load jump: a last bit of the phase decides."""
-    found = verify(generate(GenericAsperity(), tmp_path, real="float"))
+    found = verify(generate(GenericAsperity(), tmp_path, real="float", kit=False))
     (check,) = found.checks
     assert not found.ok
     assert check.rounding is not None
@@ -57,7 +57,7 @@ def test_float_does_not_hold_the_phase_of_an_asperity_at_its_ends(compiler, tmp_
 
 def test_a_loop_in_c_is_the_population_of_numpy(compiler, tmp_path):
     law, h, N = GenericAsperity(seed=5), 1e-4, 10.0
-    made = generate(law, tmp_path, real="double")
+    made = generate(law, tmp_path, real="double", kit=False)
     (tmp_path / "main.c").write_text(MAIN)
     program = tmp_path / "main"
     link_program(compiler, [tmp_path / "main.c", made.source("double")], tmp_path, program)
@@ -87,4 +87,4 @@ def test_the_text_says_how_a_population_is_made():
 )
 def test_what_makes_no_sense_is_refused(options, message, tmp_path):
     with pytest.raises(ValueError, match=message):
-        generate(GenericAsperity(), tmp_path, **options)
+        generate(GenericAsperity(), tmp_path, **options, kit=False)

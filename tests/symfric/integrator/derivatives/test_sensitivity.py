@@ -82,7 +82,7 @@ def test_difference_quotients_agree_over_a_scan_of_widths(law: str, name: str) -
 
     run = simulate(model, T_END, x0={"v": 0.02}, rtol=1e-12, t_eval=[T_END], sensitivities=[name])
     ours = derivative(run, name, "x")[0]
-    widths = at * 10.0 ** -np.arange(1, 10)
+    widths = at * 10.0 ** -np.array([1, 5, 6, 7, 9])
     quotients = np.array([(x_end(at + h) - x_end(at - h)) / (2 * h) for h in widths])
     wrong = np.abs(quotients / ours - 1)
     assert wrong.min() <= (1e-6 if law == "brown_mcphee" else 1e-4)
