@@ -224,7 +224,7 @@ class Controller:
         Args:
             plant: the model of the plant, with events or without.
             t_end: [s], rounded to whole cycles.
-            references: name -> number, or function of times [s], known to the controller in advance.
+            references: name -> number, or function of times [s], which the controller knows ahead.
             x0, plant_p: start values and parameters of the plant, by name.
             p: parameters of the controller's model, by name.
             noise: standard deviation of measured states, by name.
@@ -272,7 +272,7 @@ def controller_of(
     penalty: float = 1e3,
     name: str | None = None,
 ) -> Controller:
-    """Derive a model predictive controller from a problem of one phase, whose duration T is the horizon.
+    """Derive a model predictive controller from a problem of one phase with the horizon T.
 
         min  sum_k h [sum_i w_i r_i^2 + L] + E(x_N)   s.t.  x_(k+1) = F(x_k, u_k),  bounds
 
@@ -287,7 +287,7 @@ def controller_of(
         problem: the problem to minimise.
         step: time between cycles [s].
         method, steps: of `flow`, for an interval. The steps should resolve the transition velocity
-            of friction: if v changes by much more than v_t in one step, iterations converge slowly or
+            of friction: if v changes by much more than v_t in a step, iterations converge slowly or
             not at all, as the residual shows. With bristles "backward_euler".
         measured: names of measured states, by default all; the others, such as bristles, are taken
             from the plan. Inputs with a rate (`rates`) are never measured.

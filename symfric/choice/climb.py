@@ -34,7 +34,7 @@ RUN, RUNS = 250_000_000, 5
 LEAST, LEAST_WHOLE = 5_000, 30_000
 """Attempts that they may take of a machine however large."""
 GROWTH = 8
-"""A run may take so many times the attempts of the run before, which was a bit softer."""
+"""Run may take so many times the attempts of the run before, which was a bit softer."""
 
 
 @final
@@ -76,7 +76,7 @@ class Budget:
         return sum(self.attempts) < share * self.whole
 
     def model(self, s: float) -> Model:
-        """The machine with the law at the softness `s`.
+        """Return the machine with the law at the softness `s`.
 
         Raises:
             ValueError: beyond a bound of the law, or the machine refuses it.
@@ -86,7 +86,7 @@ class Budget:
         return self._models[s]
 
     def run(self, s: float, rtol: float, most: int | None = None) -> Sample:
-        """A run at the softness `s`; `most` attempts at most.
+        """Return a run at the softness `s`; `most` attempts at most.
 
         Raises:
             SolveError: it failed, or would take more.
@@ -159,7 +159,7 @@ class Asked:
 @final
 @dataclass(frozen=True, eq=False)
 class AtEqualError:
-    """The run that a law is judged by.
+    """Run that a law is judged by.
 
     Attributes:
         s: its softness.
@@ -202,7 +202,8 @@ def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
 
 
 def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sample, float]:
-    """The run at `rtol`, or at the next looser of `LOOSER` that takes no more than `most` attempts.
+    """Return the run at `rtol`, or at the next looser of `LOOSER` that takes no more than `most`
+    attempts.
 
     Drier than it comes a law has one further chance, since what fails at one takes about as much.
 
@@ -221,7 +222,7 @@ def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sa
 
 
 def nearest(rungs: Ladder) -> Rung:
-    """The softest rung whose error is about the smallest that the law reaches."""
+    """Return the softest rung whose error is about the smallest that the law reaches."""
     least = min(rung.error for rung in rungs.rungs)
     return next(rung for rung in rungs.rungs if not rung.error > AS_NEAR * least)
 
@@ -230,7 +231,7 @@ def at_equal_error(
     runs: Budget, s: float, reference: Reference, asked: Asked,
     near: Rung, whole: bool,
 ) -> AtEqualError:  # fmt: skip
-    """The loosest tolerance at which an error is at most the accuracy.
+    """Return the loosest tolerance at which an error is at most the accuracy.
 
     A tolerance counts if the next tighter one keeps the accuracy, too; where none does the finest
     that ends within the budget.
@@ -267,7 +268,7 @@ def at_equal_error(
 def _loosest(
     runs: Budget, s: float, error: Callable[[Sample], float], asked: Asked, finest: float
 ) -> tuple[float, Sample | None, float]:
-    """The tolerance and its run, if any above `finest`, and the error of the last one."""
+    """Return the tolerance and its run, if any above `finest`, and the error of the last one."""
     rtol, last = LOOSEST, nan
     before: tuple[float, Sample] | None = None
     while rtol > 1.1 * finest and runs.left():
@@ -285,7 +286,7 @@ def _loosest(
 
 
 def short(problem: object) -> str:
-    """The first sentence of an error; of a run that failed what its status says."""
+    """Return the first sentence of an error; of a run that failed what its status says."""
     if isinstance(problem, SolveError) and isinstance(problem.partial, Trajectory):
         run = problem.partial
         said = {

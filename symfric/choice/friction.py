@@ -1,4 +1,4 @@
-"""The friction that all candidates describe, and each law with the numbers that describe it."""
+"""Friction that all candidates describe, and each law with the numbers that describe it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class Friction:
         return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")
 
     def sliding(self, speed: float) -> float:
-        """The coefficient of steady sliding at a speed [m/s] > 0."""
+        """Return the coefficient of steady sliding at a speed [m/s] > 0."""
         fall = 0.0 if self.v_s is None else exp(-((speed / self.v_s) ** 2))
         return self.mu_d + (self.mu_s - self.mu_d) * fall
 
@@ -80,7 +80,7 @@ class Friction:
 
 
 def friction_of(law: Law) -> Friction:
-    """The levels of `law` where it has mu_s and mu_d; else those of the defaults."""
+    """Return the levels of `law` where it has mu_s and mu_d; else those of the defaults."""
     known = parameters(law)
     given = {n: float(known[n].value) for n in ("mu_s", "mu_d") if n in known}
     start = Friction()
@@ -102,7 +102,9 @@ NO_FALL = (VelocityBased, StickSlip)
 
 
 def fall_of(law: Law) -> str | None:
-    """The parameter of `law` that is its Stribeck velocity or the inverse; None without one."""
+    """Return the parameter of `law` that is its Stribeck velocity or the inverse; None without
+    one.
+    """
     if isinstance(law, NO_FALL):
         return None
     name = FALL.get(type(law), "v_s")
@@ -155,7 +157,7 @@ LEVELS: dict[type[Law], Levels] = {
 
 
 def alike(law: Law, friction: Friction, load: float | None) -> Law:
-    """`law` with the levels, and where it has one the Stribeck velocity, of `friction`.
+    """Return `law` with the levels, and where it has one the Stribeck velocity, of `friction`.
 
     Args:
         load: normal force [N] where it is one number.
@@ -184,7 +186,7 @@ def alike(law: Law, friction: Friction, load: float | None) -> Law:
 
 
 def peaked(law: Law, mu_s: float, load: float | None) -> Law:
-    """A static law with the highest force of steady sliding at mu_s N; any other as it is.
+    """Return a static law with the highest force of steady sliding at mu_s N; any other as it is.
 
     The product of a rise over one velocity and a fall over another stays below the static level
     that it is written with, by 0.05 % to 7 %. What is measured is the peak.
@@ -213,7 +215,9 @@ PASSES = 12
 
 
 def _top(law: Law, v: Array, N: float) -> float:
-    """The highest force of steady sliding over N: on the grid `v`, then on one around its peak."""
+    """Return the highest force of steady sliding over N: on the grid `v`, then on one around
+    its peak.
+    """
     F = steady_force(law, v, N)
     k = int(np.argmax(F))
     near = np.geomspace(v[max(k - 1, 0)], v[min(k + 1, v.size - 1)], 201)
@@ -221,7 +225,9 @@ def _top(law: Law, v: Array, N: float) -> float:
 
 
 def _raised(law: Law, factor: float, missing: float, N: float, v: Array) -> dict[str, float]:
-    """The parameters of a higher peak: by a factor, or by a coefficient; sliding stays as it is."""
+    """Return the parameters of a higher peak: by a factor, or by a coefficient; sliding stays
+    as it is.
+    """
     now = {name: float(p.value) for name, p in parameters(law).items()}
     if isinstance(law, MakkarDixon):  # gamma_1 times a share of itself makes the peak
         share = float((np.tanh(now["gamma_2"] * v) - np.tanh(now["gamma_3"] * v)).max())

@@ -1,4 +1,4 @@
-"""The user's machine with any law in it, what one run costs, and references of errors."""
+"""User's machine with any law in it, what one run costs, and references of errors."""
 
 import warnings
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ def quiet_run(machine: Machine, model: Model, law: Law, rtol: float, most: int) 
 @final
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A law in a machine, with numbers that describe the wanted friction, and its softness.
+    """Law in a machine, with numbers that describe the wanted friction, and its softness.
 
     Attributes:
         machine: where it is.
@@ -65,15 +65,15 @@ class Candidate:
 
     @property
     def power(self) -> float:
-        """The least power of the softness that its velocities have; 0 where nothing is smooth."""
+        """Least power of the softness that its velocities have; 0 where nothing is smooth."""
         return min((k.velocities for k in self.knobs.values() if k.powers), default=0.0)
 
     def law_at(self, s: float) -> Law:
-        """The law at the softness `s`; of several places the first."""
+        """Return the law at the softness `s`; of several places the first."""
         return next(iter(self.knobs.values())).at(s)
 
     def model(self, s: float) -> Model:
-        """The machine at the softness `s`.
+        """Return the machine at the softness `s`.
 
         Raises:
             ValueError: beyond a bound of the law, or the machine refuses it.
@@ -89,7 +89,7 @@ class Candidate:
 
     @cached_property
     def first(self) -> Model:
-        """The machine with the law as it comes."""
+        """Machine with the law as it comes."""
         return self.model(1.0)
 
 
@@ -97,7 +97,7 @@ def candidate(
     machine: Machine, law: Law, frictions: Mapping[str, Friction], load: float | None, own: bool,
     bristles: float = OF_BRISTLES[0],
 ) -> Candidate:  # fmt: skip
-    """`law` in `machine`.
+    """Return `law` in `machine`.
 
     Args:
         frictions: that it is to describe, by the place in the machine; "" for any other place.
@@ -150,7 +150,7 @@ def frictions_of(machine: Machine, given: Friction | None, scene: object) -> dic
 
 
 def load_of(model: Model) -> float | None:
-    """The normal force [N] of all contacts where it is one number; else None."""
+    """Return the normal force [N] of all contacts where it is one number; else None."""
     loads = [contact.N for contact in model.contacts]
     if not loads or not all(is_number(N) and np.isfinite(float(N)) for N in loads):
         return None
@@ -168,7 +168,7 @@ RATIO, SHARPEST = 4.0, 12
 @final
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The motion that errors are measured from.
+    """Motion that errors are measured from.
 
     Attributes:
         about: what it is.
@@ -200,7 +200,7 @@ def reference_of(
     load: float | None,
     accuracy: float,
 ) -> tuple[Reference, Machine]:
-    """The reference, and the machine compared at its times.
+    """Return the reference, and the machine compared at its times.
 
     Raises:
         ValueError: no reference, or signals that the machine does not have.
@@ -264,7 +264,9 @@ def _exact(machine: Machine, frictions: Mapping[str, Friction], load: float | No
 def _sharpest(
     machine: Machine, frictions: Mapping[str, Friction], load: float | None, accuracy: float
 ) -> Reference:
-    """The limit of a smooth law, as far as its runs follow each other in a power of the width."""
+    """Return the limit of a smooth law, as far as its runs follow each other in a power of the
+    width.
+    """
     law = BrownMcPhee() if frictions[""].v_s is None else Stribeck()
     held, runs, gaps = candidate(machine, law, frictions, load, own=False), [], list[float]()
     uncertain = inf

@@ -65,7 +65,7 @@ class Motion:
 def largest(
     machine: Machine, model: Model, method: str, motion: Motion, share: float
 ) -> tuple[float | None, str]:
-    """The largest step [s] in which the plant, as its C block steps, follows the motion.
+    """Return the largest step [s] in which the plant, as its C block steps, follows the motion.
 
     The plant block of `symfric.codegen` steps from the start to the end of the motion, inputs held
     at their value in the middle of each step. A step size holds if the positions are finite and
@@ -98,7 +98,7 @@ def _refined(
     step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
     share: float,
 ) -> float:  # fmt: skip
-    """The larger ones between h, which holds, and ten times that."""
+    """Return the larger ones between h, which holds, and ten times that."""
     for factor in (5.0, 2.0):
         if _follows(step, factor * h, block, machine, motion, share):
             return factor * h
@@ -106,7 +106,7 @@ def _refined(
 
 
 def _step(block: Block) -> ca.Function:
-    """(states, [inputs; h]) -> states after a step."""
+    """Return (states, [inputs; h]) -> states after a step."""
     x = ca.SX.sym("x", len(block.states))
     u = ca.SX.sym("u", len(block.inputs))
     h = ca.SX.sym("h")
@@ -141,7 +141,9 @@ def _follows(
 
 
 def _inputs(block: Block, given: Mapping[str, Input], t: Array) -> Array:
-    """The inputs at the times `t`, shape (inputs, times); start values where none are given."""
+    """Return the inputs at the times `t`, shape (inputs, times); start values where none are
+    given.
+    """
     rows = [sampled(given.get(v.name, float(v.start)), t) for v in block.inputs]  # pyright: ignore[reportArgumentType]
     return np.array(rows).reshape(len(rows), t.size)
 
@@ -189,7 +191,8 @@ class Task:
 
 
 def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
-    """The row of the first of several forms of a law that is ranked; without one of the best.
+    """Return the row of the first of several forms of a law that is ranked; without one of the
+    best.
 
     A law that does not show what is needed does not show it in another form, either.
     """
@@ -202,7 +205,7 @@ def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
 
 
 def measured(task: Task, name: str, law: Law) -> Row:
-    """The row of `law`; never raises for what a law or a machine may do."""
+    """Return the row of `law`; never raises for what a law or a machine may do."""
     shown = tuple(phenomena(law))
     hard = nature.physical(law)
     row = Row(
@@ -247,7 +250,9 @@ def _refusal(machine: Machine, problem: Exception) -> str:
 
 
 def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
-    """The task with the law's own motion as reference, where only the integrator is judged."""
+    """Return the task with the law's own motion as reference, where only the integrator is
+    judged.
+    """
     if task.reference is not OWN:
         return task
     run = held.run(held.first, 0.1 * task.asked.fine, 10 * runs.most)
@@ -255,7 +260,9 @@ def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
 
 
 def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
-    """The row with its error from data; ranked where that is about as small as the smallest."""
+    """Return the row with its error from data; ranked where that is about as small as the
+    smallest.
+    """
     if misfits is None or not row.attempts:
         return row
     misfit, best = misfits[row.law], min(misfits.values())
@@ -267,7 +274,7 @@ def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
 
 
 def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) -> Row:
-    """The row with what was measured, and where it stands.
+    """Return the row with what was measured, and where it stands.
 
     Raises:
         SolveError: no run ends.
@@ -295,7 +302,7 @@ def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) 
 
 
 def _judged(task: Task, rungs: Ladder, runs: Budget) -> AtEqualError:
-    """The run at equal error: from the reference where the law keeps it, else its own.
+    """Return the run at equal error: from the reference where the law keeps it, else its own.
 
     Raises:
         SolveError: no run ends.
@@ -326,7 +333,7 @@ def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
 
 
 def _own_numbers(law: Law) -> dict[str, float]:
-    """The parameters that are not those that the law comes with: what to give it."""
+    """Return the parameters that are not those that the law comes with: what to give it."""
     known = {n: (float(p.value), p.default) for n, p in parameters(law).items()}  # pyright: ignore[reportArgumentType]
     with suppress(TypeError):  # a wrapper, which comes with no law in it
         whole = parameters(type(law)())  # of elements that a law comes with it says the numbers
@@ -348,7 +355,7 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
 
 
 def _stepped(task: Task, held: Candidate, rungs: Ladder, row: Row) -> Row:
-    """The row with the largest fixed steps, of the law as soft as these may be off.
+    """Return the row with the largest fixed steps, of the law as soft as these may be off.
 
     A law that never comes so near to the reference is followed as it was judged.
     """

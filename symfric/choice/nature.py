@@ -46,7 +46,7 @@ ALIASES = {
 
 
 def needed(where: str, given: object) -> tuple[str, ...]:
-    """The words of `NEEDS` that `given` means: words, aliases or codes, in this order.
+    """Return the words of `NEEDS` that `given` means: words, aliases or codes, in this order.
 
     Raises:
         ValueError: a text instead of a sequence, or a word that means nothing; it lists all.
@@ -66,7 +66,7 @@ def _word(text: str, of_code: dict[str, str]) -> str:
 
 
 def lacking(needs: Iterable[str], codes: Iterable[str]) -> list[str]:
-    """The words of `needs` that a law with these phenomena does not show."""
+    """Return the words of `needs` that a law with these phenomena does not show."""
     shown = set(codes)
     return [word for word in needs if NEEDS[word][0] not in shown]
 
@@ -88,7 +88,8 @@ STEP = 1e-3
 
 
 def physical(law: Law) -> tuple[list[Parameter], tuple[str, ...]]:
-    """The parameters that describe friction, and the names of those that are hard to measure.
+    """Return the parameters that describe friction, and the names of those that are hard to
+    measure.
 
     Hard are bristles (micrometres before break-away), times (dwell, lag) and shapes, which only a
     fit gives; what smooths a jump is chosen and is neither.
@@ -98,7 +99,7 @@ def physical(law: Law) -> tuple[list[Parameter], tuple[str, ...]]:
 
 
 def smoothness(law: Law) -> str:
-    """The class in the velocity, as the numbers of `law` are.
+    """Return the class in the velocity, as the numbers of `law` are.
 
     A law that is smooth only over a width says what it is without: "C∞ (C0 at v = 0 as v_eps -> 0)"
     with v_eps = 1e-15 m/s is C0. One that switches by events is of the class "event". A law of laws
@@ -122,13 +123,13 @@ def smoothness(law: Law) -> str:
 
 
 def form(law: Law) -> str:
-    """The form that `law` was given in place of the one that it comes in; "" for that."""
+    """Return the form that `law` was given in place of the one that it comes in; "" for that."""
     chosen = options(law).get("form")
     return chosen.value if chosen is not None and chosen.value != chosen.default else ""
 
 
 def forms(law: Law) -> tuple[Law, ...]:
-    """`law` with its modes switched by events, where it has that form, and as it is.
+    """Return `law` with its modes switched by events, where it has that form, and as it is.
 
     The first is the one to try first: the exact one, if a controller can take it, too.
     """

@@ -1,4 +1,4 @@
-"""The choice as pictures, and as one page that needs nothing from elsewhere."""
+"""Choice as pictures, and as one page that needs nothing from elsewhere."""
 
 from collections.abc import Sequence
 from html import escape
@@ -135,13 +135,13 @@ def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]
 
 
 def _around(axis: Axes, row: Row, size: float) -> Bbox:
-    """The square that the marker of a row covers [pixel]."""
+    """Return the square that the marker of a row covers [pixel]."""
     x, y = axis.transData.transform((1e-6 * row.work, row.error))
     return Bbox.from_extents(x - size / 2, y - size / 2, x + size / 2, y + size / 2)
 
 
 def _by_name(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
-    """The work of each of them, by rank."""
+    """Return the work of each of them, by rank."""
     for place, row in enumerate(named):
         k = KINDS.index(shown(row.phenomena))
         face = colour(k) if row.ranked else "none"
@@ -157,7 +157,7 @@ def _by_name(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
 
 
 def _round(axis: Axes, values: Sequence[float]) -> None:
-    """A logarithmic axis with round numbers on it, three at least where it can."""
+    """Return a logarithmic axis with round numbers on it, three at least where it can."""
     low, high = 0.8 * min(values), 1.25 * max(values)
     ticks: list[float] = []
     for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)):
@@ -193,7 +193,7 @@ NARROW = 700
 
 
 def page(choice: Ranking) -> str:
-    """The whole document."""
+    """Return the whole document."""
     parts = (html.title(choice.title), _asked(choice), body(choice, 760), _meaning())
     return html.page(choice.title, "en", "\n".join(parts))
 
@@ -214,7 +214,7 @@ def body(choice: Ranking, width: int = 640) -> str:
 
 
 def _image(choice: Ranking, width: int) -> str:
-    """The picture for wide and for narrow screens, at twice its size for sharp ones."""
+    """Return the picture for wide and for narrow screens, at twice its size for sharp ones."""
     wide, narrow = (plot_choice(choice, wide=wide) for wide in (True, False))
     source = data_uri(wide, 2 * width / float(wide.get_size_inches()[0]))
     small = data_uri(narrow, 2 * SMALL_WIDTH / float(narrow.get_size_inches()[0]))

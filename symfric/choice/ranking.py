@@ -93,7 +93,7 @@ class Row:
 
     @property
     def called(self) -> str:
-        """The law with its form."""
+        """Law with its form."""
         return f"{self.law} (form = {self.form})" if self.form else self.law
 
     @property
@@ -110,7 +110,8 @@ class Row:
 
 
 def ordered(rows: Iterable[Row]) -> list[Row]:
-    """The best first, with their ranks: by work what does all that is asked, others by their error.
+    """Return the best first, with their ranks: by work what does all that is asked, others by their
+    error.
 
     Nothing that a clock says decides: the same rows come in the same order on every run.
     """
@@ -127,7 +128,7 @@ def ordered(rows: Iterable[Row]) -> list[Row]:
 
 
 def best_of(rows: Sequence[Row]) -> Row:
-    """The first of them, were they ordered."""
+    """Return the first of them, were they ordered."""
     return min(rows, key=place)
 
 
@@ -172,7 +173,7 @@ class Ranking:
     unmeasured: tuple[str, ...] = ()
 
     def __getitem__(self, law: str) -> Row:
-        """The row of a law."""
+        """Return the row of a law."""
         found = {row.law: row for row in self.rows}
         check_names("choice", [law], found)
         return found[law]
@@ -187,21 +188,21 @@ class Ranking:
 
     @property
     def placed(self) -> tuple[Row, ...]:
-        """The rows of all laws that run here, by their rank."""
+        """Rows of all laws that run here, by their rank."""
         return tuple(row for row in self.rows if row.rank)
 
     @property
     def ranked(self) -> tuple[Row, ...]:
-        """The rows of laws that show what is needed and keep the accuracy, least work first."""
+        """Rows of laws that show what is needed and keep the accuracy, least work first."""
         return tuple(row for row in self.rows if row.ranked)
 
     @property
     def best(self) -> Row | None:
-        """The first of them; None where there is none."""
+        """First of them; None where there is none."""
         return next(iter(self.ranked), None)
 
     @property
     def title(self) -> str:
-        """The question in a line."""
+        """Question in a line."""
         asked = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
         return f"{self.machine}: {asked}, {self.accuracy:g} off at most"

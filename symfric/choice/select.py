@@ -40,7 +40,7 @@ SCREEN = 16
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice(Ranking):
-    """A ranking of laws that shows, draws and writes itself; see `Ranking` for its attributes."""
+    """Ranking of laws that shows, draws and writes itself; see `Ranking` for its attributes."""
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ class Choice(Ranking):
 
     @property
     def table(self) -> list[dict[str, Any]]:
-        """A row of plain numbers and texts for each law; what CSV and data frames hold."""
+        """Row of plain numbers and texts for each law; what CSV and data frames hold."""
         return [flat(row) for row in self.rows]
 
     def __repr__(self) -> str:
@@ -108,7 +108,7 @@ class Choice(Ranking):
 
 
 def flat(row: Row) -> dict[str, Any]:
-    """A row without nested values."""
+    """Return a row without nested values."""
     found = row.to_dict()
     del found["curve"]
     values = found.pop("values") or {}
@@ -242,7 +242,7 @@ def select(
 
 
 def laws_of(where: str, laws: Candidates | None) -> dict[str, tuple[Law, ...]]:
-    """The candidates by name, each in the forms that are tried.
+    """Return the candidates by name, each in the forms that are tried.
 
     Raises:
         ValueError: unknown names, something else than laws, none at all.
@@ -263,7 +263,7 @@ def laws_of(where: str, laws: Candidates | None) -> dict[str, tuple[Law, ...]]:
 
 
 def _rows(task: Task, laws: Forms, workers: int, progress: Progress | None) -> list[Row]:
-    """The rows; those that are there when somebody interrupts."""
+    """Return the rows; those that are there when somebody interrupts."""
     rows: list[Row] = []
     results = _many(task, laws, workers) if workers > 1 else _one_by_one(task, laws)
     with suppress(KeyboardInterrupt):
@@ -280,7 +280,8 @@ def _one_by_one(task: Task, laws: Forms) -> Iterator[Row]:
 
 
 def _many(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
-    """The rows as they come from several processes, each of which asks for one law at a time.
+    """Return the rows as they come from several processes, each of which asks for one law at a
+    time.
 
     They are forked: functions of a user's file cannot be sent.
     """
@@ -310,7 +311,7 @@ def _many(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
 
 
 def _answer(pipe: Any, process: ForkProcess, name: str) -> Row:
-    """The row that a process sends; that it ended, where it sends none."""
+    """Return the row that a process sends; that it ended, where it sends none."""
     try:
         row: Row = pipe.recv()
     except EOFError:

@@ -54,7 +54,7 @@ class Softness(Regularisation):
     velocities: float = 0.0
 
     def at(self, s: float) -> Law:
-        """The law at the factor `s`.
+        """Return the law at the factor `s`.
 
         Raises:
             ValueError: beyond a bound of the law.
@@ -67,14 +67,14 @@ class Softness(Regularisation):
 
 
 def _within(p: Parameter, value: float) -> float:
-    """A width that is at its bound stays there: it only rounds off."""
+    """Return a width that is at its bound stays there: it only rounds off."""
     return min(max(value, p.lower), p.upper) if p.role == "width" else value
 
 
 def softness(
     law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
 ) -> Softness:
-    """The scalable parameters of `law`; none of one that rests exactly or has no widths.
+    """Return the scalable parameters of `law`; none of one that rests exactly or has no widths.
 
     Args:
         law, friction, load: what it describes, and under which load.
@@ -90,7 +90,7 @@ def softness(
 
 
 def _power(law: Law, p: Parameter, of_speed: float) -> float:
-    """The power of s for a parameter; 0 for one that makes nothing smooth."""
+    """Return the power of s for a parameter; 0 for one that makes nothing smooth."""
     value = float(p.value)  # pyright: ignore[reportArgumentType]  (numbers only)
     if p.name in RELATIVE or p.field in LEVEL_LIKE.get(type(law), ()):
         return 0.0
@@ -123,13 +123,13 @@ MOST, SOFTEST = 24, 5
 MARGIN = 0.7
 """Part of the wanted error that is left to the law; the rest is the integrator's."""
 ROUNDING = 5e-3
-"""An error that falls by less than this share of it over three rungs is the law's own."""
+"""Error that falls by less than this share of it over three rungs is the law's own."""
 
 
 @final
 @dataclass(frozen=True)
 class Rung:
-    """A run of the ladder: factor of the widths, error, attempts, tolerance, motion over size."""
+    """Run of the ladder: factor of the widths, error, attempts, tolerance, motion over size."""
 
     s: float
     error: float
@@ -154,7 +154,7 @@ class Ladder:
     decided: bool = False
 
     def softest(self, wanted: float) -> float | None:
-        """The softest factor below which every run keeps the error; None where none does."""
+        """Return the softest factor below which every run keeps the error; None where none does."""
         kept = len(self.rungs)
         while kept and self.rungs[kept - 1].error <= wanted:
             kept -= 1
@@ -221,7 +221,8 @@ def ladder(
 
 
 def limit_order(rungs: Sequence[Rung]) -> float | None:
-    """The order in s with which motions tend to one that is off; None where that is not shown.
+    """Return the order in s with which motions tend to one that is off; None where that is not
+    shown.
 
     Three runs show the order q of x_0 + c s^q, whose c s_2^q the limit still is from the last one,
     if they are leaps apart: at an extremum of their error neighbours are alike, too.

@@ -1,4 +1,4 @@
-"""The choice in words: what to take and why, and a table of eighty columns."""
+"""Choice in words: what to take and why, and a table of eighty columns."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
@@ -8,7 +8,7 @@ from symfric.choice.nature import EVENT, is_smooth
 from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Ranking, Row
 
 FASTER = 1.25
-"""The clock contradicts the work beyond this ratio."""
+"""Clock contradicts the work beyond this ratio."""
 
 
 def verdict(
@@ -33,7 +33,7 @@ def verdict(
 
 
 def _fastest(ranked: Sequence[Row], asked: str) -> str:
-    """The law of the least work, who is as good, and what the clock says against it."""
+    """Return the law of the least work, who is as good, and what the clock says against it."""
     best = ranked[0]
     text = (
         f"Simulation: take {best.called}, the least work of {len(ranked)} that show {asked} and "
@@ -52,7 +52,9 @@ def _fastest(ranked: Sequence[Row], asked: str) -> str:
 
 
 def _smooth(ranked: Sequence[Row]) -> str:
-    """The one with second derivatives that climbs least; bristles where there is no other."""
+    """Return the one with second derivatives that climbs least; bristles where there is no
+    other.
+    """
     smooth = [row for row in ranked if is_smooth(row.smoothness)]
     if not smooth:
         first = ranked[0]
@@ -198,7 +200,7 @@ def _line(row: Row, tied: bool, cores: bool) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number >= 0 in five places; a dash for none."""
+    """Return a number >= 0 in five places; a dash for none."""
     if not isfinite(value):
         return "-"
     if value >= 10 ** (digits - 1):
@@ -207,7 +209,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def short(value: float | None) -> str:
-    """A power of ten with one digit; a dash for none."""
+    """Return a power of ten with one digit; a dash for none."""
     if value is None or not isfinite(value):
         return "-"
     return f"{value:.0e}".replace("e-0", "e-").replace("e+00", "")

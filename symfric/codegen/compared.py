@@ -1,11 +1,11 @@
-"""Rows of generated C and of CasADi: where they differ most, and whether rounding explains it.
+"""Comparison of generated C and CasADi: largest differences, and whether rounding explains them.
 
-Rounding errors of float are relative to the magnitude of what a signal is made of. A signal that is
+Rounding errors of float are relative to the magnitude of the terms of a signal. A signal that is
 the small difference of large numbers, such as the stroke between two bodies, has the rounding
-errors of those. Its magnitude m is that of its terms: m(a + b) is the larger of m(a)
-and m(b), m(-a) = m(|a|) = m(a), m(a^2) = m(a)^2, m(sqrt(a)) = sqrt(m(a)), and of anything else it
-is the absolute value. What is left of closing equations is judged by all that went into it: there
-m(a b) is the larger of m(a) |b| and |a| m(b), m(a / b) = m(a) / |b|, too.
+errors of those. Its magnitude m is that of its terms: m(a + b) is the larger of m(a) and m(b),
+m(-a) = m(|a|) = m(a), m(a^2) = m(a)^2, m(sqrt(a)) = sqrt(m(a)), and of any other operation it is
+the absolute value. Residuals of closing equations are judged by all their terms: there m(a b) is
+the larger of m(a) |b| and |a| m(b), and m(a / b) = m(a) / |b|.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,25 +31,25 @@ from symfric.model.kinds import CONSTRAINTS
 Array = NDArray[np.float64]
 
 OVERFLOWS = 1e18
-"""Of a number beyond, no square is one in float."""
+"""Numbers above this have no square in float."""
 
 TOLERANCE = 1e-5
 """Largest error of float, relative to the magnitude of each signal."""
 
 RARE = 0.01
-"""Share of the steps in which modes may differ; where there are more, none is excused."""
+"""Largest fraction of steps in which modes may differ by ties; with more, none is accepted."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One sequence of inputs, done by C and by CasADi.
+    """One sequence of inputs, run by C and by CasADi.
 
     Attributes:
-        inputs: as they were given, shape (steps, inputs).
+        inputs: as given, shape (steps, inputs).
         parameters: of every step, shape (steps, parameters); None: the defaults.
-        rows, expected: what C and CasADi made of it, see `run_c`.
-        terms: of the block, see `magnitude`, made where it is needed.
+        rows, expected: results of C and CasADi, see `run_c`.
+        terms: of the block, see `magnitude`, built on demand.
     """
 
     generated: Generated
@@ -62,7 +62,7 @@ class Run:
 
     @property
     def block(self) -> Block:
-        """The block that was generated."""
+        """Block that was generated."""
         return self.generated.block
 
     @cached_property
@@ -81,8 +81,8 @@ class Run:
     def tied(self) -> NDArray[np.bool_]:
         """Mask of modes that differ in float because their decision ties, shape (steps, columns).
 
-        That is where the mode of the C is one that CasADi's own operations come to when each is
-        rounded to float, to nearest or by chance up or down. Nothing else in that step is excused.
+        A tie means that CasADi's own operations give the mode of the C when each is rounded to
+        float, to nearest or randomly up or down. Other differences in that step are not accepted.
         """
         found = np.zeros(self.rows.shape, bool)
         if self.real.size == 8:
@@ -97,14 +97,16 @@ class Run:
         return found
 
     def _rounded(self, rows: NDArray[np.int64]) -> Array | None:
-        """Results of CasADi's operations in float for some of the steps, see `rounded`."""
+        """Return results of CasADi's operations in float for some of the steps, see `rounded`."""
         states, parameters, inputs = self._arguments
         own = np.broadcast_to(parameters, (len(inputs), parameters.shape[-1]))
         return rounded(self.block, states[rows], own[rows], inputs[rows])
 
     @property
     def _overflows(self) -> NDArray[np.bool_]:
-        """Steps in which float overflows, as the status of the C says, and double does not."""
+        """Steps in which float overflows, as reported by the status of the C, but double does
+        not.
+        """
         if self.real.size == 8 or not self.generated.guards:
             return np.zeros(len(self.rows), bool)
         said = (self.rows[:, -1].astype(int) & int(Status.OUTPUT)) != 0
@@ -112,12 +114,12 @@ class Run:
 
     @cached_property
     def error(self) -> float:
-        """The largest of them."""
+        """Largest relative difference."""
         return float(self.relative.max(initial=0.0))
 
     @property
     def worst(self) -> str:
-        """The signal that it belongs to, "" without a difference."""
+        """Signal with the largest difference, "" without a difference."""
         names = signals(self.block, guards=self.generated.guards)
         return names[self._place[1]] if self.error else ""
 
@@ -125,7 +127,7 @@ class Run:
     def rounding(self) -> float | None:
         """Largest change of the worst signal by rounding to float in the worst step, see `rounded`.
 
-        None where it is not known.
+        None if it is not known.
         """
         row, column = self._place
         made = self._rounded(np.array([row]))
@@ -143,7 +145,7 @@ class Run:
 
     @cached_property
     def _arguments(self) -> tuple[Array, Array, Array]:
-        """States before every step, parameters and inputs, as the step takes them."""
+        """States before every step, parameters and inputs, as arguments of the step."""
         block, model = self.block, GuardModel(self.block, self.real)
         start, inputs = model.start, self.real.rounded(self.inputs)
         states = np.vstack([start, self.rows[:-1, : len(block.states)]])
@@ -157,7 +159,7 @@ class Run:
 
     @cached_property
     def _scale(self) -> Array:
-        """The magnitude of every column: of its terms, its nominal value or its peak."""
+        """Magnitude of every column: of its terms, its nominal value or its peak."""
         count = len(self.block.states)
         found = magnitudes(self.terms(), self.block, *self._arguments)
         found = np.concatenate([found, *(found[:count] for _ in self.block.resets)])
@@ -169,7 +171,7 @@ class Run:
 
 
 def ulp(a: Array, b: Array) -> int:
-    """Largest distance in units in the last place, the largest integer if a value is not finite."""
+    """Return the largest distance in units in the last place; the largest integer if not finite."""
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         return np.iinfo(np.int64).max
     distance = np.abs(_ordered(a) - _ordered(b))
@@ -177,13 +179,13 @@ def ulp(a: Array, b: Array) -> int:
 
 
 def _ordered(values: Array) -> NDArray[np.int64]:
-    """Integers in the order of the floats, neighbours one apart, both zeros 0."""
+    """Return integers in the order of the floats, neighbours one apart, both zeros 0."""
     bits = np.ascontiguousarray(values).view(np.int64)
     return np.where(bits < 0, np.iinfo(np.int64).min - bits, bits)
 
 
 SAMPLES = 1000
-"""Steps that are looked at."""
+"""Number of steps examined."""
 
 SUMS = {ca.OP_ADD, ca.OP_SUB}
 SAME = {ca.OP_NEG, ca.OP_FABS}
@@ -192,7 +194,7 @@ PRODUCTS = {ca.OP_MUL, ca.OP_DIV}
 
 
 def terms(block: Block) -> ca.Function:
-    """(state, param, in) of a step -> the magnitudes of its states and outputs, a column."""
+    """Return (state, param, in) of a step -> the magnitudes of its states and outputs, a column."""
     source = graph(block.step)
     arguments = [ca.SX.sym("x", len(g)) for g in (block.states, block.parameters, block.inputs)]
     everything = Graph(source.nodes, (tuple(range(len(source.nodes))),))
@@ -209,7 +211,9 @@ def terms(block: Block) -> ca.Function:
 def _found(
     source: Graph, values: Sequence[ca.SX], results: Sequence[int], passes: AbstractSet[int]
 ) -> dict[int, ca.SX]:
-    """Magnitudes of the nodes between `results` and what does not pass on those of its parts."""
+    """Return magnitudes of the nodes between `results` and nodes that do not pass on their
+    terms.
+    """
     reached = set(results)
     for i in reversed(range(len(source.nodes))):
         if i in reached and source.nodes[i].op in passes:
@@ -226,7 +230,7 @@ def _found(
 
 
 def _passed(op: int, own: Sequence[ca.SX], m: Sequence[ca.SX]) -> ca.SX:
-    """The magnitude of an operation on numbers `own` of the magnitudes `m`."""
+    """Return the magnitude of an operation on numbers `own` of the magnitudes `m`."""
     if op == SELECT:
         return ca.if_else(own[0], m[1], m[2])
     if op in SUMS:
@@ -243,9 +247,9 @@ def _passed(op: int, own: Sequence[ca.SX], m: Sequence[ca.SX]) -> ca.SX:
 def magnitudes(
     of: ca.Function, block: Block, states: Array, parameters: Array, inputs: Array
 ) -> Array:
-    """The largest magnitude of every state and output over some steps, shape (states + outputs,).
+    """Return the largest magnitude of every state and output over some steps.
 
-    Of states at least the nominal value.
+    The shape is (states + outputs,); states have at least the nominal value.
 
     Args:
         of: `terms` of the block.
@@ -260,20 +264,20 @@ def magnitudes(
 
 
 STRETCH = 100
-"""Steps of one kind of motion, or of load, in a row."""
+"""Number of consecutive steps with one type of motion, or of load."""
 
 LOADS = (1.0, 10.0, 0.1, 1.5, 0.0, 1.0, 1e-3, 6.0, 0.5, 0.0, 100.0, 1.0)
-"""Of a load, in units of its nominal value, in a random order: it jumps, and is gone."""
+"""Loads in units of the nominal value, in a random order with jumps and zeros."""
 
 BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, -1e9, 1e-310, -1.0)
-"""In the place of an input, in units of its nominal value."""
+"""Bad values of an input, in units of its nominal value."""
 
 
 def excitation(block: Block, steps: int) -> Array:
-    """Valid inputs of every step, shape (steps, inputs), the same at each call.
+    """Return valid inputs of every step, shape (steps, inputs), the same at each call.
 
-    An input with a lower bound of 0 or more, such as a load, wavers about levels between which it
-    jumps by factors up to 1e5, zero among them; the others see in turn, in units of their nominal
+    An input with a lower bound of 0 or more, such as a load, fluctuates about levels between which
+    it jumps by factors up to 1e5, including zero; the others get in turn, in units of their nominal
     value, slow sines, bursts up to 2, tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt
     reversals. All stay within their bounds.
     """
@@ -306,7 +310,7 @@ def _within(variable: Variable, values: Array) -> Array:
 
 
 def spoiled(block: Block, inputs: Array) -> Array:
-    """The same inputs with what is not finite or out of range in a twentieth of the places."""
+    """Return the inputs with a twentieth of the values not finite or out of range."""
     random = np.random.default_rng(1)
     nominal = np.array([v.nominal for v in block.inputs])
     bad = random.choice(BAD, inputs.shape) * nominal
@@ -314,10 +318,10 @@ def spoiled(block: Block, inputs: Array) -> Array:
 
 
 def varied(block: Block, steps: int, longest: float) -> Array:
-    """Parameters of every step, shape (steps, parameters), that stay for `STRETCH` of them.
+    """Return parameters of every step, shape (steps, parameters), constant over `STRETCH` steps.
 
     The step size passes through three decades up to `longest` times its default, the others through
-    +-20 %, or from 0 to a tenth where they are 0, within their bounds.
+    +-20 %, or from 0 to a tenth if they are 0, within their bounds.
     """
     random = np.random.default_rng(2)
     stretches = -(-steps // STRETCH)

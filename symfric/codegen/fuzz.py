@@ -1,14 +1,14 @@
-"""Random steps of guarded C under sanitizers: nothing dies, and what is valid is not altered.
+"""Random steps of guarded C under sanitizers: no crash, and no change of valid data.
 
-The program makes its inputs itself. In three steps of four they are valid (the ends of their
-ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s among them); in the others an input, a
-parameter or a state is NaN, infinite, huge, denormal or negative. Of every step is demanded:
+The program generates its own inputs. In three steps of four they are valid (including the ends of
+their ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s); in the others an input, a
+parameter or a state is NaN, infinite, huge, denormal or negative. For every step it checks that
 
-    outputs are finite (a state that is not is found by the next step, which says so),
-    the status is what the ranges of inputs, parameters and states before the step say, and
-    where that is 0, all bits are those of the same step generated without guards.
+    outputs are finite (a state that is not is detected by the next step),
+    the status agrees with the ranges of inputs, parameters and states before the step, and
+    if it is 0, all bits are those of the same step generated without guards.
 
-The last resort, an output that is not finite with the default parameters, is counted.
+The replacement of an output that is not finite with the default parameters is counted.
 """
 
 from collections.abc import Sequence
@@ -45,11 +45,11 @@ class Fuzzed:
         valid: steps with a status of 0; their bits were compared.
         repaired: steps with another status.
         altered: valid steps whose bits are not those of the C without guards.
-        unflagged: steps whose status is not what it must be.
+        unflagged: steps with a wrong status.
         unfinished: steps after which an output is not finite.
         last_resort: steps with default parameters in which an output was not finite and has been
-            replaced by 0; with others, such as mu_s = 0, an output may have no value.
-        report: what a sanitizer said, "" for nothing.
+            replaced by 0; with others, such as mu_s = 0, an output may be undefined.
+        report: output of a sanitizer, "" if empty.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Fuzzed:
 
     @property
     def ok(self) -> bool:
-        """Nothing died, nothing was silent and nothing valid was touched."""
+        """True if there was no crash, no missing status and no change of valid data."""
         return not (self.altered or self.unflagged or self.unfinished or self.report)
 
 
@@ -74,7 +74,7 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
 
     Raises:
         ValueError: an unknown type, no steps.
-        CompileError: the compiler refuses the C, or has no sanitizers.
+        CompileError: the compiler rejects the C, or has no sanitizers.
     """
     checks.choice("fuzz: real", real, REALS)
     checks.count("fuzz: steps", steps, least=1)
@@ -101,7 +101,7 @@ DEFAULT = "memcpy(param, &{0}_default, sizeof {0}_default);"
 
 
 def _program(block: Block, bare: Block, real: Real) -> str:
-    """The program, with calls and ranges of the block in it."""
+    """Return the program, with calls and ranges of the block in it."""
     inputs = [range_of(v) for v in block.inputs]
     parameters = [parameter_range(v) for v in block.parameters]
     used = _used(block)
@@ -136,7 +136,7 @@ def _program(block: Block, bare: Block, real: Real) -> str:
 
 
 def _used(block: Block) -> set[tuple[int, int]]:
-    """(argument, row) of the numbers that a step depends on."""
+    """Return (argument, row) of the numbers that a step depends on."""
     return {node.entry for node in graph(block.step).nodes if node.op == ca.OP_INPUT}
 
 
@@ -146,7 +146,7 @@ def _column(name: str, values: Sequence[float], real: Real) -> str:
 
 
 def _call(block: Block, real: Real, *, guards: bool) -> str:
-    """Statements that copy the numbers into structs, call a step, and copy them back."""
+    """Return statements that copy the numbers into structs, call a step, and copy them back."""
     groups, name = members(block), prefix(block, real)
     short = {group: letter for group, letter in zip(GROUPS, "spuy", strict=True) if group in groups}
     pointers = {group: f"&{letter}" for group, letter in short.items()}

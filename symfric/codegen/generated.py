@@ -1,4 +1,4 @@
-"""The files of a block: header and source of each floating point type, and the kit round them."""
+"""Files of a block: header and source of each floating point type, and the export package."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -32,12 +32,12 @@ class Generated:
     """Files that `generate` wrote.
 
     Attributes:
-        block: what the C computes.
-        folder: where the files are.
+        block: source of the C.
+        folder: of the files.
         reals: floating point types, by name.
         files: all files, the manifest last.
         manifest: content of NAME_manifest.json.
-        guards: whether the C has guards, see `symfric.codegen.guards`.
+        guards: True if the C has guards, see `symfric.codegen.guards`.
     """
 
     block: Block
@@ -48,11 +48,11 @@ class Generated:
     guards: bool = True
 
     def header(self, real: str) -> Path:
-        """The header file of the type `real`."""
+        """Return the header file of the type `real`."""
         return self.folder / f"{prefix(self.block, REALS[real])}.h"
 
     def source(self, real: str) -> Path:
-        """The source file of the type `real`."""
+        """Return the source file of the type `real`."""
         return self.folder / f"{prefix(self.block, REALS[real])}.c"
 
 
@@ -71,13 +71,13 @@ def generate(
 ) -> Generated:
     """Write a friction law, or any block, as C99.
 
-    For each type `NAME_f64.h`, whose head is the data sheet, and `NAME_f64.c` (float: `f32`), and
-    what makes a kit of them: test vectors and a unit test in C (`NAME_f64_test.c`, `..._vectors.h`,
-    `.csv`), `CMakeLists.txt` and `NAME_block.cmake`, a loader for Python without symfric
-    (`NAME_ctypes.py`), an S-function for Simulink (`NAME_sfun.c`) and `NAME_manifest.json` with
-    meanings, units, ranges, hashes, operation counts and, where there is a compiler, sizes and
+    The files for each type are `NAME_f64.h`, with the data sheet at its head, and `NAME_f64.c`
+    (float: `f32`). The export package adds test vectors and a unit test in C (`NAME_f64_test.c`,
+    `..._vectors.h`, `.csv`), `CMakeLists.txt` and `NAME_block.cmake`, a loader for Python without
+    symfric (`NAME_ctypes.py`), an S-function for Simulink (`NAME_sfun.c`) and `NAME_manifest.json`
+    with meanings, units, ranges, hashes, operation counts and, if there is a compiler, sizes and
     stack. All names but CMakeLists.txt, which is the same for all, begin with that of the block, so
-    that several kits may share a folder and a program.
+    that several packages may share a folder and a program.
 
     The C allocates nothing, includes only math.h, stdbool.h and, for the guards, stdint.h and
     string.h, has no data but constants, and compiles without warnings under -Wall -Wextra
@@ -85,21 +85,21 @@ def generate(
 
     Args:
         law: a friction law, see `law_block`; a population, see `contact_block`; or a block.
-        out: folder, made where it is missing; files of the same names are replaced.
+        out: folder, created if missing; files of the same names are replaced.
         name: C identifier; default the name of the law.
         real: "double", "float" or both.
         h: step size [s] as a constant instead of a parameter (laws with states).
         free, fold: parameters that stay variable at run time, or become constants, see `law_block`;
-            by default they are fields of a struct with a constant default beside it. Those of a
+            by default they are fields of a struct, with a constant struct of defaults. Those of a
             population are constants.
-        turning: the law is that of a contact that turns: rad/s and N m in its texts.
-        guards: clamp inputs to their ranges, repair what is not finite, and return a status that
-            says so; see `symfric.codegen.guards`. What is valid is not changed by a bit.
-        kit: False leaves sources and manifest, without sizes.
+        turning: True for a contact that turns: rad/s and N m in its texts.
+        guards: clamp inputs to their ranges, repair values that are not finite, and report it in a
+            status; see `symfric.codegen.guards`. Valid values are not changed by a bit.
+        kit: False writes only sources and manifest, without sizes.
 
     Raises:
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a number
-            outside the range of float (a computed one below it becomes the smallest that is not 0).
+            outside the range of float (a computed one below it becomes the smallest nonzero one).
     """
     several = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
     check_names("codegen: real", several, REALS)
@@ -113,7 +113,7 @@ def generate(
     reals = [REALS[n] for n in names]
     for one in reals:
         for value in block.constants.values():
-            one.literal(value)  # refuses what would be rounded to 0 or infinity
+            one.literal(value)  # raises an error if rounded to 0 or infinity
     texts: dict[str, str] = {}
     for one in reals:
         texts[f"{prefix(block, one)}.h"] = header(block, one, guards)
@@ -129,10 +129,10 @@ def generate(
 
 
 def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> Generated:
-    """The same with what was measured on other cores in its manifest, also in the file.
+    """Add measurements on other cores to the manifest, also in the file.
 
     Args:
-        measured: of each core and type what `symfric.embedded` found, as `Measured.to_dict`.
+        measured: results of `symfric.embedded` for each core and type, as `Measured.to_dict`.
     """
     if not measured:
         return generated
@@ -142,7 +142,7 @@ def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> G
 
 
 def _measured(block: Block, reals: Sequence[Real], folder: Path) -> dict[str, dict[str, Any]]:
-    """Sizes and stack by type, as the compiler of this machine makes them, if it has one."""
+    """Return sizes and stack by type from the compiler of this machine, if it has one."""
     compiler = find_compiler()
     if compiler is None:
         return {}
@@ -150,14 +150,14 @@ def _measured(block: Block, reals: Sequence[Real], folder: Path) -> dict[str, di
     for real in reals:
         try:
             sizes = footprint(block, real, folder, compiler)
-        except CompileError:  # one that cannot compile makes no sizes; `verify` says why
+        except CompileError:  # no sizes without a working compiler; `verify` reports why
             continue
         found[real.name] = {"measured": {"compiler": str(compiler), **sizes.to_dict()}}
     return found
 
 
 def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
-    """The block of a law with the `options` that were given, all of which must apply."""
+    """Return the block of a law with the given `options`, all of which must apply."""
     allowed = ("name", "h", "free", "fold", "turning")
     what = "a law"
     if isinstance(law, Block):
@@ -179,11 +179,11 @@ def manifest(
     texts: Mapping[str, str],
     measured: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Content of NAME_manifest.json.
+    """Return the content of NAME_manifest.json.
 
     Args:
-        texts: files of the kit and their content.
-        measured: by type, sizes and stack that a compiler made, empty where none did.
+        texts: files of the package and their content.
+        measured: by type, sizes and stack from a compiler, empty without one.
     """
     return {
         "name": block.name,
@@ -224,7 +224,7 @@ def manifest(
 
 
 def _variable(variable: Variable, start: str, within: Range | None) -> dict[str, Any]:
-    """Meaning, unit and range; of what guards watch the range that they keep."""
+    """Return meaning, unit and range; for guarded variables the range that guards enforce."""
     low, high = (variable.lower, variable.upper) if within is None else (within.low, within.high)
     return {
         "name": variable.name,

@@ -1,10 +1,10 @@
 """Guards in generated C: invalid inputs never crash a step, and always set a bit of its status.
 
     inputs       outside their range: clamped to it; not finite: their start value, a safe one
-    step size    as inputs, the default in place of what is not finite
+    step size    as inputs, the default in place of values that are not finite
     states       beyond `HUGE` times their nominal value, or not finite: all restart
     parameters   outside their ranges: the default set is used
-    outputs      not finite after all that: 0, and all states restart
+    outputs      still not finite: 0, and all states restart
 
 A bit of the status that a step returns (`Status`) reports each change; a number within its range is
 not changed, nor is a state that is too large for the present load, such as a bristle after the load
@@ -28,22 +28,22 @@ from symfric.emitter.c99 import Real
 from symfric.foundation.parameters import Variable
 
 WIDE = 1e6
-"""An input without bounds is clamped to this many times its nominal value."""
+"""Limit of an input without bounds, relative to its nominal value."""
 
 HUGE = 1e10
-"""A state of more than this many times its nominal value is none of a machine."""
+"""Limit of a state, relative to its nominal value, beyond which it is invalid."""
 
 SHORTEST, LONGEST = 1e-9, 1e3
 """Range of a step size that is a parameter [s]."""
 
 TOP = 1e30
-"""No range ends beyond: squares of half of it are numbers in float."""
+"""Largest bound of a range: squares of half of it are finite in float."""
 
 STEP_SIZE = "h"
 
 
 class Status(IntFlag):
-    """Bits for what a step repaired; 0 if nothing."""
+    """Status bits for repairs by a step; 0 if there are none."""
 
     CLAMPED = 1
     NOT_FINITE = 2
@@ -72,9 +72,9 @@ class Range:
 
 
 def range_of(variable: Variable) -> Range:
-    """The range of an input: its bounds, `WIDE` times its nominal value where it has none.
+    """Return the range of an input: its bounds, by default `WIDE` times its nominal value.
 
-    The safe value is its start value, 0 unless the model says otherwise.
+    The safe value is its start value, by default 0.
     """
     wide = WIDE * variable.nominal
     start = float(variable.start)
@@ -82,7 +82,7 @@ def range_of(variable: Variable) -> Range:
 
 
 def parameter_range(variable: Variable) -> Range:
-    """The range of a parameter: its bounds, `WIDE` times its default where it has none.
+    """Return the range of a parameter: its bounds, by default `WIDE` times its default.
 
     The step size h has `SHORTEST` ... `LONGEST`. A default is always within its range.
     """
@@ -101,12 +101,12 @@ def _range(variable: Variable, low: float, high: float, safe: float) -> Range:
 
 
 def state_limit(variable: Variable) -> float:
-    """The magnitude beyond which a state counts as lost."""
+    """Return the magnitude beyond which a state is invalid."""
     return min(HUGE * max(variable.nominal, abs(float(variable.start))), TOP)
 
 
 def constants(block: Block, real: Real) -> str:
-    """The bits of the status as macros for the header."""
+    """Return the bits of the status as macros for the header."""
     stem = prefix(block, real).upper()
     kinds = [s for s in Status if block.states or s != Status.STATE]
     kinds = [s for s in kinds if block.parameters or s != Status.PARAMETER]
@@ -120,12 +120,12 @@ def constants(block: Block, real: Real) -> str:
 
 
 def bit(block: Block, real: Real, status: Status) -> str:
-    """The macro of one bit."""
+    """Return the macro of one bit."""
     return f"{prefix(block, real).upper()}_{status.name}"
 
 
 def helpers(block: Block, real: Real, text: str) -> str:
-    """The static functions that `text`, the guarded functions of a block, calls."""
+    """Return the static functions that `text`, the guarded functions of a block, calls."""
     name = prefix(block, real)
     own = {"unfit": _unfit(block, real), "lost": _lost(block, real)}
     general = filled(
@@ -147,7 +147,7 @@ def helpers(block: Block, real: Real, text: str) -> str:
 
 
 def _outside(name: str, real: Real, place: str, low: float, high: float) -> str:
-    """The condition that the number at `place` is outside its range, or NaN."""
+    """Return the condition that the number at `place` is outside its range, or NaN."""
     least, most = real.literal(low), real.literal(high)
     if low >= 0.0:
         return f"{name}_outside({place}, {least}, {most})"
@@ -158,7 +158,7 @@ def _outside(name: str, real: Real, place: str, low: float, high: float) -> str:
 
 
 def mended(block: Block, real: Real, variable: Variable, group: str, status: str) -> list[str]:
-    """Statements that bring a local, an input or the step size, into its range.
+    """Return statements that bring a local, an input or the step size, into its range.
 
     Args:
         group: "in" or "param".
@@ -179,7 +179,7 @@ def mended(block: Block, real: Real, variable: Variable, group: str, status: str
 
 
 def fit_parameters(block: Block, real: Real, status: str) -> list[str]:
-    """Statements that put the default parameters in the place of those that are out of range."""
+    """Return statements that use the default parameters if one is out of range."""
     name = prefix(block, real)
     if all(v.name == STEP_SIZE for v in block.parameters):
         return []
@@ -192,7 +192,7 @@ def fit_parameters(block: Block, real: Real, status: str) -> list[str]:
 
 
 def found_states(block: Block, real: Real, status: str) -> list[str]:
-    """Statements that let the states restart if one of them is lost."""
+    """Return statements that restart all states if one of them is invalid."""
     if not block.states:
         return []
     name = prefix(block, real)
@@ -205,7 +205,7 @@ def found_states(block: Block, real: Real, status: str) -> list[str]:
 
 
 def finite_outputs(block: Block, real: Real, status: str) -> list[str]:
-    """Statements that put 0 in the place of outputs that are not finite."""
+    """Return statements that replace outputs that are not finite by 0."""
     name, said = prefix(block, real), _said(block, real, Status.OUTPUT, status)
     most = real.literal(float(np.finfo(real.kind).max))
     if block.is_function:
@@ -226,33 +226,33 @@ def finite_outputs(block: Block, real: Real, status: str) -> list[str]:
 
 
 def _said(block: Block, real: Real, kind: Status, status: str) -> str:
-    """The statement that adds a bit to the status that a pointer shows."""
+    """Return the statement that adds a bit to the status that a pointer shows."""
     place = status.removeprefix("&") if status.startswith("&") else f"*{status}"
     return f"{place} |= {bit(block, real, kind)};"
 
 
 def _unfit(block: Block, real: Real) -> str:
-    """The function that tells whether a parameter is out of its range."""
+    """Return the function that is true if a parameter is out of its range."""
     name = prefix(block, real)
     ranges = {v.name: parameter_range(v) for v in block.parameters}
     limits = [ranges[v.name] for v in block.parameters]
     rows = [m for m in members(block).get("param", ()) if m.name != STEP_SIZE]
     conditions = [(m, [(r.low, r.high) for r in limits[m.first : m.first + m.count]]) for m in rows]
     return _any(
-        f"/* Whether a parameter is outside its range. */\n"
+        f"/* Returns true if a parameter is outside its range. */\n"
         f"static bool {name}_unfit(const {name}_param_t *param)",
         name, real, "param", conditions,
     )  # fmt: skip
 
 
 def _lost(block: Block, real: Real) -> str:
-    """The function that tells whether a state is no number of a machine."""
+    """Return the function that is true if a state is invalid."""
     name = prefix(block, real)
     limits = [state_limit(v) for v in block.states]
     rows = members(block).get("state", ())
     conditions = [(m, [(-x, x) for x in limits[m.first : m.first + m.count]]) for m in rows]
     return _any(
-        f"/* Whether a state is absurd or not finite. */\n"
+        f"/* Returns true if a state is absurd or not finite. */\n"
         f"static bool {name}_lost(const {name}_state_t *state)",
         name, real, "state", conditions,
     )  # fmt: skip
@@ -265,7 +265,9 @@ def _any(
     group: str,
     rows: Sequence[tuple[Member, Sequence[tuple[float, float]]]],
 ) -> str:
-    """A function that is true if one of the members is outside its range; arrays by loops."""
+    """Return a function that is true if one of the members is outside its range; loops for
+    arrays.
+    """
     single: list[str] = []
     loops: list[str] = []
     for member, ranges in rows:

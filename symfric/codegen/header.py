@@ -1,4 +1,4 @@
-"""The header file of a block: its data sheet, structs and prototypes."""
+"""Header file of a block: its data sheet, structs and prototypes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
@@ -12,19 +12,19 @@ from symfric.emitter.c99 import Real
 from symfric.foundation.parameters import Variable
 
 MEANING = {
-    "state": "States: what a step remembers; one struct for each contact or joint.",
-    "param": "Parameters: may be changed between any two steps.",
+    "state": "States, kept between steps; one struct for each contact or joint.",
+    "param": "Parameters, which may be changed between steps.",
     "in": "Inputs of a step.",
     "out": "Outputs of a step.",
 }
-"""Of the structs."""
+"""Comments of the structs."""
 
 NARROW = 30
-"""Columns that a comment beside a member has at least."""
+"""Least width of a comment next to a member [columns]."""
 
 
 def header(block: Block, real: Real, guards: bool = True) -> str:
-    """Text of the header file; raises as `routines`."""
+    """Return the text of the header file; raises as `routines`."""
     name = prefix(block, real)
     guard = f"{name.upper()}_H"
     structs = "".join(
@@ -54,7 +54,7 @@ def _variables(block: Block, group: str) -> Sequence[Variable]:
 
 
 def _struct(block: Block, group: str, rows: Sequence[Member], real: Real, guards: bool) -> str:
-    """A struct, every member with its meaning, unit, start or default value, and range."""
+    """Return a struct, every member with its meaning, unit, start or default value, and range."""
     variables, width = _variables(block, group), max(len(row.declared) for row in rows) + 1
     lines = ""
     for row in rows:
@@ -69,7 +69,7 @@ def _struct(block: Block, group: str, rows: Sequence[Member], real: Real, guards
 
 
 def _numbers(group: str, variables: Sequence[Variable], guards: bool) -> Iterator[str]:
-    """Start or default value, where all have the same, and range."""
+    """Yield start or default value, if all are equal, and range."""
     starts = list(dict.fromkeys(f"{float(v.start):g}" for v in variables))
     if starts and group in ("state", "param"):
         shown = starts if len(starts) < 2 else [starts[0], "...", starts[-1]]
@@ -79,11 +79,11 @@ def _numbers(group: str, variables: Sequence[Variable], guards: bool) -> Iterato
 
 
 def _declared(block: Block, name: str) -> str:
-    """Declarations of the default parameters and of the start values."""
+    """Return declarations of the default parameters and of the start values."""
     found = ""
     if block.parameters:
         found += (
-            f"/* To be copied, and changed. */\nextern const {name}_param_t {name}_default;\n\n"
+            f"/* Default parameters to copy. */\nextern const {name}_param_t {name}_default;\n\n"
         )
     if block.states:
         found += f"/* Start values of the model. */\nextern const {name}_state_t {name}_start;\n\n"
@@ -91,7 +91,7 @@ def _declared(block: Block, name: str) -> str:
 
 
 def sheet(block: Block, guards: bool) -> Iterator[str]:
-    """The data sheet, line by line."""
+    """Return the data sheet, line by line."""
     yield from ["", *(line for text in block.doc.splitlines() for line in _wrapped(text))]
     yield from _section("Equations", block.equations.splitlines())
     yield from _section("Discretisation", _lines(block.discretisation))
@@ -115,7 +115,7 @@ def _wrapped(text: str, room: int = WIDTH - 3) -> list[str]:
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Sentences wrapped, formulas, which are indented, as they stand."""
+    """Yield sentences wrapped; indented formulas are unchanged."""
     for line in text.splitlines():
         yield from [line] if line.startswith(" ") else _wrapped(line, WIDTH - 7)
 
@@ -128,12 +128,12 @@ def _list(texts: Sequence[str]) -> Iterator[str]:
 
 
 def _sample_time(block: Block) -> str:
-    """Text about the step size and where it is set."""
+    """Return the text about the step size and its setting."""
     h = block.sample_time
     if h is None:
         return ""
     if "h" in block.constants:
-        return f"h = {h:g} s, a constant of this code: call it at this interval and no other."
+        return f"h = {h:g} s, a constant of this code: call it at exactly this interval."
     return (
         f"h, a parameter, {h:g} s by default: set it to the interval at which the code is called. "
         "It may change from step to step."
@@ -141,7 +141,7 @@ def _sample_time(block: Block) -> str:
 
 
 def _guards(block: Block) -> list[str]:
-    """Sentences about the repair of invalid numbers, and its report."""
+    """Return sentences about the repair of invalid numbers, and its report."""
     safe = ", ".join(f"{v.name} = {range_of(v).safe:g}" for v in block.inputs)
     found = [f"Inputs outside their range are clamped to it; not finite ones are replaced: {safe}."]
     if block.states:
@@ -150,12 +150,12 @@ def _guards(block: Block) -> list[str]:
         found.append("If a parameter is outside its range, the default set is used for this step.")
     if any(v.name == "h" for v in block.parameters):
         found.append("A step size outside its range is clamped to it.")
-    found.append("Whatever a guard changes sets a bit of the status; what is valid is not changed.")
+    found.append("Every change by a guard sets a bit of the status; valid numbers are not changed.")
     return found if block.inputs else found[1:]
 
 
 def _constants(block: Block) -> Iterator[str]:
-    """The numbers that were folded into the formulas, a line each."""
+    """Yield the numbers folded into the formulas, a line each."""
     texts = {name: f"{name} = {value:g}" for name, value in block.constants.items()}
     width = max(map(len, texts.values()), default=0)
     about = {"h": "step size [s]"} | dict(block.about)
@@ -164,22 +164,22 @@ def _constants(block: Block) -> Iterator[str]:
 
 
 def _inputs(block: Block, guards: bool) -> Iterator[str]:
-    """Meaning, unit and range of the arguments of a function, a line each."""
+    """Yield meaning, unit and range of the arguments of a function, a line each."""
     width = max((len(v.name) for v in block.inputs), default=0)
     for v in block.inputs:
         yield f"{v.name:<{width}}  {meaning(v.doc, v.unit, interval([v], 'in', guards))}"
 
 
 def meaning(doc: str, unit: str, *more: str) -> str:
-    """Meaning of a number, its unit, and further texts."""
+    """Return the meaning of a number, its unit, and further texts."""
     return ", ".join(text for text in (f"{doc} [{unit}]".strip(), *more) if text)
 
 
 def interval(variables: Sequence[Variable], group: str, guards: bool) -> str:
-    """The closed interval in which each of some variables is valid; "" for all numbers.
+    """Return the closed interval in which each of some variables is valid; "" for all numbers.
 
     Args:
-        group: "state", "param" or "in"; guards keep the latter two within.
+        group: "state", "param" or "in"; guards enforce the latter two.
     """
     ends = [_ends(v, group, guards) for v in variables]
     low, high = max(low for low, _ in ends), min(high for _, high in ends)

@@ -1,8 +1,8 @@
-"""The kit round the C of a block: proof for the target, build files, wrappers for other tools.
+"""Export package of a block: unit test, build files, wrappers for other tools.
 
-A unit test in plain C repeats the proof on the machine where the code will run, with its test
-vectors as a header and as CSV; CMake builds libraries and tests; a Python loader and a Simulink
-S-function call the C. Their fixed text is in `templates`.
+A unit test in plain C verifies the code on its target machine, with test vectors as a header and as
+CSV; CMake builds libraries and tests; a Python loader and a Simulink S-function call the C. Their
+fixed text is in `templates`.
 """
 
 import csv
@@ -31,7 +31,7 @@ from symfric.codegen.vectors import BASE, PARAMETER_SHARE, ROUNDINGS, Vectors, v
 from symfric.emitter.c99 import Real
 
 EXPLAINED = """\
-A number passes if it differs from what CasADi computed in double precision by no more than its
+A number passes if it differs from the result of CasADi in double precision by no more than its
 tolerance: {base:g} of the peak of its signal over all rows, for the rounding of a few operations,
 of the functions of math.h and of fused multiply-add, which differ between compilers and targets; or
 {roundings:g} times what rounding to this type changes in nine of ten rows, where that is more,
@@ -39,7 +39,7 @@ as in differences of large numbers."""
 
 
 def kit_files(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, str]:
-    """Texts of the files beside header and source, by file name."""
+    """Return the texts of the files besides header and source, by file name."""
     texts: dict[str, str] = {}
     for real in reals:
         stem, rows = prefix(block, real), vectors(block, real, guards)
@@ -54,10 +54,10 @@ def kit_files(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, st
 
 
 def unit_test(block: Block, real: Real, guards: bool) -> str:
-    """Text of NAME_test.c.
+    """Return the text of NAME_test.c.
 
     The function returns the number of wrong results and needs neither stdio nor memory of its own;
-    with NAME_TEST_PRINT it prints them, with NAME_TEST_NO_MAIN it leaves `main` to others.
+    with NAME_TEST_PRINT it prints them, with NAME_TEST_NO_MAIN it has no `main`.
     """
     name = prefix(block, real)
     lines = declarations(block, real) + ["unsigned int status = 0u;"] * guards
@@ -82,7 +82,7 @@ def unit_test(block: Block, real: Real, guards: bool) -> str:
 
 
 def _body(block: Block, real: Real, guards: bool) -> list[str]:
-    """One row: numbers in, a step, numbers out."""
+    """Return the statements of one row: numbers in, a step, numbers out."""
     name = prefix(block, real)
     states, inputs, outputs = (fields(block, group) for group in ("state", "in", "out"))
     lines = [f"{place} = vector->state[{i}];" for i, place in enumerate(states)]
@@ -103,7 +103,7 @@ def _body(block: Block, real: Real, guards: bool) -> list[str]:
 
 
 def _resets(block: Block, real: Real, guards: bool) -> list[str]:
-    """The further initialisations, from the inputs of a row that are not bad."""
+    """Return the further initialisations, from the valid inputs of a row."""
     if not block.resets:
         return []
     name, lines = prefix(block, real), list[str]()
@@ -119,7 +119,7 @@ def _resets(block: Block, real: Real, guards: bool) -> list[str]:
 
 
 def vector_header(found: Vectors, guards: bool) -> str:
-    """Text of NAME_vectors.h: the rows as constant arrays."""
+    """Return the text of NAME_vectors.h: the rows as constant arrays."""
     block, real = found.block, found.real
     name, count = prefix(block, real), len(found.steps)
     sizes = {"state": len(block.states), "in": len(block.inputs)}
@@ -147,7 +147,7 @@ def vector_header(found: Vectors, guards: bool) -> str:
     texts = [
         *banner(block, f"{name}_vectors.h"),
         "",
-        "Steps of their own: the states before, the inputs, one parameter that is changed (by",
+        "Independent steps: the states before, the inputs, one parameter that is changed (by",
         f"{PARAMETER_SHARE:.0%} of its default) or none, and the states after and the outputs.",
         f"States: {order}.",
         "",
@@ -166,13 +166,13 @@ def vector_header(found: Vectors, guards: bool) -> str:
 
 
 def results(block: Block) -> dict[str, int]:
-    """Arrays of results in a row and how many numbers they hold."""
+    """Return arrays of results in a row and their sizes."""
     states = len(block.states)
     return {"next": states, "out": len(block.outputs), "reset": states * len(block.resets)}
 
 
 def _rows(found: Vectors, guards: bool) -> list[str]:
-    """Each row as the initialiser of a struct."""
+    """Return each row as the initialiser of a struct."""
     real, steps, lines = found.real, found.steps, list[str]()
     ends = np.cumsum([0, *results(found.block).values()])
     for k in range(len(steps)):
@@ -187,7 +187,7 @@ def _rows(found: Vectors, guards: bool) -> list[str]:
 
 
 def vector_table(found: Vectors, guards: bool) -> str:
-    """The same rows as CSV, for other tools: columns with names and units."""
+    """Return the same rows as CSV, for other tools: columns with names and units."""
     block = found.block
     names = [v.name for v in block.parameters]
     head = [f"{v.name} before [{v.unit}]" for v in block.states]
@@ -212,14 +212,14 @@ def vector_table(found: Vectors, guards: bool) -> str:
 
 
 def _tolerance_row(found: Vectors, width: int, guards: bool) -> list[str]:
-    """The second row: the tolerance of each result."""
+    """Return the second row: the tolerance of each result."""
     values = [repr(float(x)) for x in found.tolerance]
     empty = width - len(values) - guards
     return ["tolerance", *[""] * (empty - 1), *values, *["0"] * guards]
 
 
 def loader(block: Block, reals: Sequence[Real], guards: bool) -> str:
-    """Text of NAME_ctypes.py: class `Block` with `step`, `run` on arrays and `reset`."""
+    """Return the text of NAME_ctypes.py: class `Block` with `step`, `run` on arrays and `reset`."""
     types = {real.name: prefix(block, real) for real in reals}
     layout = {
         group: [(member.name, member.size) for member in rows]
@@ -252,7 +252,7 @@ def loader(block: Block, reals: Sequence[Real], guards: bool) -> str:
 
 
 def wrapper(block: Block, reals: Sequence[Real], guards: bool) -> str:
-    """Text of NAME_sfun.c; on the type double where it is there, else on float."""
+    """Return the text of NAME_sfun.c, for the type double if available, else float."""
     real = max(reals, key=lambda r: r.size)
     states, count = fields(block, "state"), len(block.states)
     outputs = len(block.outputs) + guards
@@ -284,7 +284,7 @@ def wrapper(block: Block, reals: Sequence[Real], guards: bool) -> str:
 
 
 def _given(block: Block, real: Real) -> list[str]:
-    """Statements that take states, parameters and inputs from Simulink."""
+    """Return statements that get states, parameters and inputs from Simulink."""
     cast = "" if real.size == 8 else f"({real.name})"
     name, lines = prefix(block, real), list[str]()
     for i, place in enumerate(fields(block, "state")):
@@ -305,13 +305,13 @@ def _given(block: Block, real: Real) -> list[str]:
 
 
 def _shown(block: Block, guards: bool) -> list[str]:
-    """Statements that give the outputs, and the status, to Simulink."""
+    """Return statements that pass the outputs, and the status, to Simulink."""
     places = [*fields(block, "out"), *(["status"] if guards else [])]
     return [f"ssGetOutputPortRealSignal(S, {i})[0] = (real_T){p};" for i, p in enumerate(places)]
 
 
 def _about(block: Block, name: str, guards: bool) -> list[str]:
-    """The head of the file: how it is built and what its ports are."""
+    """Return the head of the file: build instructions and ports."""
     ports = [f"{v.name} [{v.unit}]" for v in block.inputs]
     shown = [f"{n} [{o.unit}]" for n, o in block.outputs.items()] + ["status"] * guards
     order = ", ".join(v.name for v in block.parameters) or "none"
@@ -324,7 +324,7 @@ def _about(block: Block, name: str, guards: bool) -> list[str]:
         f"    mex {block.name}_sfun.c {name}.c",
         f"and in the block S-Function the name {block.name}_sfun with the arguments h, []. For a",
         f"build for a target (dSPACE, Speedgoat) add {name} to its S-function modules: sources are",
-        "all that it needs.",
+        "sufficient.",
         f"Arguments: sample time [s].{said}",
         f"    Parameters, [] for the defaults, tunable, in the order {order}.",
         f"Inputs: {', '.join(ports) or 'none'}.",
@@ -337,7 +337,7 @@ def _indented(lines: Sequence[str]) -> str:
 
 
 def cmake(block: Block, reals: Sequence[Real]) -> str:
-    """Text of NAME_block.cmake: a static and a shared library, unit tests, where they can be."""
+    """Return the text of NAME_block.cmake: a static and a shared library, and unit tests."""
     stems = [prefix(block, real) for real in reals]
     tests = [f"{stem}_test" for stem in stems]
     return filled(

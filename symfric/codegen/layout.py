@@ -1,11 +1,11 @@
-"""Names and structs of a block in one floating point type, and pieces of C that files share.
+"""Names and structs of a block in one floating point type, and shared pieces of C.
 
 Names begin with block and type: struct types `NAME_f32_state_t` (likewise param, in, out), default
 parameters `NAME_f32_default`, functions `NAME_f32_init`, `NAME_f32_step`; `f64` for double, so that
-both types live in one program. Nothing is allocated and no data but the constant defaults exist,
-so one block serves any number of joints.
+both types may be used in one program. Nothing is allocated and the only data are the constant
+defaults, so one block serves any number of joints.
 
-Numbers of alike elements that stand next to each other, such as the states F_1 ... F_10, are one
+Numbers of identical elements that are next to each other, such as the states F_1 ... F_10, are one
 array member, `float F[10]`. In memory a struct is the flat column of the block's variables.
 """
 
@@ -27,14 +27,14 @@ from symfric.emitter.rolling import Array
 @final
 @dataclass(frozen=True)
 class Member:
-    """One member of a struct.
+    """Member of a struct.
 
     Attributes:
         name: C identifier.
         unit: of each number.
-        doc: what it is, "" where nobody has said.
+        doc: description, may be "".
         first: row of its first number in the flat struct.
-        size: 0 for a single number, else how many an array holds.
+        size: 0 for a single number, else the length of the array.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Member:
 
     @property
     def declared(self) -> str:
-        """As in a declaration: `F[10]`."""
+        """Declaration, such as `F[10]`."""
         return f"{self.name}[{self.size}]" if self.size else self.name
 
     @property
@@ -55,19 +55,19 @@ class Member:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Its numbers as C writes them: `F[0]`, `F[1]`, ..."""
+        """C expressions of its numbers: `F[0]`, `F[1]`, ..."""
         if not self.size:
             return (self.name,)
         return tuple(f"{self.name}[{i}]" for i in range(self.size))
 
 
 def prefix(block: Block, real: Real) -> str:
-    """Prefix of all names of a block in one type, and of its files."""
+    """Return the prefix of all names of a block in one type, and of its files."""
     return f"{block.name}_{real.suffix}"
 
 
 def members(block: Block) -> dict[str, tuple[Member, ...]]:
-    """Struct -> its members; empty structs are left out."""
+    """Return struct -> its members; empty structs are left out."""
     variables = {"state": block.states, "param": block.parameters, "in": block.inputs}
     flat = {group: [(v.name, v.unit, v.doc) for v in of] for group, of in variables.items()}
     flat["out"] = [(name, output.unit, output.doc) for name, output in block.outputs.items()]
@@ -93,16 +93,16 @@ def _members(block: Block, group: str, rows: Sequence[tuple[str, str, str]]) -> 
 
 
 def places(block: Block, group: str) -> tuple[str, ...]:
-    """The numbers of a struct in the block's order, as C writes them behind `state->`."""
+    """Return the numbers of a struct in the block's order, as C writes them behind `state->`."""
     return tuple(place for member in members(block).get(group, ()) for place in member.places)
 
 
 def indexed(block: Block, results: Sequence[str], guards: bool) -> Arrays:
-    """Arrays that loops may index: those of the structs in the order of `GROUPS`.
+    """Return arrays that loops may index: those of the structs in the order of `GROUPS`.
 
     Args:
         results: the structs that the results of the function are written to.
-        guards: inputs are mended in locals, one by one; no loop may read them past these.
+        guards: True if inputs are repaired in locals, one by one; no loop may read the originals.
     """
     mended = {"in"} if guards else set[str]()
 
@@ -124,18 +124,18 @@ TEMPLATES = Path(__file__).with_name("templates")
 
 
 class _AtTemplate(Template):
-    """Text with places @name, since $ has a meaning in CMake."""
+    """Template with placeholders @name, since $ has a meaning in CMake."""
 
     delimiter = "@"
 
 
 def filled(template: Path, **values: object) -> str:
-    """Text of a template file with a value in each place @name."""
+    """Return the text of a template file with a value in each placeholder @name."""
     return _AtTemplate(template.read_text(encoding="utf-8")).substitute(values)
 
 
 def banner(block: Block, file: str) -> list[str]:
-    """First lines of a file: who made it, and whose it is."""
+    """Return the first lines of a file: generator and licence."""
     return [
         f"{file}: C99 made by symfric {version('symfric')} with CasADi {version('casadi')}, "
         f"model {block.fingerprint}.",
@@ -144,17 +144,17 @@ def banner(block: Block, file: str) -> list[str]:
 
 
 def block_comment(lines: Sequence[str]) -> str:
-    """Lines of text as one comment."""
+    """Return lines of text as one comment."""
     return "/* " + "\n".join(f" * {comment(line)}".rstrip() for line in lines)[3:] + "\n */"
 
 
 def comment(text: str) -> str:
-    """Text that cannot end the comment it stands in."""
+    """Return text that cannot end the comment that contains it."""
     return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def folded(line: str, margin: str) -> str:
-    """A long line broken at blanks, further in than it begins."""
+    """Return a long line broken at blanks, with deeper indentation."""
     margin += " " * (len(line) - len(line.lstrip(" ")))
     return "\n".join(
         wrap(
@@ -169,7 +169,7 @@ def folded(line: str, margin: str) -> str:
 
 
 def number(value: float, real: Real) -> str:
-    """`value` rounded to the type as C: a literal, or a macro of math.h for what is not finite."""
+    """Return `value` rounded to the type as C: a literal, or a macro of math.h if not finite."""
     rounded = float(real.rounded(value))
     if math.isnan(rounded):
         return "NAN"
@@ -179,12 +179,12 @@ def number(value: float, real: Real) -> str:
 
 
 def braces(values: Iterable[float], real: Real) -> str:
-    """Numbers as the initialiser of an array."""
+    """Return numbers as the initialiser of an array."""
     return "{" + ", ".join(number(float(value), real) for value in values) + "}"
 
 
 def declarations(block: Block, real: Real) -> list[str]:
-    """Variables `state`, `param`, `in`, `out` of a step, those that there are."""
+    """Return the declared variables `state`, `param`, `in`, `out` of a step."""
     name = prefix(block, real)
     found = [f"{name}_{group}_t {group};" for group in GROUPS if group in members(block)]
     if block.is_function:
@@ -201,7 +201,7 @@ def called(
     inputs: Sequence[str],
     status: str = "&status",
 ) -> str:
-    """The call of one step.
+    """Return the call of one step.
 
     Args:
         pointers: to each struct, by group.
@@ -216,7 +216,7 @@ def called(
 
 
 def step(block: Block, real: Real, guards: bool) -> list[str]:
-    """The statements of one step on the variables of `declarations`; with guards sets `status`."""
+    """Return the statements of one step on the variables of `declarations`; guards set `status`."""
     call = called(
         block, real, guards, {group: f"&{group}" for group in GROUPS}, fields(block, "in")
     )
@@ -226,7 +226,9 @@ def step(block: Block, real: Real, guards: bool) -> list[str]:
 
 
 def fields(block: Block, group: str) -> list[str]:
-    """The numbers of a group as C writes them: `state.z`, `in.v`, of a function `in[0]`, `out`."""
+    """Return the numbers of a group as C expressions: `state.z`, `in.v`, of a function `in[0]`,
+    `out`.
+    """
     if block.is_function and group == "in":
         return [f"in[{i}]" for i in range(len(block.inputs))]
     if block.is_function and group == "out":

@@ -19,11 +19,11 @@ def _twice(x: Array) -> Array:
 
 
 LACKS = {"erf", "remainder"}
-"""Functions of C99 that NumPy lacks, or means otherwise."""
+"""Functions of C99 that NumPy lacks, or defines differently."""
 NUMPY = {"pow": "power"} | {
     f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")
 }
-"""Functions that NumPy names otherwise than C99."""
+"""Functions with other names in NumPy than in C99."""
 
 OPERATIONS: dict[int, Callable[..., Any]] = {
     ca.OP_ADD: np.add,
@@ -50,7 +50,7 @@ OPERATIONS: dict[int, Callable[..., Any]] = {
         if name not in LACKS
     },
 }
-"""Those of C99 that NumPy has, by CasADi's numbers."""
+"""Functions of C99 that NumPy has, by CasADi's numbers."""
 
 
 def in_type(
@@ -59,18 +59,18 @@ def in_type(
     kind: str,
     random: np.random.Generator | None = None,
 ) -> Array | None:
-    """The results of a function, below each other, with every operation rounded to a type.
+    """Return the results of a function, below each other, with every operation rounded to a type.
 
     Args:
         function: of SX, with dense arguments and results.
         arguments: rows of numbers, shape (rows, size of the argument).
         kind: NumPy's name of the type, such as "f4".
-        random: rounds each result that is not exact up or down by chance, one of the last bits on
-            both sides of it, instead of to the nearest. What differs between runs is rounding.
+        random: rounds each inexact result randomly to one of its two neighbours, instead of to the
+            nearest. Differences between runs are rounding errors.
             Source: Vignes, Mathematics and Computers in Simulation 35 (1993), CESTAC.
 
     Returns:
-        Shape (rows, results), in double; None where NumPy lacks an operation (erf, remainder).
+        Shape (rows, results), in double; None if NumPy lacks an operation (erf, remainder).
     """
     source, found = graph(function), list[Array]()
     count = len(arguments[0])
@@ -95,7 +95,7 @@ def in_type(
 
 
 def _up_or_down(exact: Array, kind: str, random: np.random.Generator) -> Array:
-    """Numbers of the type on a side of each number taken by chance, or the number where it is one.
+    """Return a random neighbour of the type for each number, or the number itself if exact.
 
     The double nearest to a result of an operation on floats stands for the result itself.
     """
@@ -106,25 +106,26 @@ def _up_or_down(exact: Array, kind: str, random: np.random.Generator) -> Array:
 
 
 SAMPLES = 64
-"""Times that a step is done, the first rounded to nearest and the others up or down by chance."""
+"""Repetitions of a step, the first rounded to nearest and the others randomly."""
 
 AT_ONCE = 2048
-"""Steps that are held in memory together."""
+"""Number of steps in memory at once."""
 
 DECISIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
 PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
 
 
 def functions(block: Block) -> list[ca.Function]:
-    """Functions that give the columns of a row: the step and the further initialisations."""
+    """Return the Functions of the columns of a row: the step and the further initialisations."""
     return [block.step, *(block.reset(name) for name in block.resets)]
 
 
 def modes(block: Block) -> NDArray[np.bool_]:
-    """Which columns hold a mode, shape (columns,): a number that only decisions choose.
+    """Return a mask of the columns that hold a mode, shape (columns,): a number from decisions
+    only.
 
-    It is the result of a comparison, or one of some constants and modes that comparisons pick.
-    A state is one if its next value is, in the step and in every initialisation.
+    It is the result of a comparison, or one of some constants and modes selected by comparisons. A
+    state is a mode if its next value is one, in the step and in every initialisation.
     """
     sources, count = [graph(function) for function in functions(block)], len(block.states)
     states = np.ones(count, bool)
@@ -137,7 +138,7 @@ def modes(block: Block) -> NDArray[np.bool_]:
 
 
 def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which rows of the results only decisions choose, where these of the states are modes."""
+    """Return a mask of the rows that only decisions determine, given the states that are modes."""
     found: list[bool] = []
     for node in source.nodes:
         if node.op == ca.OP_INPUT:
@@ -151,13 +152,13 @@ def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDAr
 
 
 def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array | None:
-    """Results of CasADi's operations in float, shape (SAMPLES, steps, columns).
+    """Return results of CasADi's operations in float, shape (SAMPLES, steps, columns).
 
     Args:
         states, parameters, inputs: before and in every step, shape (steps, ...).
 
     Returns:
-        The same at each call; None where NumPy lacks an operation of the block.
+        The same at each call; None if NumPy lacks an operation of the block.
     """
     random, parts = np.random.default_rng(0), list[Array]()
     size = max(1, AT_ONCE // SAMPLES)

@@ -1,4 +1,4 @@
-"""The C functions of a block and the source file that holds them."""
+"""C functions of a block and their source file."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -34,10 +34,10 @@ from symfric.foundation.parameters import Variable
 
 @dataclass(frozen=True)
 class Routine:
-    """One C function.
+    """C function.
 
     Attributes:
-        result: type of what it returns.
+        result: return type.
         calls: function of math.h (double's name) -> number of calls.
         operations: number of operations, calls included.
     """
@@ -52,7 +52,7 @@ class Routine:
 
     @property
     def head(self) -> str:
-        """The prototype without its semicolon."""
+        """Prototype without its semicolon."""
         start = f"{self.result} {self.name}("
         one_line = f"{start}{', '.join(self.arguments)})"
         return (
@@ -61,10 +61,11 @@ class Routine:
 
 
 def routines(block: Block, real: Real, guards: bool = True) -> tuple[Routine, ...]:
-    """The C functions of a block: `_init`, `_reset`, its resets and `_step`, or one of scalars.
+    """Return the C functions of a block: `_init`, `_reset`, its resets and `_step`, or a scalar
+    one.
 
-    With `guards` they return the status of `symfric.codegen.guards`, the function of
-    scalars adds its bits to an argument; without they return nothing and check nothing.
+    With `guards` they return the status of `symfric.codegen.guards`, and a function of scalars adds
+    its bits to an argument; without they return nothing and check nothing.
 
     Raises:
         ValueError: an operation without counterpart in C99, or a constant outside the type.
@@ -74,7 +75,7 @@ def routines(block: Block, real: Real, guards: bool = True) -> tuple[Routine, ..
         (output,) = block.outputs.values()
         (shown,) = block.outputs
         doc = f"{shown} [{output.unit}]: {output.doc}".rstrip(": ") + "."
-        doc += " Sets bits of *status, clears none: begin with 0." if guards else ""
+        doc += " Sets bits of *status and clears none: start with 0." if guards else ""
         ends = f"const {real.name} {shown} = {{}};" if guards else "return {};"
         return (_routine(block, real, name, doc, block.step, [[], [ends]], guards),)
     store = [f"state->{place} = {{}};" for place in places(block, "state")]
@@ -91,11 +92,11 @@ def routines(block: Block, real: Real, guards: bool = True) -> tuple[Routine, ..
 
 
 def _starts(block: Block, real: Real) -> tuple[Routine, Routine]:
-    """`_init` with start values of one's own, `_reset` to those of the model."""
+    """Return `_init` with given start values, `_reset` to those of the model."""
     name = prefix(block, real)
     own, given = f"{name}_state_t *state", f"const {name}_state_t *start"
-    init = "Initial state, such as that of the model; call it before the first step."
-    reset = "The initial state of the model."
+    init = "Sets an initial state, such as that of the model; call it before the first step."
+    reset = "Sets the initial state of the model."
     return (
         Routine(f"{name}_init", "void", (own, given), init, ("*state = *start;",)),
         Routine(f"{name}_reset", "void", (own,), reset, (f"*state = {name}_start;",)),
@@ -152,7 +153,9 @@ def _routine(
 
 
 def _loads(block: Block, real: Real, used: Sequence[tuple[int, int]]) -> list[str]:
-    """Locals with the names of the variables; the arguments of a function of scalars have them."""
+    """Return locals with the names of the variables; a function of scalars has them as
+    arguments.
+    """
     groups = (block.states, block.parameters, block.inputs)
     return [
         f"const {real.name} {groups[i][j].name} = {GROUPS[i]}->{places(block, GROUPS[i])[j]};"
@@ -169,9 +172,9 @@ def _guarded(
     steps: bool,
     status: str,
 ) -> list[str]:
-    """`lines` between guards: inputs, step size, parameters, states, then outputs.
+    """Return `lines` between guards: inputs, step size, parameters, states, then outputs.
 
-    The step size is read before parameters that are out of range give way to the defaults.
+    The step size is read before invalid parameters are replaced by the defaults.
     """
     steered = [(1, j) for j, v in enumerate(block.parameters) if v.name == STEP_SIZE]
     sizes = [entry for entry in used if entry in steered]
@@ -191,11 +194,11 @@ def _guarded(
 
 
 ALIGNED = 30
-"""Width of values whose comments stand in a column."""
+"""Width of values with aligned comments."""
 
 
 def source(block: Block, real: Real, guards: bool = True) -> str:
-    """Text of the source file; raises as `routines`."""
+    """Return the text of the source file; raises as `routines`."""
     name = prefix(block, real)
     functions = routines(block, real, guards)
     called = sorted({call for r in functions for call in r.calls} & set(TRANSCENDENTAL.values()))
@@ -204,7 +207,7 @@ def source(block: Block, real: Real, guards: bool = True) -> str:
         for call in called
     )
     if macros:
-        macros = "/* Define these to put your own, faster functions in. */\n" + macros + "\n"
+        macros = "/* Define these to use your own, faster functions. */\n" + macros + "\n"
     bodies = "\n".join(
         f"{r.head}\n{{\n" + "".join(folded(line, "    ") + "\n" for line in r.statements) + "}\n"
         for r in functions
@@ -223,7 +226,7 @@ def source(block: Block, real: Real, guards: bool = True) -> str:
 
 
 def _defaults(block: Block, real: Real) -> str:
-    """The constants: default parameters and start values."""
+    """Return the constants: default parameters and start values."""
     name = prefix(block, real)
     return _constant(f"{name}_param_t {name}_default", "param", block.parameters, block, real) + (
         _constant(f"{name}_state_t {name}_start", "state", block.states, block, real)
@@ -233,7 +236,9 @@ def _defaults(block: Block, real: Real) -> str:
 def _constant(
     declared: str, group: str, variables: Sequence[Variable], block: Block, real: Real
 ) -> str:
-    """A constant struct with the start value of every variable; arrays in braces of their own."""
+    """Return a constant struct with the start value of every variable; arrays in their own
+    braces.
+    """
     if not variables:
         return ""
     rows: list[tuple[str, str]] = []

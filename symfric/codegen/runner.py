@@ -1,7 +1,7 @@
-"""Compiling generated C, and running a block on the same inputs as C and in CasADi's VM.
+"""Compilation of generated C, and runs of a block in C and in CasADi's VM on the same inputs.
 
-Both give one row a step: the states after it, the outputs, the states that each reset would make of
-the inputs, and with guards the status.
+Both give one row per step: the states after it, the outputs, the states of each reset for the
+inputs, and with guards the status.
 """
 
 import shutil
@@ -31,14 +31,14 @@ WARNINGS = tuple(
 )
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
-"""Without contraction to fused multiply-add the C has the bits of CasADi."""
+"""Flags without contraction to fused multiply-add, so that the C has the bits of CasADi."""
 
 
 def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
-    """Compile `source` to an object file; returns the warnings.
+    """Compile `source` to an object file; return the warnings.
 
     Raises:
-        CompileError: the compiler refuses it.
+        CompileError: the compiler rejects it.
     """
     return compiler.warnings(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
 
@@ -47,13 +47,13 @@ def link_program(compiler: Compiler, parts: Sequence[Path], include: Path, targe
     """Compile and link C and object files.
 
     Raises:
-        CompileError: the compiler refuses them.
+        CompileError: the compiler rejects them.
     """
     compiler.run(*FLAGS, f"-I{include}", *map(str, parts), "-o", str(target), "-lm")
 
 
 def needed_symbols(target: Path) -> frozenset[str] | None:
-    """Names that an object file takes from elsewhere; None where no `nm` says it."""
+    """Return the undefined names of an object file; None without `nm`."""
     nm = shutil.which("nm")
     if nm is None:
         return None
@@ -70,13 +70,13 @@ def needed_symbols(target: Path) -> frozenset[str] | None:
 @final
 @dataclass(frozen=True)
 class Footprint:
-    """The object file of one source.
+    """Size of the object file of one source.
 
     Attributes:
-        text: bytes of code and of constants; None where there is no `size`.
-        data: bytes of variables, which there are none of.
-        stack: function -> bytes of its own frame; functions of libm come on top. Empty where the
-            compiler does not tell.
+        text: bytes of code and of constants; None without `size`.
+        data: bytes of variables, always 0.
+        stack: function -> bytes of its own frame, without functions of libm. Empty if the compiler
+            does not report it.
     """
 
     text: int | None
@@ -84,7 +84,7 @@ class Footprint:
     stack: dict[str, int]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything by name."""
+        """Return all values by name."""
         return {"text": self.text, "data": self.data, "stack": dict(self.stack)}
 
 
@@ -94,10 +94,11 @@ def footprint(
     """Compile the source of a block in `folder` and measure the object file.
 
     Args:
-        flags: beside -std=c99 -O2 -ffp-contract=off, such as -mcpu=cortex-m4 of a cross-compiler.
+        flags: in addition to -std=c99 -O2 -ffp-contract=off, such as -mcpu=cortex-m4 of a
+            cross-compiler.
 
     Raises:
-        CompileError: the compiler refuses it.
+        CompileError: the compiler rejects it.
     """
     stem = prefix(block, real)
     with TemporaryDirectory(prefix="symfric-") as place:
@@ -105,7 +106,7 @@ def footprint(
         command = [*FLAGS, *flags, "-c", str(folder / f"{stem}.c"), "-o", str(target)]
         try:
             compiler.run("-fstack-usage", *command)
-        except CompileError:  # clang before 11, and others, do not know the option
+        except CompileError:  # clang before 11, and others, lack the option
             compiler.run(*command)
         said = target.with_suffix(".su")
         stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
@@ -114,13 +115,13 @@ def footprint(
 
 
 def _stack(text: str) -> dict[str, int]:
-    """The frames in a file of -fstack-usage: "file:line:column:function", bytes, kind."""
+    """Return the frames in a file of -fstack-usage: "file:line:column:function", bytes, kind."""
     rows = [line.split("\t") for line in text.splitlines() if line.count("\t") >= 2]
     return {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
 
 
 def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
-    """Bytes of text and of data with bss, by the `size` beside the compiler."""
+    """Return bytes of text and of data with bss, by the `size` next to the compiler."""
     program = Path(compiler.command[0])
     beside = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
     size = shutil.which(str(program.with_name(beside))) or shutil.which(beside)
@@ -139,11 +140,12 @@ def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
 Array = NDArray[np.float64]
 
 PER_STEP = 1e-3
-"""Seconds that a step may take."""
+"""Time limit of a step [s]."""
 
 
 def program(block: Block, real: Real, guards: bool = True) -> str:
-    """A C program that reads inputs from standard input and writes a row a step, all binary.
+    """Return a C program that reads inputs from standard input and writes a row per step, all
+    binary.
 
     With a second argument on its command line it reads the parameters before the inputs.
     """
@@ -201,10 +203,10 @@ def run_c(
     *,
     guards: bool = True,
 ) -> Array:
-    """Rows (steps, columns) that the compiled `program` makes of `inputs` (steps, inputs).
+    """Return rows (steps, columns) of the compiled `program` for `inputs` (steps, inputs).
 
     Args:
-        parameters: of every step, shape (steps, parameters); the defaults of the C without them.
+        parameters: of every step, shape (steps, parameters); by default those of the C.
 
     Raises:
         CompileError: the program does not run here, or ends too early.
@@ -233,13 +235,13 @@ def run_vm(
     *,
     guards: bool = True,
 ) -> Array:
-    """The same rows from CasADi in double, with inputs and parameters rounded to `real`.
+    """Return the same rows from CasADi in double, with inputs and parameters rounded to `real`.
 
     The guards are those of `GuardModel`.
 
     Args:
-        states: shape (steps, states): every step but the first begins from the row before.
-        parameters: of every step, shape (steps, parameters); the defaults without them.
+        states: shape (steps, states): every step but the first starts from the row before.
+        parameters: of every step, shape (steps, parameters); by default those of the block.
     """
     model = GuardModel(block, real)
     inputs, said = real.rounded(inputs), np.zeros(len(inputs), np.int64)
@@ -278,7 +280,7 @@ def run_vm(
 
 
 def signals(block: Block, *, guards: bool = True) -> list[str]:
-    """Names of the columns."""
+    """Return the names of the columns."""
     states = [v.name for v in block.states]
     later = [f"{r}.{name}" for r in block.resets for name in states]
     return states + list(block.outputs) + later + ["status"] * guards
@@ -287,7 +289,7 @@ def signals(block: Block, *, guards: bool = True) -> list[str]:
 @final
 @dataclass(frozen=True, eq=False)
 class GuardModel:
-    """The guards of a block in NumPy, on rows of numbers of one type."""
+    """Guards of a block in NumPy, on rows of numbers of one type."""
 
     block: Block
     real: Real
@@ -299,11 +301,11 @@ class GuardModel:
 
     @cached_property
     def default(self) -> Array:
-        """Parameters as the block has them by default, in its type."""
+        """Default parameters, in the type."""
         return self.real.rounded([v.start for v in self.block.parameters])
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Inputs (steps, inputs) as a guarded step sees them, and the status of every step."""
+        """Return inputs (steps, inputs) after the guards, and the status of every step."""
         found, status = rows.copy(), np.zeros(len(rows), np.int64)
         for i in self._used:
             found[:, i], bits = self._mended(rows[:, i], range_of(self.block.inputs[i]))
@@ -315,7 +317,7 @@ class GuardModel:
         return not bool((np.abs(states) <= self._limits).all())
 
     def parameters(self, values: Array) -> tuple[Array, int]:
-        """Parameters (parameters,) as a guarded step sees them, and the status."""
+        """Return parameters (parameters,) after the guards, and the status."""
         low, high, is_size = self._ranges
         unfit = ~((values >= low) & (values <= high))
         found = values.copy()
@@ -328,7 +330,7 @@ class GuardModel:
 
     @cached_property
     def _used(self) -> tuple[int, ...]:
-        """Inputs that the step depends on; no other is looked at."""
+        """Inputs that the step depends on; only these are checked."""
         nodes = graph(self.block.step).nodes
         return tuple(n.entry[1] for n in nodes if n.op == ca.OP_INPUT and n.entry[0] == 2)
 

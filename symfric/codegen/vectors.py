@@ -1,9 +1,9 @@
-"""Test vectors: single steps of a block with what CasADi makes of them.
+"""Test vectors: single steps of a block with CasADi's results.
 
-Each row is a step of its own, from the states in it: an error of rounding does not grow over the
-rows. Rows are taken from a run through rest, creep, bursts, reversals and steps of the load, so
-that every comparison in the block comes out both ways if it does in that run; then every parameter
-is changed, in the rows where that matters most; with guards, at last, bad inputs.
+Each row is an independent step from its own states, so rounding errors do not accumulate over the
+rows. Rows are taken from a run through stick, creep, bursts, reversals and steps of the load, so
+that both outcomes of every comparison in the block occur if they do in that run; then every
+parameter is changed, in the rows in which that matters most; with guards, bad inputs follow.
 """
 
 from dataclasses import dataclass
@@ -24,29 +24,32 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 STEPS = 800
-"""Of the run that rows are taken from."""
+"""Steps of the run that rows are taken from."""
 PLAIN, EACH = 32, 2
-"""Rows at even distances, beside those for comparisons, and rows with each parameter changed."""
+"""Number of equidistant rows, in addition to those for comparisons, and rows per changed
+parameter."""
 PARAMETER_SHARE = 0.25
-"""By which a parameter is changed, of its default."""
+"""Relative change of a parameter."""
 BASE = {4: 1e-5, 8: 1e-12}
 """Tolerance relative to the peak of a signal, by the size of the type: rounding of some operations,
-of libm and of fused multiply-add, which differ between compilers and targets."""
+of libm and of fused multiply-add, which differ between compilers and targets.
+"""
 ROUNDINGS = 8.0
-"""Tolerance in units of what rounding changes in most rows: of the numbers that go in, and in float
-of every operation, as in differences of large numbers. The tenth of the rows in which a result may
-change by more, such as at a jump, is left out."""
+"""Tolerance in units of the rounding changes in most rows: of the inputs, and in float of every
+operation, as in differences of large numbers. The tenth of the rows in which a result may change by
+more, such as at a jump, is left out.
+"""
 BAD = (np.nan, np.inf, -np.inf)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Steps of their own, one a row, all numbers rounded to the type.
+    """Independent steps, one per row, all numbers rounded to the type.
 
     Attributes:
         states, inputs: before and during the steps, shapes (rows, states) and (rows, inputs).
-        changed: number of the parameter that has not its default, -1 for none, shape (rows,).
+        changed: number of the changed parameter, -1 for none, shape (rows,).
         values: of that parameter, 0 for none, shape (rows,).
     """
 
@@ -59,19 +62,19 @@ class Steps:
         return len(self.changed)
 
     def chosen(self, rows: Integers) -> "Steps":
-        """Some of the rows."""
+        """Return some of the rows."""
         return Steps(self.states[rows], self.inputs[rows], self.changed[rows], self.values[rows])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Vectors:
-    """Steps and what they make.
+    """Steps and their results.
 
     Attributes:
-        results: states after the step, outputs, and the states that each further initialisation
-            makes of the inputs, in double precision, shape (rows, results).
-        status: what the guards say, 0 without them, shape (rows,).
+        results: states after the step, outputs, and the states of each further initialisation for
+            the inputs, in double precision, shape (rows, results).
+        status: of the guards, 0 without them, shape (rows,).
         tolerance: of each result, shape (results,).
     """
 
@@ -84,7 +87,7 @@ class Vectors:
 
 
 def vectors(block: Block, real: Real, guards: bool) -> Vectors:
-    """Test vectors of a block in a floating point type, the same at each call."""
+    """Return test vectors of a block in a floating point type, the same at each call."""
     run = _run(block, real)
     results, _ = made(block, real, run, guards=False)
     spread = _spread(block, real, run, results)
@@ -107,7 +110,7 @@ def vectors(block: Block, real: Real, guards: bool) -> Vectors:
 
 
 def made(block: Block, real: Real, steps: Steps, *, guards: bool) -> tuple[Array, Integers]:
-    """Results and status of steps by CasADi; the run of `run_vm` has one step before them."""
+    """Return results and status of steps by CasADi; `run_vm` makes one step before them."""
     first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
     parameters, inputs = (
         np.vstack([_defaults(block, real), given]),
@@ -120,14 +123,16 @@ def made(block: Block, real: Real, steps: Steps, *, guards: bool) -> tuple[Array
 
 
 def excitation(block: Block) -> Array:
-    """Inputs of a run, shape (STEPS, inputs)."""
+    """Return inputs of a run, shape (STEPS, inputs)."""
     random = np.random.default_rng(0)
     columns = [_signal(v, random) for v in block.inputs]
     return np.column_stack([np.zeros((STEPS, 0)), *columns])
 
 
 def _signal(variable: Variable, random: np.random.Generator) -> Array:
-    """Steps of a load; rest, creep, slow and fast motion of all else; within the bounds."""
+    """Return steps of a load; stick, creep, slow and fast motion of other inputs; within the
+    bounds.
+    """
     k = np.arange(STEPS)
     if variable.lower >= 0.0:
         levels = np.array([1.0, 0.3, 2.0, 0.7, 0.1, 3.0])
@@ -148,7 +153,7 @@ def _signal(variable: Variable, random: np.random.Generator) -> Array:
 
 
 def _run(block: Block, real: Real) -> Steps:
-    """The steps of a run, as far as it is finite."""
+    """Return the steps of a run, as far as it is finite."""
     inputs, count = real.rounded(excitation(block)), len(block.states)
     after = run_vm(block, real, inputs, guards=False)
     start = np.array([[float(v.start) for v in block.states]])
@@ -164,7 +169,7 @@ def _defaults(block: Block, real: Real) -> Array:
 
 
 def _parameters(block: Block, real: Real, steps: Steps) -> Array:
-    """The parameters of every step, shape (rows, parameters)."""
+    """Return the parameters of every step, shape (rows, parameters)."""
     found = np.tile(_defaults(block, real), (len(steps), 1))
     rows = np.flatnonzero(steps.changed >= 0)
     found[rows, steps.changed[rows]] = steps.values[rows]
@@ -172,12 +177,12 @@ def _parameters(block: Block, real: Real, steps: Steps) -> Array:
 
 
 def _is_sound(spread: Array, tolerance: Array) -> NDArray[np.bool_]:
-    """Rows that no rounding can take out of the tolerance."""
+    """Return a mask of rows that no rounding can move out of the tolerance."""
     return np.all(ROUNDINGS / 2 * spread <= tolerance, axis=1)
 
 
 def _spread(block: Block, real: Real, steps: Steps, results: Array) -> Array:
-    """Changes of the results by rounding of the inputs, shape (rows, results)."""
+    """Return changes of the results by rounding of the inputs, shape (rows, results)."""
     random, found = np.random.default_rng(1), np.zeros_like(results)
     unit = float(np.finfo(f"f{real.size}").eps)
     first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
@@ -196,7 +201,7 @@ def _spread(block: Block, real: Real, steps: Steps, results: Array) -> Array:
 
 
 def _in_float(block: Block, steps: Steps, parameters: Array, results: Array) -> Array:
-    """Results with every operation in float; NaN where that is not known."""
+    """Return results with every operation in float; NaN if unknown."""
     arguments = [steps.states, parameters, steps.inputs]
     parts: list[Array] = []
     for function in (block.step, *(block.reset(name) for name in block.resets)):
@@ -207,7 +212,7 @@ def _in_float(block: Block, steps: Steps, parameters: Array, results: Array) -> 
 
 
 def _telling(block: Block, real: Real, steps: Steps) -> Integers:
-    """Rows with each outcome of each comparison, and some at even distances."""
+    """Return rows with each outcome of each comparison, and some equidistant ones."""
     seen: set[tuple[int, bool]] = set()
     chosen = set(np.linspace(0, len(steps) - 1, min(PLAIN, len(steps))).astype(int).tolist())
     for k, outcomes in enumerate(_outcomes(block, real, steps).astype(bool).tolist()):
@@ -224,7 +229,7 @@ SIDES = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX})
 
 
 def _outcomes(block: Block, real: Real, steps: Steps) -> Array:
-    """Outcomes of the comparisons in a step, shape (rows, comparisons)."""
+    """Return outcomes of the comparisons in a step, shape (rows, comparisons)."""
     source = graph(block.step)
     asked = [(i, n) for i, n in enumerate(source.nodes) if n.op in COMPARISONS | SIDES]
     if not (asked and len(steps)):
@@ -245,7 +250,7 @@ def _outcomes(block: Block, real: Real, steps: Steps) -> Array:
 def _changing(
     block: Block, real: Real, steps: Steps, before: Array, i: int, tolerance: Array
 ) -> Steps:
-    """The rows in which changing parameter `i` changes most, relative to the tolerance."""
+    """Return the rows in which changing parameter `i` changes most, relative to the tolerance."""
     value = float(real.rounded(changed_value(block.parameters[i])))
     changed = np.full(len(steps), i, np.int64)
     new = Steps(steps.states, steps.inputs, changed, np.full(len(steps), value))
@@ -257,14 +262,14 @@ def _changing(
 
 
 def changed_value(variable: Variable) -> float:
-    """A parameter's default a quarter larger, or smaller where a bound is in the way."""
+    """Return a parameter's default increased by a quarter, or decreased if a bound requires it."""
     start = float(variable.start)
     step = PARAMETER_SHARE * (abs(start) if start else variable.nominal)
     return start + step if start + step <= variable.upper else start - step
 
 
 def _bad(block: Block, steps: Steps) -> Steps:
-    """The last row with each input, state and parameter bad, one at a time."""
+    """Return the last row with each input, state and parameter bad, one at a time."""
     last = steps.chosen(np.array([len(steps) - 1]))
     found: list[Steps] = []
     for i in range(len(block.inputs)):
@@ -283,6 +288,6 @@ def _bad(block: Block, steps: Steps) -> Steps:
 
 
 def _joined(parts: list[Steps]) -> Steps:
-    """Rows below each other."""
+    """Concatenate steps."""
     names = ("states", "inputs", "changed", "values")
     return Steps(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

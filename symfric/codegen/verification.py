@@ -1,4 +1,4 @@
-"""Proof that generated C computes what CasADi computes."""
+"""Verification of generated C against CasADi."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 STEPS = 20_000
 FEWER = 4000
-"""Steps with bad inputs, and with other parameters."""
+"""Number of steps with bad inputs, and with other parameters."""
 
 
 @final
@@ -46,25 +46,25 @@ class Check:
     Attributes:
         real: "double" or "float".
         steps: number of steps compared.
-        warnings: what the compiler warned of.
+        warnings: of the compiler.
         ulp: in double, the largest distance from CasADi in units in the last place; 0 means equal
-            bits (but for the sign of a zero). None in float.
+            bits (except for the sign of a zero). None in float.
         error: largest difference from CasADi, which computes in double from the same rounded
             inputs and parameters, relative to the magnitude of each signal: its nominal value, its
             peak, or the size of the terms it is the difference of, see `magnitudes`, whichever is
-            the largest. In float every step begins from the states that the C has: a contact that
-            breaks away some rounding errors later is no error of the C.
-        foreign: what the object file needs besides functions of math.h in its own type; None where
-            there is no `nm`.
+            the largest. In float every step starts from the states of the C: a contact that breaks
+            away some rounding errors later is not an error of the C.
+        foreign: undefined names of the object file other than functions of math.h in its own type;
+            None without `nm`.
         runs_away: the step after which a state is huge or not finite in CasADi, too; None if none.
-        worst: the signal that differs most, "" where none does.
-        rounding: how far that signal is moved, in the unit of `error`, when every operation of
-            CasADi in that step is rounded to float, to nearest and by chance up or down; an error
-            of that size is no fault of the C but of the type. None where it is not known, in
-            double, and where the error is small.
+        worst: the signal that differs most, "" without a difference.
+        rounding: change of that signal, in the unit of `error`, when every operation of CasADi in
+            that step is rounded to float, to nearest and randomly up or down; an error of that
+            size is caused by the type, not by the C. None if unknown, in double, and if the error
+            is small.
         ties: in float, steps in which a mode of 0 or 1 differs because its decision ties: with its
-            operations rounded so CasADi comes to the mode of the C, too. All else in these steps
-            is compared as in the others.
+            operations rounded, CasADi also gives the mode of the C. All other signals in these
+            steps are compared as usual.
     """
 
     real: str
@@ -80,12 +80,14 @@ class Check:
 
     @property
     def near(self) -> bool:
-        """Equal bits in double, small errors in float."""
+        """True for equal bits in double, small errors in float."""
         return self.error <= TOLERANCE if self.ulp is None else self.ulp == 0
 
     @property
     def ok(self) -> bool:
-        """No warnings, nothing foreign, equal bits in double, small errors in float, all finite."""
+        """True if there are no warnings, no foreign names, no differences and only finite
+        values.
+        """
         return self.near and not self.warnings and not self.foreign and self.runs_away is None
 
     @property
@@ -104,7 +106,7 @@ class Check:
 
 
 ROUNDINGS = 4.0
-"""Times what chance was seen to do: it was not asked for the worst."""
+"""Safety factor on the observed random rounding, which need not contain the worst case."""
 
 
 @final
@@ -114,8 +116,8 @@ class Verification:
 
     Attributes:
         name: of the block.
-        status: "verified", or a sentence that says why not.
-        compiler: the command, None where there is none.
+        status: "verified", or a sentence with the reason.
+        compiler: the command, None without one.
         checks: one for each floating point type.
     """
 
@@ -126,18 +128,18 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """Return True if everything was checked and is as it should be."""
+        """True if every check passed."""
         return self.status == VERIFIED
 
     def to_dict(self) -> dict[str, Any]:
-        """The content as plain types, for JSON."""
+        """Return the content as plain types, for JSON."""
         return asdict(self) | {
             "ok": self.ok,
             "checks": [asdict(c) | {"ok": c.ok, "why": c.why} for c in self.checks],
         }
 
     def table(self) -> str:
-        """A few lines of text."""
+        """Return a few lines of text."""
         head = f"{self.name}: {self.status}" + (f" ({self.compiler})" if self.compiler else "")
         if not self.checks:
             return head
@@ -160,30 +162,31 @@ def verify(
     compiler: str | None = None,
     adjustable: Callable[[], Block] | None = None,
 ) -> Verification:
-    """Compile generated C, run it beside CasADi on the same inputs and compare.
+    """Compile generated C, run it on the same inputs as CasADi and compare.
 
-    Three fixed pseudo-random sequences: 20 000 steps of `excitation` (slow sines, bursts,
-    reversals, velocities down to 1e-12, exact zeros, loads that jump a thousandfold or vanish); of
-    guarded C 4000 with NaN, infinities and absurd numbers among them, `spoiled`; and where there
-    are parameters 4000 with other ones, step sizes over three decades among them, `varied`. What
-    the guards of the C do is done beside CasADi in NumPy, and the status is compared as well. The C
-    is compiled with -O2 -ffp-contract=off; where a compiler may fuse multiply and add, the last
-    bits differ. A step in which float overflows, such as a plant under an absurd force, and says so
-    by its status is not compared.
+    There are three fixed pseudo-random sequences: 20 000 steps of `excitation` (slow sines, bursts,
+    reversals, velocities down to 1e-12, exact zeros, loads that jump a thousandfold or vanish); for
+    guarded C 4000 with NaN, infinities and absurd numbers, `spoiled`; and if there are parameters
+    4000 with other values, including step sizes over three decades, `varied`. The guards of the C
+    are repeated in NumPy, and the status is compared as well. The C is compiled with -O2
+    -ffp-contract=off; if a compiler may fuse multiply and add, the last bits differ. A step in
+    which float overflows, such as a plant under an absurd force, and reports it by its status is
+    not compared.
 
-    A plant that runs away under these inputs, in CasADi as in C, fails: its step is too long for
-    it, and the status names the longest of some shorter ones that is not, where h is a parameter.
+    A plant that diverges under these inputs, in CasADi as in C, fails: its step is too long, and
+    the status gives the longest of some shorter ones that is not, if h is a parameter.
 
-    In float a signal may be off by more than is allowed although the C is right: where friction is
-    steep, a last bit of the velocity moves it as far. That fails, too, and the status says so. A
-    mode, such as that of an element that comes back to its limit exactly, may fall one step earlier
-    or later; that is no error where CasADi rounded to float does so, too, and is counted in `ties`.
+    In float a signal may exceed the tolerance although the C is correct: where friction is steep,
+    the last bit of the velocity has such an effect. That fails, too, with an explanation in the
+    status. A mode, such as that of an element that returns to its limit exactly, may change one
+    step earlier or later; that is not an error if CasADi rounded to float does the same, and is
+    counted in `ties`.
 
     Args:
-        generated: what `generate` returned.
-        compiler: command that takes gcc's options; default $CC where it exists, else gcc or clang.
-        adjustable: makes the same block with its step size h as a parameter, to look for a shorter
-            one where it is a constant.
+        generated: returned by `generate`.
+        compiler: command that takes gcc's options; default $CC if it exists, else gcc or clang.
+        adjustable: returns the same block with its step size h as a parameter, to search for a
+            shorter one if it is a constant.
 
     Returns:
         The findings. Without a compiler, or with one whose programs do not run here, the status
@@ -213,7 +216,7 @@ def verify(
 
 
 def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
-    """Describe a block that runs away, and suggest a remedy."""
+    """Describe a block that diverges, and suggest a remedy."""
     if h is None:
         return f"it runs away within {steps} steps, in CasADi as in C; check signs and parameters"
     said = f"after {steps} steps of {h:g} s it runs away, in CasADi as in C: that step is too long"
@@ -236,7 +239,7 @@ def _given(generated: Generated) -> Given:
     if block.parameters:
         parameters = varied(block, FEWER, 10.0)
         rows = run_vm(block, REALS["double"], few, parameters=parameters, guards=False)
-        if runs_away(block, rows) is not None:  # a plant is not asked for steps beyond its own
+        if runs_away(block, rows) is not None:  # a plant needs no steps longer than its own
             parameters = varied(block, FEWER, 1.0)
         found.append((few, parameters))
     return found
@@ -280,7 +283,7 @@ def _check(
 def _rows(
     generated: Generated, real: Real, executable: Path, inputs: Array, parameters: Array | None
 ) -> tuple[Array, Array]:
-    """One sequence of inputs, by C and by CasADi."""
+    """Return the results of one sequence of inputs, by C and by CasADi."""
     block, guards = generated.block, generated.guards
     rows = run_c(block, real, executable, inputs, parameters, guards=guards)
     own = rows[:, : len(block.states)] if real.size == 4 else None
@@ -288,7 +291,9 @@ def _rows(
 
 
 def _allowed(block: Block, real: Real, guards: bool) -> set[str]:
-    """Functions of math.h, and memcpy, with which compilers copy large structs."""
+    """Return the allowed functions: those of math.h, and memcpy, by which compilers copy
+    structs.
+    """
     functions = {call for routine in routines(block, real, guards) for call in routine.calls}
     if {"sin", "cos"} <= functions:
         functions.add("sincos")
@@ -308,10 +313,10 @@ SHORTER = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3)
 
 
 def runs_away(block: Block, rows: Array) -> int | None:
-    """The first step after which a state is huge or not finite, or restarts; None if there is none.
+    """Return the first step after which a state is huge or not finite, or restarts; None if none.
 
     Args:
-        rows: what `run_vm` returned.
+        rows: returned by `run_vm`.
     """
     scale = np.array([v.nominal for v in block.states])
     lost = ~(np.abs(rows[:, : scale.size]) <= HUGE * scale).all(axis=1)
@@ -321,16 +326,16 @@ def runs_away(block: Block, rows: Array) -> int | None:
 
 
 def step_size(block: Block) -> float | None:
-    """The step size [s] of a block that has one, as a parameter or as a constant."""
+    """Return the step size [s] of a block that has one, as a parameter or as a constant."""
     starts = {v.name: float(v.start) for v in block.parameters}
     return starts.get("h", block.constants.get("h"))
 
 
 def longest_step(block: Block, inputs: Array, below: float) -> float | None:
-    """The longest step size [s] of a few below one that is too long, with which none runs away.
+    """Return the longest step size [s] of a few below `below` that does not diverge.
 
     Args:
-        block: with its step size h as a parameter; of any other nothing is found.
+        block: with its step size h as a parameter; None for others.
         inputs: of every step, shape (steps, inputs).
         below: the step size that is too long [s].
     """

@@ -1,4 +1,4 @@
-"""A friction compensator as a block: the force to add to that of a controller, and a controller."""
+"""Friction compensator as a block: the force to add to that of a controller, and a controller."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -56,7 +56,7 @@ def compensator(
     settings: Compensation | None = None,
     **chosen: Any,
 ) -> Block:
-    """The block of a friction compensator: the force to add, in the units of the drive.
+    """Return the block of a friction compensator: the force to add, in the units of the drive.
 
         v_c = dead zone of the blend of v_ref + delay a_ref + error_gain e and v
         F   = slew(limit(ramp [scaled law(v_c, N) + inertia a_ref + stick + dither]))
@@ -141,7 +141,7 @@ def compensator(
 
 
 def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
-    """The desired velocity, and the one that moves the law."""
+    """Return the desired velocity, and the one that moves the law."""
     wanted = v = ca.SX(0)
     if s.velocity != "measured" or s.stick is not None:
         wanted = parts.given("v_ref", "m/s", "reference velocity", 0.1)
@@ -161,7 +161,7 @@ def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
 
 
 def folded(block: Block) -> Block:
-    """The block with all its parameters but h as constants."""
+    """Return the block with all its parameters but h as constants."""
     gone = [p for p in block.parameters if p.name != "h"]
     symbols = ca.vertcat(*(p.symbol for p in gone))
     numbers = ca.vertcat(*(ca.SX(float(p.start)) for p in gone))
@@ -187,7 +187,7 @@ def without_end(discretisation: str) -> str:
 
 
 def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
-    """The settings with the numbers of a drive where none are given."""
+    """Return the settings with the numbers of a drive where none are given."""
     load = checks.number(f"{where}: N of the drive", drive.N, unit="N", lower=0.0)
     offset = checks.number(f"{where}: offset of the drive", drive.offset, unit="N")
     return replace(
@@ -200,7 +200,7 @@ def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
 def _built(
     parts: Parts, found: Terms, s: Compensation, v: ca.SX, h: ca.SX | float, where: str
 ) -> Terms:
-    """The terms with dry friction that builds up over a way, where that is chosen."""
+    """Return the terms with dry friction that builds up over a way, where that is chosen."""
     if s.build_up is None:
         return found
     if found.law.states:
@@ -212,7 +212,7 @@ def _built(
 
 
 def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> ca.SX:
-    """The force of the law with the scales of its terms."""
+    """Return the force of the law with the scales of its terms."""
     checks.check_names(f"{where}: without", s.without, found.names)
     asked = s.scales
     if asked is None:
@@ -231,7 +231,7 @@ def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> ca.SX:
 
 
 def _held(parts: Parts, s: Compensation) -> dict[str, Output]:
-    """The output that stops the integrator of the controller, where that is chosen."""
+    """Return the output that stops the integrator of the controller, where that is chosen."""
     if s.hold is None:
         return {}
     v_ref = parts.given("v_ref", "m/s", "reference velocity", 0.1)
@@ -245,7 +245,7 @@ def _held(parts: Parts, s: Compensation) -> dict[str, Output]:
 
 
 def _added(parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float) -> ca.SX:
-    """The force of the law with all that is added, and within its limits."""
+    """Return the force of the law with all that is added, and within its limits."""
     if s.offset is not None:
         more = parts.parameter("offset", s.offset, "N", "constant force", lower=-inf)
         force = force + more
@@ -272,7 +272,7 @@ def _added(parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX 
 @final
 @dataclass(frozen=True, eq=False)
 class Cascade(Parametric):
-    """A cascade of position (P) and velocity (PI) with an encoder, at a fixed sample time.
+    """Cascade of position (P) and velocity (PI) with an encoder, at a fixed sample time.
 
         x_m = count round(x / count)                     what the encoder says
         v_m = v_m + share [(x_m - x_m before) / h - v_m]    filtered difference
@@ -294,7 +294,7 @@ class Cascade(Parametric):
     )
 
     def block(self) -> Block:
-        """(x, r, v_ref, a_ref, hold) -> u, and what it measures: x_m, v_m, e, v_s."""
+        """Return (x, r, v_ref, a_ref, hold) -> u, and what it measures: x_m, v_m, e, v_s."""
         x, r, v_ref, a_ref, hold = inputs = (
             Variable("x", "m", nominal=0.1, doc="position"),
             Variable("r", "m", nominal=0.1, doc="reference position"),

@@ -1,4 +1,4 @@
-"""A compensating force in the making: the terms of a law, and the stages that the force passes.
+"""Compensating force in the making: the terms of a law, and the stages that the force passes.
 
 A stage adds its states, inputs and parameters to the parts of the block, and returns the force or
 velocity that it lets through; it is in the C only where it is chosen.
@@ -39,7 +39,7 @@ LEAST = 1e-9
 @final
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """The friction force of the block of a law in terms.
+    """Friction force of the block of a law in terms.
 
         F = dry(coulomb, stribeck, bristle) + viscous
 
@@ -64,7 +64,7 @@ class Terms:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The terms that this law has, of `TERMS`."""
+        """Terms that this law has, of `TERMS`."""
         viscous = () if self.viscous is None else ("viscous",)
         if self.dry.is_zero():
             return viscous
@@ -79,7 +79,7 @@ class Terms:
         return tuple(found)
 
     def scaled(self, scales: Mapping[str, ca.SX | float]) -> ca.SX:
-        """The force [N] with its terms scaled; terms that are not named are whole.
+        """Return the force [N] with its terms scaled; terms that are not named are whole.
 
         A law without states gets scaled levels. One with states keeps them, and so the motion of
         its states: its dry force is scaled by the ratio of the Stribeck curves,
@@ -109,7 +109,7 @@ class Terms:
         return dry + scales.get("viscous", 1.0) * self.viscous
 
     def one_sided(self, built: ca.SX) -> "Terms":
-        """The terms with `built` times the sliding force of either side as dry friction.
+        """Return the terms with `built` times the sliding force of either side as dry friction.
 
         Raises:
             ValueError: a law that has no sliding force on one side of rest.
@@ -134,14 +134,14 @@ class Terms:
         return ca.substitute(expression, ca.vertcat(*symbols.values()), ca.vertcat(*values))
 
     def _steady(self) -> ca.SX:
-        """The dry force after long sliding at the velocity [N]."""
+        """Return the dry force after long sliding at the velocity [N]."""
         N = ca.fmax(self.N, LEAST)
         z = ca.SX(self.law.steady_state(self.v, N))
         return _without_viscous(self.law, ca.SX(self.law.force(self.v, N, z)))
 
 
 def level_of(law: Law, v: ca.SX) -> ca.SX | None:
-    """The Stribeck curve g(v) > 0 under 1 N that a law with states tends to, if it has one.
+    """Return the Stribeck curve g(v) > 0 under 1 N that a law with states tends to, if it has one.
 
     Only ratios of it count, which do not depend on the load.
     """
@@ -151,7 +151,7 @@ def level_of(law: Law, v: ca.SX) -> ca.SX | None:
 
 
 def terms(law: Law, block: Block) -> Terms:
-    """The terms of the `F` of `block`, the block of `law`."""
+    """Return the terms of the `F` of `block`, the block of `law`."""
     known = parameters(law)
     own = {v.name: v for v in block.parameters if v.name in known}
     v, N = (x.symbol for x in block.inputs[:2])
@@ -177,7 +177,7 @@ def terms(law: Law, block: Block) -> Terms:
 
 
 def _without_viscous(law: Law, force: ca.SX) -> ca.SX:
-    """The force with viscous coefficients of zero, where they are symbols."""
+    """Return the force with viscous coefficients of zero, where they are symbols."""
     values = [p.value for p in parameters(law).values() if p.role == "viscous"]
     symbols = ca.veccat(*(ca.SX(value) for value in values if is_symbolic(value)))
     return ca.substitute(force, symbols, ca.DM.zeros(symbols.numel())) if values else force
@@ -218,7 +218,7 @@ def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
 
 @final
 class Parts:
-    """The variables of a block that stages have brought so far.
+    """Variables of a block that stages have brought so far.
 
     Attributes:
         states, inputs, parameters: as in `Block`.
@@ -246,7 +246,7 @@ class Parts:
         lower: float = -inf,
         upper: float = inf,
     ) -> ca.SX:
-        """The input of that name, added if there is none."""
+        """Return the input of that name, added if there is none."""
         for known in self.inputs:
             if known.name == name:
                 return known.symbol
@@ -268,7 +268,9 @@ class Parts:
 
 
 def blended(parts: Parts, wanted: ca.SX, v: ca.SX, v_blend: float) -> ca.SX:
-    """The desired velocity near zero of the measured one, beyond 2 v_blend the measured one, C2."""
+    """Return the desired velocity near zero of the measured one, beyond 2 v_blend the measured
+    one, C2.
+    """
     width = parts.parameter(
         "v_blend", v_blend, "m/s", "up to here the desired velocity, beyond twice it the measured",
         lower=1e-12,
@@ -279,7 +281,7 @@ def blended(parts: Parts, wanted: ca.SX, v: ca.SX, v_blend: float) -> ca.SX:
 
 
 def beyond_dead_zone(parts: Parts, v: ca.SX, dead_zone: float) -> ca.SX:
-    """The velocity less what lies within +-dead_zone, continuous: 0 inside."""
+    """Return the velocity less what lies within +-dead_zone, continuous: 0 inside."""
     width = parts.parameter("v_dead", dead_zone, "m/s", "velocities up to here count as rest")
     return ca.SX(v - smooth.clip(v, -width, width))
 
@@ -287,7 +289,7 @@ def beyond_dead_zone(parts: Parts, v: ca.SX, dead_zone: float) -> ca.SX:
 def built_up(
     parts: Parts, v: ca.SX, h: ca.SX | float, distance: float, table: Sequence[tuple[float, float]]
 ) -> ca.SX:
-    """The share b in [-1, 1] of sliding friction that has built up, its mean over the step.
+    """Return the share b in [-1, 1] of sliding friction that has built up, its mean over the step.
 
     b+ = b + 2 v h / distance, held within +-1: linear in the way since the reversal, and by the
     table, if there is one, bent. What a shorter way back leaves stays, as in a Maxwell element.
@@ -315,7 +317,7 @@ def _interpolated(table: Sequence[tuple[float, float]], s: ca.SX) -> ca.SX:
 def freed(
     parts: Parts, wanted: ca.SX, v: ca.SX, h: ca.SX | float, force: float, time: float, rest: float
 ) -> ca.SX:
-    """A further force that grows while the desired velocity moves and the axis does not.
+    """Return a further force that grows while the desired velocity moves and the axis does not.
 
     Its share q in [-1, 1] goes with the pace 1/t_stick towards sign(v_ref) while |v| is below
     v_stick and |v_ref| beyond 2 v_stick, and towards 0 where |v| is beyond 2 v_stick or |v_ref|
@@ -338,7 +340,7 @@ def freed(
 
 
 def dithered(parts: Parts, h: ca.SX | float, force: float, frequency: float) -> ca.SX:
-    """A sine of a force and frequency of its own."""
+    """Return a sine of a force and frequency of its own."""
     amplitude = parts.parameter("F_dither", force, "N", "amplitude of the dither")
     pace = parts.parameter("f_dither", frequency, "Hz", "frequency of the dither")
     phase = parts.state("phase", "1", "turns of the dither, 0 to 1")

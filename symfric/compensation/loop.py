@@ -1,4 +1,4 @@
-"""A drive with friction under its position controller, with the generated C of a compensator."""
+"""Drive with friction under its position controller, with the generated C of a compensator."""
 
 import ctypes
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ class Members:
         real: str = "double",
         compiler: Compiler | None = None,
     ) -> None:
-        """`values` has the parameters of each member that are not the default.
+        """Return `values` has the parameters of each member that are not the default.
 
         Raises:
             ValueError: unknown parameters.
@@ -95,7 +95,7 @@ class Members:
         return found
 
     def _call(self, real: Real) -> str:
-        """The statements of a step of member i."""
+        """Return the statements of a step of member i."""
         name = prefix(self.block, real)
         arrays = {"state": self.state, "param": self.param, "in": self.input, "out": self.output}
         sizes = {group: array.shape[1] for group, array in arrays.items()}
@@ -266,7 +266,7 @@ def _check(
 
 
 def _own(blocks: Sequence[Block], name: str, case: Mapping[str, float]) -> list[dict[str, float]]:
-    """The parameters of a case for each block."""
+    """Return the parameters of a case for each block."""
     where = f"{WHERE}: case '{name}'"
     known = [{v.name for v in block.parameters} for block in blocks]
     found = checks.named(where, case, sorted(set().union(*known)))
@@ -330,7 +330,7 @@ def _commanded(
     forces: Array,
     setup: Setup,
 ) -> Array:
-    """The command of controller and blocks together; the `forces` of the blocks are written.
+    """Return the command of controller and blocks together; the `forces` of the blocks are written.
 
     `acted` are those over the last interval: an observer of forces does not see what others do.
     """

@@ -38,7 +38,7 @@ def lugre_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """The bristle deflection of LuGre friction, observed by the position error of a loop.
+    """Return the bristle deflection of LuGre friction, observed by the position error of a loop.
 
         dz/dt = v - sigma_0 |v| z / g(v) + k e,   |z| <= mu_s N / sigma_0
         F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
@@ -107,7 +107,7 @@ def gms_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """The spring forces of GMS friction, observed by the position error of a loop.
+    """Return the spring forces of GMS friction, observed by the position error of a loop.
 
         F_i+ = F_i of the law after the step + k_i h k e,   |F_i| <= alpha_i mu_s N
         F    = F_1 + F_2 + ... + sigma_2 v
@@ -177,7 +177,7 @@ def _observer(
     h: float | None,
     where: str,
 ) -> Block:
-    """The block of an observer of the states of `law`, with the name and texts of the law.
+    """Return the block of an observer of the states of `law`, with the name and texts of the law.
 
     Args:
         corrected: (law, v, N, states, gain times error, step size) -> states after the step and
@@ -222,7 +222,7 @@ def _finished(
     h: ca.SX | float,
     where: str,
 ) -> ca.SX:
-    """The force faded in and limited, where that is chosen."""
+    """Return the force faded in and limited, where that is chosen."""
     if ramp is not None:
         ramp = checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
         force = ramped(parts, force, h, ramp)

@@ -55,14 +55,14 @@ class Reference:
 
     @property
     def rest(self) -> slice | None:
-        """The second half of the time after the last motion; None without a rest of ten samples."""
+        """Second half of the time after the last motion; None without a rest of ten samples."""
         last = int(np.flatnonzero(np.diff(self.x) != 0).max(initial=-1)) + 1
         begin = (last + self.x.size) // 2
         return slice(begin, None) if self.x.size - begin >= 10 else None
 
 
 def sine(amplitude: float, frequency: float, t_end: float, h: float = 1e-3) -> Reference:
-    """A (1 - cos(2 pi f t)) / 2 ... a sine between 0 and 2 A that begins at rest.
+    """Return a (1 - cos(2 pi f t)) / 2 ... a sine between 0 and 2 A that begins at rest.
 
     Args:
         amplitude: A [m].
@@ -77,7 +77,7 @@ def sine(amplitude: float, frequency: float, t_end: float, h: float = 1e-3) -> R
 
 
 def step(height: float, t_end: float, t_step: float = 0.1, h: float = 1e-3) -> Reference:
-    """A jump of the position, without a velocity, and rest after it."""
+    """Return a jump of the position, without a velocity, and rest after it."""
     height = checks.number("step: height", height, unit="m")
     t = _times("step", t_end, h)
     return Reference(np.where(t >= t_step, height, 0.0), 0 * t, 0 * t, h)
@@ -217,7 +217,7 @@ class Comparison:
     units: tuple[str, str] = ("m", "N")
 
     def __repr__(self) -> str:
-        """The table."""
+        """Return the table."""
         return self.table()
 
     def __getitem__(self, name: str) -> Loop:
@@ -256,7 +256,7 @@ class Comparison:
         return tuple(found)
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row a case, as plain data."""
+        """Return a row a case, as plain data."""
         return [
             {
                 "case": loop.name,
@@ -274,7 +274,7 @@ class Comparison:
         ]
 
     def table(self) -> str:
-        """A few lines of text: errors in a unit of their size, the hunting in counts."""
+        """Return a few lines of text: errors in a unit of their size, the hunting in counts."""
         width = max(len(name) for name in self.loops)
         x, force = self.units
         scale, small = _unit_for(max(loop.peak for loop in self.loops.values()))

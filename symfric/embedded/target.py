@@ -135,7 +135,7 @@ def literals(values: np.ndarray, real: str) -> str:
 @final
 @dataclass(frozen=True)
 class Core:
-    """A Cortex-M core.
+    """Cortex-M core.
 
     Attributes:
         name: in short.
@@ -195,7 +195,7 @@ LIBRARY_PATIENCE = 10.0
 @final
 @dataclass(frozen=True)
 class Tools:
-    """The cross compiler, and the path of the emulator."""
+    """Cross compiler, and the path of the emulator."""
 
     gcc: Compiler
     qemu: str
@@ -219,7 +219,7 @@ class Absent:
 
 
 def find_tools() -> Tools | Absent:
-    """The tools in PATH, or which of them are not there."""
+    """Return the tools in PATH, or which of them are not there."""
     gcc, qemu = shutil.which(GCC), shutil.which(QEMU)
     if gcc is not None and qemu is not None and _has_library(gcc):
         return Tools(Compiler((gcc,)), qemu)
@@ -247,7 +247,7 @@ FLAGS = ("-mthumb", "-std=gnu99", "-ffunction-sections", "-fdata-sections", "-ff
 """For every core."""
 
 SHIFT = 7
-"""An instruction takes 2^7 ns of QEMU's time: 3.2 ticks of SysTick, whose 24 bits are enough for
+"""Instruction takes 2^7 ns of QEMU's time: 3.2 ticks of SysTick, whose 24 bits are enough for
 5 million instructions."""
 
 WORD = "[0-9a-f]{8}"
@@ -278,14 +278,14 @@ class Said:
 @final
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A core, the tools for it and options of the compiler."""
+    """Core, the tools for it and options of the compiler."""
 
     core: Core
     tools: Tools
     flags: Sequence[str]
 
     def linked(self, folder: Path, main: str, sources: Sequence[Path], *flags: str) -> Path:
-        """An image of a main program and `sources`, the first of which is what is measured.
+        """Return an image of a main program and `sources`, the first of which is what is measured.
 
         Raises:
             CompileError: the compiler refuses it.
@@ -359,7 +359,7 @@ def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Sa
 
 
 def _words(lines: Sequence[str]) -> dict[str, NDArray[np.uint32]]:
-    """The words behind each name, up to "end"."""
+    """Return the words behind each name, up to "end"."""
     found: dict[str, list[int]] = {}
     for line in lines[: lines.index("end")]:
         if fullmatch(WORD, line):

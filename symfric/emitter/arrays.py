@@ -38,7 +38,7 @@ Places = Mapping[tuple[int, int], str]
 @final
 @dataclass(frozen=True)
 class Arrays:
-    """The rows that C can index: of arguments, which are `read`, and of results, `written`."""
+    """Rows that C can index: of arguments, which are `read`, and of results, `written`."""
 
     read: tuple[Array, ...] = ()
     written: tuple[Array, ...] = ()
@@ -119,7 +119,7 @@ class _Rolled:
         self.calls, self.operations, self.outside = Counter[str](), 0, 0
 
     def free(self, name: str) -> str:
-        """A name that nothing else has."""
+        """Return a name that nothing else has."""
         while name in self.taken:
             name += "_"
         self.taken.add(name)
@@ -135,7 +135,7 @@ class _Rolled:
         return uses
 
     def _in_loops(self) -> Iterator[tuple[int, int]]:
-        """The rows that loops read."""
+        """Return the rows that loops read."""
         for loop in self.plan.loops:
             for group, row in loop.body.reads:
                 yield from ((group, row + i) for i in range(loop.size))
@@ -171,14 +171,14 @@ class _Rolled:
         return Code(used, (*tables, *lines), self.calls, self.operations, self.outside)
 
     def _counted(self, code: Code, times: int = 1) -> tuple[str, ...]:
-        """The lines of a part that is executed so often."""
+        """Return the lines of a part that is executed so often."""
         self.calls.update({call: times * count for call, count in code.calls.items()})
         self.operations += times * code.operations
         self.outside += times * code.outside
         return code.lines
 
     def _straight(self, part: "_Part") -> list[str]:
-        """The lines of a straight part."""
+        """Return the lines of a straight part."""
         numbers = [i for i in part.kept if i in self.carried and not self._truth(i)]
         truths = [i for i in part.kept if i in self.carried and self._truth(i)]
         starts = [
@@ -212,7 +212,7 @@ class _Rolled:
         return is_truth(self.source, i)
 
     def _loop(self, loop: Loop) -> list[str]:
-        """The lines of a loop."""
+        """Return the lines of a loop."""
         body, i = loop.body, self.index
         taken = set[str]()
         reads = [self._read(*entry, taken) for entry in body.reads]
@@ -277,7 +277,7 @@ class _Rolled:
 
 
 def _declared(lines: Sequence[str], made: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """The lines with a declaration of every name, where it is given its value or before.
+    """Return the lines with a declaration of every name, where it is given its value or before.
 
     A local that only another name is given to has that name.
     """
@@ -343,7 +343,8 @@ class _Part:
     def graph(
         self, results: Sequence[Sequence[int]], arguments: int, truth: Callable[[int], bool]
     ) -> tuple[Graph, list[list[int]]]:
-        """The part as a graph; what it takes are the arguments behind the `arguments` own ones.
+        """Return the part as a graph; what it takes are the arguments behind the `arguments` own
+        ones.
 
         Returns:
             The graph, and the nodes behind the rows of the two further arguments: numbers, bools.

@@ -29,7 +29,7 @@ COSTS = {ca.OP_DIV: 4, ca.OP_INV: 4, ca.OP_SQRT: 4, ca.OP_FLOOR: 8, ca.OP_CEIL: 
 @final
 @dataclass(frozen=True)
 class Region:
-    """A side of a branch, or the whole function.
+    """Side of a branch, or the whole function.
 
     Attributes:
         parent: number of the region that the branch stands in.
@@ -47,7 +47,7 @@ class Region:
 @final
 @dataclass(frozen=True)
 class Placed:
-    """A graph with the place of every operation.
+    """Graph with the place of every operation.
 
     Attributes:
         source: the graph.
@@ -65,7 +65,7 @@ class Placed:
 
 
 def placed(source: Graph, apart: Iterable[int] = ()) -> Placed:
-    """The graph with branches where they spare something.
+    """Return the graph with branches where they spare something.
 
     Args:
         source: a simplified graph.
@@ -150,7 +150,7 @@ class _Placement:
         self.place[i] = region
 
     def _side(self, region: int, i: int, side: int) -> int:
-        """The region of a side of select `i`."""
+        """Return the region of a side of select `i`."""
         key = (region, self.labels[i], side)
         if key not in self.inside:
             outer = self.regions[region]

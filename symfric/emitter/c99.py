@@ -18,7 +18,7 @@ TERNARY, LOGIC, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(1, 9)
 
 @dataclass(frozen=True)
 class Real:
-    """A floating point type of C.
+    """Floating point type of C.
 
     Attributes:
         name: in C.
@@ -34,7 +34,7 @@ class Real:
 
     @property
     def kind(self) -> Any:
-        """The same type in NumPy."""
+        """Same type in NumPy."""
         return np.float32 if self.size == 4 else np.float64
 
     def rounded(self, values: object) -> NDArray[np.float64]:
@@ -43,7 +43,7 @@ class Real:
             return np.asarray(values, float).astype(self.kind).astype(float)
 
     def literal(self, value: float) -> str:
-        """The shortest literal that reads back as `value` rounded to this type.
+        """Return the shortest literal that reads back as `value` rounded to this type.
 
         Raises:
             ValueError: NaN, or a number that overflows or vanishes in this type.
@@ -189,13 +189,13 @@ def representable(whole: Graph, real: Real) -> Graph:
 @final
 @dataclass(frozen=True)
 class Expression:
-    """A text and how tightly it binds."""
+    """Text and how tightly it binds."""
 
     text: str
     binds: int
 
     def within(self, least: int) -> str:
-        """The text, in parentheses where it binds less tightly than `least`."""
+        """Return the text, in parentheses where it binds less tightly than `least`."""
         return self.text if self.binds >= least else f"({self.text})"
 
 
@@ -216,7 +216,7 @@ class Writer:
         self.constants["two"] = real.literal(2.0)
 
     def expression(self, i: int) -> Expression:
-        """The value of a node, as it is."""
+        """Return the value of a node, as it is."""
         if i in self.names:
             return Expression(self.names[i], ATOM)
         node = self.source.nodes[i]
@@ -242,7 +242,7 @@ class Writer:
         return Expression(text, how.binds)
 
     def number(self, i: int) -> Expression:
-        """The value of a node; a bool as the number 1 or 0 that CasADi means."""
+        """Return the value of a node; a bool as the number 1 or 0 that CasADi means."""
         value = self.expression(i)
         if not self.logical[i]:
             return value
@@ -250,7 +250,7 @@ class Writer:
         return Expression(f"{value.within(LOGIC)} ? {one} : {zero}", TERNARY)
 
     def negation(self, i: int) -> Expression:
-        """The opposite of a bool."""
+        """Return the opposite of a bool."""
         node = self.source.nodes[i]
         if i not in self.names and node.op in OPPOSITE:
             return self._operation(i, OPPOSITE[node.op])
@@ -259,7 +259,7 @@ class Writer:
         return Expression(f"!{self.expression(i).within(ATOM)}", SIGN)
 
     def truth(self, i: int) -> Expression:
-        """The value of a node that is a bool or one of the numbers 1 and 0."""
+        """Return the value of a node that is a bool or one of the numbers 1 and 0."""
         node = self.source.nodes[i]
         if node.op == ca.OP_CONST:
             return Expression("true" if node.value else "false", ATOM)

@@ -157,7 +157,7 @@ class _Body:
                     self.loads[i] = loads[node.entry]
 
     def region(self, number: int) -> list[str]:
-        """The lines of a region."""
+        """Return the lines of a region."""
         lines: list[str] = []
         for statement in self.plan.bodies[number]:
             for i in self._loaded(number, statement):
@@ -186,7 +186,7 @@ class _Body:
                 return set()
 
     def statement(self, statement: Statement) -> list[str]:
-        """The lines of one."""
+        """Return the lines of one."""
         nodes, write = self.plan.placed.source.nodes, self.writer
         match statement:
             case Local(node):
@@ -204,7 +204,7 @@ class _Body:
                 return [self._stored(statement, self.plan.placed.source.results[result][row])]
 
     def _goal(self, select: int) -> int | Store:
-        """The result that a select becomes, or the select whose variable it shares."""
+        """Return the result that a select becomes, or the select whose variable it shares."""
         goal = self.plan.goals.get(select)
         return select if goal is None else goal if isinstance(goal, Store) else self._goal(goal)
 
@@ -231,7 +231,7 @@ class _Body:
         return "bool" if self.writer.logical[i] else self.real.name
 
     def _name(self, i: int) -> str:
-        """A new name for the local of a node."""
+        """Return a new name for the local of a node."""
         self.count += 1
         self.writer.names[i] = f"{self.stem}{self.count}"
         return self.writer.names[i]
@@ -248,7 +248,7 @@ def _is_one_block(lines: Sequence[str]) -> bool:
 
 
 def _free(stem: str, names: Sequence[str]) -> str:
-    """A beginning of the locals' names that no argument has."""
+    """Return a beginning of the locals' names that no argument has."""
     while any(fullmatch(stem + r"\d+", name) for name in names):
         stem += "_"
     return stem

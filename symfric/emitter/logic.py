@@ -6,16 +6,15 @@ values in which
 
 * conditions (of selects, in and, or, not) are comparisons and what is made of them, never numbers
   that are compared with 0; negations stand innermost and constants are folded;
-* `if_else_zero`, `fmin` and `fmax` are selects;
-* 2 (0.5 / x), which is how `reciprocal` keeps CasADi from dividing again, is 1 / x: the same bits
+* `if_else_zero`, `fmin` and `fmax` are selects; * 2 (0.5 / x), which is how `reciprocal` keeps
+CasADi from dividing again, is 1 / x: the same bits
   for |x| below 2e307 (4e37 in float).
 
 All finite numbers and infinities keep their bits, but for the sign of a zero, which C leaves to the
-library in fmin(0, -0). A number that is not one
-(NaN): `fmin(x, c)` gives c as CasADi's does wherever c is known to be a number (a constant, or
-itself cut so; hence every clip to constant bounds is NaN-proof); of two others, `fmin(x, NaN)` is
-NaN here and x there. The derivative of `fmin(x, y)` where x or y is NaN is that of a side and not
-NaN.
+library in fmin(0, -0). A number that is not one (NaN): `fmin(x, c)` gives c as CasADi's does
+wherever c is known to be a number (a constant, or itself cut so; hence every clip to constant
+bounds is NaN-proof); of two others, `fmin(x, NaN)` is NaN here and x there. The derivative of
+`fmin(x, y)` where x or y is NaN is that of a side and not NaN.
 
 `settled` then removes selects whose condition is known wherever they are used. An expression that
 must have right derivatives guards what it does not take:
@@ -47,7 +46,8 @@ LOWERED = frozenset({ca.OP_FMIN, ca.OP_FMAX, ca.OP_IF_ELSE_ZERO})
 def simplified(
     source: Graph, conditions: Collection[int] = (), truths: Collection[int] = ()
 ) -> Graph:
-    """The graph of the same values as C wants it, see above; what it gives it leaves as it is.
+    """Return the graph of the same values as C wants it, see above; what it gives it leaves as it
+    is.
 
     Args:
         source: of numbers.
@@ -94,7 +94,7 @@ class _Algebra:
     """True for constants and bools, which are NaN only if an input or an operation made them so."""
 
     def of(self, node: Node, args: Sequence[int]) -> int:
-        """The number of a node that means `node` with these arguments."""
+        """Return the number of a node that means `node` with these arguments."""
         match node.op:
             case ca.OP_FMIN | ca.OP_FMAX:
                 return self.extreme(node.op, *args)
@@ -149,7 +149,7 @@ class _Algebra:
         return i if self.logical[i] else self.compared(ca.OP_NE, i, self.constant(0.0))
 
     def negated(self, i: int) -> int:
-        """The opposite of a bool; it moves into and, or where that spares a negation."""
+        """Return the opposite of a bool; it moves into and, or where that spares a negation."""
         node, value = self.nodes[i], self.value(i)
         if value is not None:
             return self.constant(float(value == 0.0))
@@ -179,7 +179,7 @@ class _Algebra:
         return self.add(op, a, b)
 
     def select(self, condition: int, yes: int, no: int) -> int:
-        """`yes` where the condition holds, else `no`."""
+        """Return `yes` where the condition holds, else `no`."""
         condition = self.truth(condition)
         known = self.value(condition)
         if known is not None:
@@ -203,7 +203,7 @@ class _Algebra:
         return self.add(SELECT, condition, yes, no)
 
     def _settled(self, condition: int, side: int, taken: int) -> int:
-        """A side of a select on the same condition is one of that one's."""
+        """Return a side of a select on the same condition is one of that one's."""
         node = self.nodes[side]
         return node.args[taken] if node.op == SELECT and node.args[0] == condition else side
 
@@ -215,7 +215,7 @@ class _Algebra:
         return bool(value) if value in (0.0, 1.0) else None
 
     def compared(self, op: int, a: int, b: int) -> int:
-        """A comparison; of a choice between constants with a constant it is the choice."""
+        """Return a comparison; of a choice between constants with a constant it is the choice."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.constant(float(COMPARISONS[op](x, y)))
@@ -245,7 +245,7 @@ class _Algebra:
         return node.op == ca.OP_SIGN or (node.op in TRUTHFUL and op in OPPOSITE)
 
     def extreme(self, op: int, a: int, b: int) -> int:
-        """The smaller or the larger of two."""
+        """Return the smaller or the larger of two."""
         if a == b:
             return a
         if self.number[a] and not self.number[b]:
@@ -253,14 +253,16 @@ class _Algebra:
         return self._clip(op, a, b) or self._first_if(op, a, b)
 
     def _first_if(self, op: int, a: int, b: int) -> int:
-        """The one of two; of equal ones the first, or the one that is known to be a number."""
+        """Return the one of two; of equal ones the first, or the one that is known to be a
+        number.
+        """
         if not self.number[b]:
             a, b = b, a
         order = (a, b) if op == ca.OP_FMIN else (b, a)
         return self.select(self.compared(ca.OP_LT, *order), a, b)
 
     def _clip(self, op: int, a: int, b: int) -> int | None:
-        """A clip to constants, one cut before: x > low ? (x < high ? x : high) : low."""
+        """Return a clip to constants, one cut before: x > low ? (x < high ? x : high) : low."""
         node, bound = self.nodes[a], self.value(b)
         if bound is None or node.op != SELECT:
             return None
@@ -279,7 +281,7 @@ class _Algebra:
         return node.op == ca.OP_DIV and self.value(node.args[0]) == 0.5
 
     def weight_of_side(self, a: int, b: int) -> int | None:
-        """A side's share in the derivative of fmin, fmax: (p <= q) / ((p <= q) + (q <= p)).
+        """Return a side's share in the derivative of fmin, fmax: (p <= q) / ((p <= q) + (q <= p)).
 
         It is 1, 1/2 or 0.
         """
@@ -294,11 +296,11 @@ class _Algebra:
 
 
 Fact = tuple[int, bool]
-"""A node, and whether it is true."""
+"""Node, and whether it is true."""
 
 
 def settled(source: Graph) -> Graph:
-    """The same results, without selects that only one of their branches can ever leave.
+    """Return the same results, without selects that only one of their branches can ever leave.
 
     A node is used in a branch alone if all its users are; in C, where a branch that is not taken is
     not computed, its condition then is a fact. Values are the same to the bit.
@@ -331,7 +333,7 @@ def _facts(source: Graph) -> list[frozenset[Fact]]:
 
 
 def _branches(source: Graph, node: Node) -> Iterator[tuple[int, frozenset[Fact]]]:
-    """The arguments of a node, each with the conditions under which its value matters."""
+    """Return the arguments of a node, each with the conditions under which its value matters."""
     conditions: tuple[Fact | None, ...] = (None,) * len(node.args)
     first = node.args[0] if node.args else 0
     if node.op == SELECT:
@@ -345,7 +347,7 @@ def _branches(source: Graph, node: Node) -> Iterator[tuple[int, frozenset[Fact]]
 
 
 def _implied(source: Graph, number: int, truth: bool) -> Iterator[Fact]:
-    """The fact itself and those of the conditions that it is made of."""
+    """Return the fact itself and those of the conditions that it is made of."""
     yield number, truth
     node = source.nodes[number]
     if node.op == ca.OP_NOT:

@@ -67,7 +67,7 @@ class Store:
 @final
 @dataclass(frozen=True)
 class Sum:
-    """The node `total` = `start` + lanes in their order; without a start the lanes alone."""
+    """Node `total` = `start` + lanes in their order; without a start the lanes alone."""
 
     lanes: Lanes
     start: int | None
@@ -134,7 +134,7 @@ def _runs(
 
 
 def _chains(source: Graph) -> Iterator[tuple[list[int], list[int]]]:
-    """The terms of every sum of three and more, and the nodes after adding each of them."""
+    """Return the terms of every sum of three and more, and the nodes after adding each of them."""
     uses = Counter(i for node in source.nodes for i in node.args)
     uses.update(i for row in source.results for i in row)
 
@@ -188,7 +188,7 @@ def _consecutive(entries: Sequence[tuple[int, int]], read: Sequence[Array]) -> b
 
 
 def woven(source: Graph, strands: Sequence[Strand], read: Sequence[Array]) -> Body:
-    """The body of the loop that makes all `strands`, which have equally many lanes.
+    """Return the body of the loop that makes all `strands`, which have equally many lanes.
 
     Raises:
         ValueError: their graphs are not alike.

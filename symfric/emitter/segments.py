@@ -1,4 +1,4 @@
-"""A graph cut into straight parts with loops between them.
+"""Graph cut into straight parts with loops between them.
 
     part 0,  loops of stage 1,  part 1,  loops of stage 2,  ...,  last part
 
@@ -30,7 +30,7 @@ MORE = 1.1
 @final
 @dataclass(frozen=True)
 class Loop:
-    """A loop over `size` elements in the stage `stage` >= 1."""
+    """Loop over `size` elements in the stage `stage` >= 1."""
 
     stage: int
     size: int
@@ -44,7 +44,7 @@ class Loop:
 
     @property
     def stores(self) -> list[Store]:
-        """The rows that it writes."""
+        """Rows that it writes."""
         return [strand for strand in self.strands if isinstance(strand, Store)]
 
     @cached_property
@@ -77,7 +77,7 @@ class Plan:
 
     @property
     def totals(self) -> dict[int, Sum]:
-        """The sums of all loops by their node."""
+        """Sums of all loops by their node."""
         return {s.total: s for loop in self.loops for s in loop.sums}
 
     @property
@@ -92,7 +92,7 @@ class Plan:
 
 
 def planned(source: Graph, read: Sequence[Array], written: Sequence[Array]) -> Plan:
-    """The graph with all loops that spare statements and cost next to nothing.
+    """Return the graph with all loops that spare statements and cost next to nothing.
 
     What is left out: loops that would write what another one has yet to read; sums that nobody
     needs; short loops; and, where too much would be computed twice, those that do so.
@@ -137,7 +137,7 @@ def _idle(plan: Plan) -> set[Strand]:
 
 
 def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
-    """The loop that repeats most computations, if too many are repeated."""
+    """Return the loop that repeats most computations, if too many are repeated."""
     nodes = plan.source.nodes
     executed = _cost([nodes[i] for i in plan.part])
     executed += sum(loop.size * (loop.cost + len(loop.sums)) for loop in plan.loops)
@@ -163,7 +163,7 @@ def _stages(
     read: Sequence[Array],
     written: Sequence[Array],
 ) -> dict[Strand, int]:
-    """The stage of every strand: after what it needs, stores not before others have read."""
+    """Return the stage of every strand: after what it needs, stores not before others have read."""
     sums = {strand.total: strand for strand in bodies if isinstance(strand, Sum)}
     stages: dict[Strand, int] = {}
     known: list[int] = []
@@ -194,7 +194,7 @@ def _text(store: Store, written: Sequence[Array]) -> str:
 
 
 def _texts(body: Body, read: Sequence[Array]) -> dict[str, list[int]]:
-    """The memory that a body reads -> offsets of its first elements in it."""
+    """Return the memory that a body reads -> offsets of its first elements in it."""
     found: dict[str, list[int]] = {}
     for group, row in body.reads:
         array = next(a for a in read if a.holds(group, row))
@@ -220,7 +220,7 @@ def _overwriting(
 
 
 def _parts(source: Graph, loops: Sequence[Loop]) -> tuple[dict[int, int], tuple[Sum, ...]]:
-    """The straight part of every node outside the loops, the latest that serves all users.
+    """Return the straight part of every node outside the loops, the latest that serves all users.
 
     And the sums without users.
     """

@@ -1,4 +1,4 @@
-"""The statements of a function: what becomes a local, what each statement takes, their order."""
+"""Statements of a function: what becomes a local, what each statement takes, their order."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ IDLE = 2
 
 
 def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> list[int]:
-    """An order of statements 0, 1, ... in which what is taken has been made before.
+    """Return an order of statements 0, 1, ... in which what is taken has been made before.
 
     Of those that are ready the one comes next that adds least to the values that are live: it makes
     some, and ends those that nobody else takes. Of several it is the first that takes a single
@@ -82,7 +82,7 @@ LONGEST = 5
 @final
 @dataclass(frozen=True)
 class Local:
-    """A constant local: the value of `node`."""
+    """Constant local: the value of `node`."""
 
     node: int
 
@@ -90,7 +90,7 @@ class Local:
 @final
 @dataclass(frozen=True)
 class Branch:
-    """An `if` with the sides of the selects of `label` in `region`."""
+    """`if` with the sides of the selects of `label` in `region`."""
 
     region: int
     label: int
@@ -109,7 +109,7 @@ class Side:
 @final
 @dataclass(frozen=True)
 class Store:
-    """A row of a result is written."""
+    """Row of a result is written."""
 
     result: int
     row: int
@@ -137,7 +137,7 @@ class Stores:
 @final
 @dataclass(frozen=True)
 class Plan:
-    """A function as statements.
+    """Function as statements.
 
     Attributes:
         placed: the graph with its branches.
@@ -179,7 +179,7 @@ class _Planner:
         self.takes: dict[Statement, set[int]] = {}
 
     def result(self) -> tuple[Plan, set[int]]:
-        """The plan, and the selects of branches that wait for each other."""
+        """Return the plan, and the selects of branches that wait for each other."""
         self._collect()
         self._connect()
         bodies, waiting = list[tuple[Statement, ...]](), set[int]()
@@ -251,7 +251,7 @@ class _Planner:
     def _take(
         self, i: int, statement: Statement, region: int, homes: dict[int, tuple[Statement, int]]
     ) -> None:
-        """`statement` of a region writes out node `i`, or its name."""
+        """Return `statement` of a region writes out node `i`, or its name."""
         node = self.placed.source.nodes[i]
         if node.op == ca.OP_CONST:
             return

@@ -1,4 +1,4 @@
-"""The figures in which papers show what friction laws do: data first, pictures on request."""
+"""Figures in which papers show what friction laws do: data first, pictures on request."""
 
 from typing import TYPE_CHECKING
 

@@ -31,10 +31,10 @@ from symfric.scenes import ALL_SCENES
 
 
 class MakeFigure(Protocol):
-    """A function that makes a figure of a law."""
+    """Function that makes a figure of a law."""
 
     def __call__(self, law: AnyLaw, N: float = ..., given: Scales | None = None) -> FigureData:
-        """The figure of `law` under `N` [N], with its own magnitudes or those `given`."""
+        """Return the figure of `law` under `N` [N], with its own magnitudes or those `given`."""
         ...
 
 
@@ -57,7 +57,8 @@ FIGURES: dict[str, MakeFigure] = {
 
 
 def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
-    """The figure `name` of `law` under the normal force `N` [N], with the excitation of the papers.
+    """Return the figure `name` of `law` under the normal force `N` [N], with the excitation of the
+    papers.
 
     The functions of the same names take more options.
 
@@ -81,7 +82,7 @@ PANELS = 2
 
 
 def in_scene(law: AnyLaw, scene: str) -> Trajectory:
-    """The run of `scene` with `law`, over the time that shows what it is about.
+    """Return the run of `scene` with `law`, over the time that shows what it is about.
 
     Raises:
         ValueError: a population of contacts, a law that the scene refuses.
@@ -99,7 +100,7 @@ def in_scene(law: AnyLaw, scene: str) -> Trajectory:
 
 
 def scene_figure(scene: str, runs: Mapping[str, Trajectory]) -> FigureData:
-    """The signals that `runs` (legend entry -> run of `scene`) share.
+    """Return the signals that `runs` (legend entry -> run of `scene`) share.
 
     Columns t [s] and the shared signals; a curve for each run. Drawn are positions, friction and
     energy or power.
@@ -188,20 +189,20 @@ def _able(
 
 
 def _reason(text: str) -> str:
-    """The expectation alone of an error message."""
+    """Return the expectation alone of an error message."""
     start = text.find("expected ")
     return text[max(start, 0) :].split("; ")[0].split(", got ")[0]
 
 
 def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:
-    """The title of the first, with the further inputs of all that say theirs."""
+    """Return the title of the first, with the further inputs of all that say theirs."""
     inputs = [steady_inputs(law) for law in laws]
     said = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
     return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(said))
 
 
 def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, AnyLaw]:
-    """The laws by legend entry; laws of one kind are numbered."""
+    """Return the laws by legend entry; laws of one kind are numbered."""
     if isinstance(laws, Mapping):
         found = dict(laws)
     else:

@@ -70,7 +70,7 @@ class Curve:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class FigureData(Showing):
-    """The data of one figure.
+    """Data of one figure.
 
     `figure["2 Hz"]` is the curve of that case, law or label; its columns come by name.
 
@@ -104,7 +104,7 @@ class FigureData(Showing):
         return Shown(f"figure '{self.name}': {self.title}", (), Table(header, rows))
 
     def thumbnail(self) -> "Figure":
-        """The picture of `plot`, small."""
+        """Return the picture of `plot`, small."""
         return self.plot()
 
     def __getitem__(self, name: str) -> Curve:
@@ -116,7 +116,7 @@ class FigureData(Showing):
         return found[name]
 
     def named(self, law: str) -> "FigureData":
-        """The same with another name of its law."""
+        """Return the same with another name of its law."""
         return replace(self, curves=tuple(replace(c, law=law) for c in self.curves))
 
     def plot(self, path: str | Path | None = None) -> "Figure":
@@ -195,7 +195,7 @@ def draw_curves(
     curves: Sequence[Curve],
     laws: Sequence[str],
 ) -> None:
-    """The curves of one panel, in units that are easily read.
+    """Return the curves of one panel, in units that are easily read.
 
     Args:
         laws: those that have a colour each, where several are compared; else the cases have.
@@ -232,7 +232,7 @@ GIVEN = ("v", "N", "F_e", "dv")
 
 
 def parts(law: AnyLaw) -> list[type[AnyLaw]]:
-    """The kinds of law inside `law`, from the outside in, each once."""
+    """Return the kinds of law inside `law`, from the outside in, each once."""
     found: list[type[AnyLaw]] = [type(law)]
     for item in fields(law):
         value = getattr(law, item.name)
@@ -243,7 +243,7 @@ def parts(law: AnyLaw) -> list[type[AnyLaw]]:
 
 
 def phenomena(law: AnyLaw) -> list[str]:
-    """The codes of everything that `law` and the laws in it show."""
+    """Return the codes of everything that `law` and the laws in it show."""
     shown = {code for part in parts(law) for code in part.facts.phenomena}
     return [code for code in PHENOMENA if code in shown]
 
@@ -255,7 +255,7 @@ def check_any(where: str, law: object) -> None:
 
 
 def finite(where: str, law: AnyLaw, F: Array) -> Array:
-    """`F` [N] of a law, if any of it is a number.
+    """Return `F` [N] of a law, if any of it is a number.
 
     Raises:
         ValueError: none is, as where parameters leave the range of a root or an arcsine.
@@ -332,7 +332,7 @@ class Scales:
 
 
 def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
-    """The magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
+    """Return the magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
 
     Raises:
         ValueError: no law, symbols for parameters, N that is not positive.
@@ -363,7 +363,9 @@ def _peak(F: Array) -> int:
 
 
 def _half_fall(law: AnyLaw, scale: float, N: float) -> float:
-    """The velocity at which the force has fallen half the way [m/s]; `scale` if it does not."""
+    """Return the velocity at which the force has fallen half the way [m/s]; `scale` if it does
+    not.
+    """
     v = scale * np.geomspace(1e-2, 1e3, 1001)
     F = steady_force(law, v, N)
     beyond = F[_peak(F) :]

@@ -1,4 +1,4 @@
-"""A contact that is slid with a given velocity, and one that is pushed with a given force."""
+"""Contact that is slid with a given velocity, and one that is pushed with a given force."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -48,13 +48,13 @@ def slid(
 @final
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """The steps of a pushed block: their ends [s], and at each the signals."""
+    """Steps of a pushed block: their ends [s], and at each the signals."""
 
     step_times: Array
     columns: dict[str, Array]
 
     def at(self, t: ArrayLike) -> dict[str, Array]:
-        """The signals at the times `t` [s], linear between the steps."""
+        """Return the signals at the times `t` [s], linear between the steps."""
         times = np.atleast_1d(np.asarray(t, float))
         return {n: np.interp(times, self.step_times, column) for n, column in self.columns.items()}
 
@@ -68,7 +68,7 @@ def shoved(
     until: float | None,
     way: float = 0.0,
 ) -> Steps:
-    """A block of `mass` [kg] on random contacts pushed with `force` [N], by explicit steps.
+    """Return a block of `mass` [kg] on random contacts pushed with `force` [N], by explicit steps.
 
     A step is a fifth of the inverse frequency of the block on its unloaded contacts: velocity
     first, then position, which holds the energy of an elastic contact.
@@ -92,7 +92,7 @@ def shoved(
 
 
 def sampled(value: Input, t: Array) -> Array:
-    """An input at the times `t` [s], shape (n,)."""
+    """Return an input at the times `t` [s], shape (n,)."""
     if isinstance(value, Hold):
         known = np.searchsorted(np.asarray(value.t), t, "right") - 1
         return np.asarray(value.values, float)[np.clip(known, 0, None)]
@@ -105,11 +105,11 @@ def sampled(value: Input, t: Array) -> Array:
 
 
 UNITS = {"t": "s", "x": "m", "v": "m/s", "F": "N"}
-"""The columns of a prescribed motion."""
+"""Columns of a prescribed motion."""
 
 
 def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Model:
-    """`law` slid with `velocity(t, pace)` [m/s] from steady sliding at its first value.
+    """Return `law` slid with `velocity(t, pace)` [m/s] from steady sliding at its first value.
 
     `pace` is a parameter of the model, so that one model serves several speeds. The law may need
     the sliding acceleration dv.
@@ -133,7 +133,7 @@ def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) ->
 
 
 class Run(Protocol):
-    """A run of a pushed block."""
+    """Run of a pushed block."""
 
     @property
     def step_times(self) -> Array:
@@ -151,12 +151,12 @@ class Slide(Protocol):
     def __call__(
         self, case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()
     ) -> Curve:
-        """The curve of `case` at `times` [s]."""
+        """Return the curve of `case` at `times` [s]."""
         ...
 
 
 def slides(law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Slide:
-    """The motion `velocity(t, pace)` [m/s] as a function (case, times [s], pace) -> curve.
+    """Return the motion `velocity(t, pace)` [m/s] as a function (case, times [s], pace) -> curve.
 
     A law starts from steady sliding at the first velocity, a population from unloaded contacts.
     """
@@ -209,7 +209,8 @@ def pushed(
     until: float | None = None,
     way: float = 0.0,
 ) -> Run:
-    """A block of `mass` [kg] under `law`, at rest at first, pushed with `force` [N] to `t_end` [s].
+    """Return a block of `mass` [kg] under `law`, at rest at first, pushed with `force` [N] to
+    `t_end` [s].
 
     With `until` the run ends where the velocity is beyond it [m/s], and the position beyond `way`.
     """
@@ -225,7 +226,7 @@ def pushed(
 
 
 def fine(run: Run, parts: int = 4) -> Array:
-    """The ends of the steps of `run` with `parts` intervals in each [s]."""
+    """Return the ends of the steps of `run` with `parts` intervals in each [s]."""
     inner = np.linspace(0.0, 1.0, parts, endpoint=False)
     starts, lengths = run.step_times[:-1], np.diff(run.step_times)
     return np.append((starts[:, None] + lengths[:, None] * inner).ravel(), run.step_times[-1])

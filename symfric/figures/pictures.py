@@ -27,11 +27,12 @@ from symfric.laws.base.law import FORCE
 Make = Callable[[AnyLaw, float, Scales], FigureData]
 
 ACCELERATION = "dv"
-"""The further input of a law that any motion offers."""
+"""Further input of a law that any motion offers."""
 
 
 def natures(laws: Mapping[str, AnyLaw], N: float) -> list[FigureData]:
-    """The behaviours that set `laws` (legend entry -> law) apart, each with all laws that have it.
+    """Return the behaviours that set `laws` (legend entry -> law) apart, each with all laws that
+    have it.
 
     All get the amplitudes of the first that has it. A law with pre-sliding shows its hysteresis,
     and its lag or its reversals; one that needs the applied force how it sticks; one whose static
@@ -146,7 +147,8 @@ def plot_laws(laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | Non
 
 
 def _steady(near: Axes, far: Axes, laws: Mapping[str, AnyLaw], N: float) -> None:
-    """The steady curves around rest, and over decades; both in the units that suit the first.
+    """Return the steady curves around rest, and over decades; both in the units that suit the
+    first.
 
     Thin, over decades: those while v < 0 of laws that are not odd.
     """
@@ -193,7 +195,7 @@ def window(law: AnyLaw, N: float) -> float:
 
 
 def decades(law: AnyLaw, N: float) -> tuple[float, float]:
-    """The velocities [m/s] between which the steady curve has all it has.
+    """Return the velocities [m/s] between which the steady curve has all it has.
 
     From a hundredth of the least velocity on which the law changes to a hundred times the greatest,
     or to where viscous friction has doubled the peak.

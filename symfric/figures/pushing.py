@@ -237,7 +237,7 @@ def break_away(
 
 
 def _peak(law: AnyLaw, N: float, rate: float, own: Scales, mass: float) -> float:
-    """The greatest friction force [N] until the block has broken away."""
+    """Return the greatest friction force [N] until the block has broken away."""
     stretch = own.stretch if isfinite(own.stretch) else 0.0
     until, way = 2 * (own.velocity + rate * stretch / own.static), SLID * stretch
     t_end = 2 * own.static / rate + 4 * sqrt(2 * mass * until / rate) + 4 * cbrt(way * mass / rate)

@@ -1,4 +1,4 @@
-"""The softest regularisation of a law that a wanted error allows in a given machine."""
+"""Softest regularisation of a law that a wanted error allows in a given machine."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ FINEST = 1e-11
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Recommendation(Showing):
-    """A law as smooth as a wanted error allows.
+    """Law as smooth as a wanted error allows.
 
     Attributes:
         law: with its width or stiffness set.
@@ -84,7 +84,7 @@ class Recommendation(Showing):
     curve: FigureData
 
     def __str__(self) -> str:
-        """The result in a sentence."""
+        """Return the result in a sentence."""
         found = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
         return (
             f"{type(self.law).__name__}: {found} is off {self.reference} by {self.error:.2g} "
@@ -92,11 +92,11 @@ class Recommendation(Showing):
         )
 
     def shown(self) -> Shown:
-        """The result in a sentence."""
+        """Return the result in a sentence."""
         return Shown("recommended", tuple(wrap(str(self), WIDTH)))
 
     def thumbnail(self) -> "Figure":
-        """The curve."""
+        """Return the curve."""
         return self.plot()
 
     def plot(self, path: str | Path | None = None) -> "Figure":
@@ -163,7 +163,7 @@ def recommended(
 
 @final
 class _Search:
-    """The runs along the curve, driest last."""
+    """Runs along the curve, driest last."""
 
     def __init__(self, machine: Machine, knob: Regularisation, wanted: float, rtol: float) -> None:
         self.machine, self.knob, self.wanted, self.rtol = machine, knob, wanted, rtol
@@ -173,7 +173,7 @@ class _Search:
         self.about, self.uncertain = "", inf
 
     def run(self, s: float, rtol: float) -> Sample:
-        """The machine with the widths at the factor `s`."""
+        """Return the machine with the widths at the factor `s`."""
         law, values = self.knob.at(s), self.knob.values(s)
         return sample(self.machine, law, rtol, s, values, max_steps=MOST_STEPS)
 
@@ -236,7 +236,7 @@ class _Search:
         return distance(run, self.reference) + self.uncertain
 
     def choose(self) -> Recommendation:
-        """The softest width below which all keep the wanted error, verified."""
+        """Return the softest width below which all keep the wanted error, verified."""
         if self.off(self.runs[0]) <= self.wanted:
             self.soften()
         errors = [self.off(run) for run in self.runs]
@@ -273,7 +273,7 @@ class _Search:
                 return
 
     def rounded(self, s: float) -> float:
-        """A factor at which the first parameter has two digits, on the dry side."""
+        """Return a factor at which the first parameter has two digits, on the dry side."""
         name = self.knob.names[0]
         value = self.knob.values(s)[name]
         size = 10.0 ** (floor(log10(value)) - 1)
@@ -282,11 +282,11 @@ class _Search:
         return self.knob.factor((-floor(-digits) if grows else floor(digits)) * size)
 
     def shown(self, s: float) -> str:
-        """The parameters at a factor."""
+        """Return the parameters at a factor."""
         return ", ".join(f"{name} = {value:.3g}" for name, value in self.knob.values(s).items())
 
     def recommendation(self, run: Sample, error: float, order: float) -> Recommendation:
-        """The result, with the curve."""
+        """Return the result, with the curve."""
         return Recommendation(
             self.knob.at(run.s), run.values, error, self.wanted, self.uncertain, order, self.about,
             self.rtol, run.steps, run.attempts, run.time_s, self.curve(),

@@ -55,12 +55,12 @@ NEGLIGIBLE = 1e-9
 DIGITS = 12
 """Of scaled parameters: what is behind is rounding."""
 STILL = 1e-9
-"""A signal that moves by less than this times its nominal size is measured by the latter."""
+"""Signal that moves by less than this times its nominal size is measured by the latter."""
 
 
 @dataclass(frozen=True, eq=False)
 class Regularisation:
-    """The parameters that make `law` smooth, scaled together by a factor s; dry friction at s = 0.
+    """Parameters that make `law` smooth, scaled together by a factor s; dry friction at s = 0.
 
     Attributes:
         powers: parameter -> power of s: widths, velocities and paths are scaled by s, stiffnesses
@@ -83,11 +83,11 @@ class Regularisation:
         return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
 
     def at(self, s: float) -> Law:
-        """The law at the factor `s`."""
+        """Return the law at the factor `s`."""
         return with_values(self.law, self.values(s))
 
     def factor(self, value: float) -> float:
-        """The factor at which the first of the parameters has this value."""
+        """Return the factor at which the first of the parameters has this value."""
         first = parameters(self.law)[self.names[0]]
         now = float(first.value)
         return (value / now) ** (1 / self.powers[first.name])
@@ -96,7 +96,7 @@ class Regularisation:
 def regularisation(
     where: str, law: Law, parameter: str | Iterable[str] | None = None
 ) -> Regularisation:
-    """The parameters that make `law` smooth: `parameter`, or those of certain roles.
+    """Return the parameters that make `law` smooth: `parameter`, or those of certain roles.
 
     Those are the stiffnesses of bristles, their damping and the paths they remember, transition
     velocities called v_t and smoothing widths [m/s]; of a law without these its only velocity.
@@ -136,7 +136,7 @@ def regularisation(
 
 
 def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
-    """`names`, whose values have to be positive numbers."""
+    """Return `names`, whose values have to be positive numbers."""
     known = parameters(law)
     for name in names:
         value = known[name].value
@@ -157,7 +157,7 @@ def _power(p: Parameter) -> float:
 @final
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A machine that takes any law, and the signals by which laws are compared.
+    """Machine that takes any law, and the signals by which laws are compared.
 
     Attributes:
         name: of the machine.
@@ -182,7 +182,7 @@ class Machine:
     backend: str = "auto"
 
     def model(self, law: Law) -> Model:
-        """The model with `law`.
+        """Return the model with `law`.
 
         Raises:
             ValueError: the machine refuses it, or gives neither scene nor model.
@@ -227,7 +227,7 @@ def machine_of(
     probe: Law,
     backend: str = "auto",
 ) -> Machine:
-    """A scene, a class of scenes, or a function law -> scene or model, as a machine.
+    """Return a scene, a class of scenes, or a function law -> scene or model, as a machine.
 
     A scene is driven as it is when nobody says how, unless `u` says so. A function is called with
     `probe` once.
@@ -329,7 +329,7 @@ def looked_at(machine: Machine, model: Model, run: Trajectory, law: Law) -> tupl
 
 
 def positions(model: Model, law: Law) -> tuple[str, ...]:
-    """The states of the machine, not of friction, that are no rates of others."""
+    """Return the states of the machine, not of friction, that are no rates of others."""
     inside = {state.name for contact in model.contacts for state in contact.states}
     inside |= {state.name for state in law.states}
     machine = [v for v in model.x if v.name not in inside and v.kind not in (FRICTION_STATE, MODE)]

@@ -268,7 +268,7 @@ def transition(
 def last_period(
     slide: Slide, frequencies: Sequence[float], periods: int, samples: int
 ) -> tuple[Curve, ...]:
-    """The last of `periods` at each of `frequencies` [Hz]."""
+    """Return the last of `periods` at each of `frequencies` [Hz]."""
     return tuple(
         slide(f"{f:g} Hz", np.linspace((periods - 1) / f, periods / f, samples), f)
         for f in frequencies
@@ -355,7 +355,9 @@ def dwell(
 
 
 def memory(law: AnyLaw, magnitudes: Scales) -> float:
-    """The way that renews the contacts [m]: D_c, else the pre-sliding distance, else 1e-5."""
+    """Return the way that renews the contacts [m]: D_c, else the pre-sliding distance, else
+    1e-5.
+    """
     known = parameters(law)
     if "D_c" in known:
         return float(known["D_c"].value)

@@ -48,7 +48,7 @@ EVENT_TOLERANCE = 1e-10
 @final
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A model as a unit computes it.
+    """Model as a unit computes it.
 
     Attributes:
         model, integrator: whose functions.
@@ -193,12 +193,14 @@ def own_memory(events: int) -> int:
 
 
 def largest_rtol(model: Model) -> float:
-    """The loosest tolerance that the events of a model allow."""
+    """Return the loosest tolerance that the events of a model allow."""
     return min((event.rtol for event in model.events), default=0.1)
 
 
 def _longest(own: Equations) -> float:
-    """The longest step [s]: a few straight pieces of events in time alone, see `run.integrate`."""
+    """Return the longest step [s]: a few straight pieces of events in time alone, see
+    `run.integrate`.
+    """
     quickest = min((pace(f, *own.span) for f in own.integrator.schedules), default=inf)
     return PACES * quickest
 
@@ -246,7 +248,9 @@ def source(own: Equations) -> str:
 
 
 def _along(own: Equations) -> ca.Function:
-    """(t, y, d, dy, dd) -> derivatives of rates, signals and algebraic equations along (dy, dd)."""
+    """Return (t, y, d, dy, dd) -> derivatives of rates, signals and algebraic equations along
+    (dy, dd).
+    """
     model, system = own.model, own.integrator.system
     t, y, d = ca.SX.sym("t"), system.y, system.d
     dy, dd = ca.SX.sym("dy", system.n), ca.SX.sym("dd", d.numel())
@@ -263,7 +267,7 @@ FOLLOWED = "static int symfric_follow(double *y, const double *d);\n"
 
 
 def _called(name: str, of: str, arguments: int, results: int) -> str:
-    """`of` as the C of the integrator calls functions."""
+    """Return `of` as the C of the integrator calls functions."""
     given = [*(f"arg[{i}]" for i in range(arguments)), *(f"res[{i}]" for i in range(results))]
     return (
         f"static int {name}(const double **arg, double **res, casadi_int *iw, double *w, int mem)\n"
@@ -335,7 +339,7 @@ def tables(own: Equations) -> str:
 
 
 def _table(name: str, values: Iterable[float], kind: str = "double") -> str:
-    """A constant array, of one number at least."""
+    """Return a constant array, of one number at least."""
     texts = [str(x) if kind == "int" else DOUBLE.literal(float(x)) for x in values] or ["0"]
     return _wrapped(f"static const {kind} {name}[{len(texts)}] = {{", texts)
 
@@ -362,7 +366,7 @@ def _quoted(text: str) -> str:
 
 
 def fingerprint(parts: Mapping[str, str]) -> str:
-    """A token of all that a unit consists of."""
+    """Return a token of all that a unit consists of."""
     digest = sha256("\0".join(f"{name}\0{text}" for name, text in parts.items()).encode())
     text = digest.hexdigest()
     return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:32]}}}"

@@ -1,4 +1,4 @@
-"""A model as a Functional Mock-up Unit, which runs in other tools without Python and CasADi.
+"""Model as a Functional Mock-up Unit, which runs in other tools without Python and CasADi.
 
 `running` loads a unit of FMI 3.0 through its C interface, as another tool does.
 """
@@ -45,7 +45,7 @@ INTERVALS = 200
 @final
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """A unit that was written.
+    """Unit that was written.
 
     Attributes:
         path: the archive.
@@ -204,7 +204,7 @@ def export_fmu(
 def _model(
     where: str, given: Model | Scene, free: Iterable[str] | None, t_end: float | None
 ) -> tuple[Model, tuple[float, float]]:
-    """The model and the span of its default experiment."""
+    """Return the model and the span of its default experiment."""
     until = 1.0
     if isinstance(given, Scene):
         until = given.t_end
@@ -231,7 +231,7 @@ def _switches_on(value: object) -> bool:
 
 
 def _method(where: str, model: Model, method: str, step: float | None) -> str:
-    """The formula of the steps."""
+    """Return the formula of the steps."""
     if step is None:
         return checks.choice(f"{where}: method", method, ["auto", *ADAPTIVE])
     checks.number(f"{where}: step", step, unit="s", above=0.0)
@@ -252,7 +252,7 @@ LOG = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
 
 @final
 class Running:
-    """An instance for co-simulation, initialised; made by `running`.
+    """Instance for co-simulation, initialised; made by `running`.
 
     Attributes:
         said: messages of the unit.
@@ -324,7 +324,7 @@ class Running:
 
 @contextmanager
 def running(path: str | Path, **start: float) -> Generator[Running]:
-    """An instance of the unit in `path`, initialised with `start` values by name.
+    """Return an instance of the unit in `path`, initialised with `start` values by name.
 
     Raises:
         ValueError: an archive without a binary for this platform.

@@ -1,4 +1,4 @@
-"""The archive of a unit: its descriptions, its C, and the binary of this platform.
+"""Archive of a unit: its descriptions, its C, and the binary of this platform.
 
 modelDescription.xml of both versions of the standard comes from the variables of a unit.
 """
@@ -69,7 +69,7 @@ class Described:
 
 
 def described(what: Described, entries: Iterable[Entry], fmi: int) -> str:
-    """The text of modelDescription.xml; `fmi` is 2 or 3."""
+    """Return the text of modelDescription.xml; `fmi` is 2 or 3."""
     root = (_second if fmi == 2 else _third)(what, tuple(entries))
     Xml.indent(root)
     text = Xml.tostring(root, encoding="unicode")
@@ -90,7 +90,7 @@ def build_description(what: Described) -> str:
 
 
 def _child(parent: Xml.Element, tag: str, **attributes: object) -> Xml.Element:
-    """A new element; attributes that are None are left out."""
+    """Return a new element; attributes that are None are left out."""
     texts = {name: _text(value) for name, value in attributes.items() if value is not None}
     return Xml.SubElement(parent, tag, texts)
 
@@ -309,7 +309,7 @@ def sources(sizes: str, model: str, fmi: int, fixed: bool, exchange: bool) -> di
 @final
 @dataclass(frozen=True, eq=False)
 class Binary:
-    """The library of this platform, or why there is none."""
+    """Library of this platform, or why there is none."""
 
     name: str
     content: bytes

@@ -1,4 +1,4 @@
-"""The variables of a unit, as both versions of the standard list them.
+"""Variables of a unit, as both versions of the standard list them.
 
 Value references count time, all signals of the model in its order (x, z, u, outputs), parameters,
 the relative tolerance, the attempts of the integrator.
@@ -24,7 +24,7 @@ LEAST_RTOL, LARGEST_RTOL = 1e-13, 0.1
 @final
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A variable of the unit.
+    """Variable of the unit.
 
     Attributes:
         reference: value reference.
@@ -163,7 +163,7 @@ def _bounded(
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """`name`, or another one where the model has it."""
+    """Return `name`, or another one where the model has it."""
     while name in taken:
         name = f"symfric_{name}"
     return name

@@ -1,4 +1,6 @@
-"""Mechanisms: rigid bodies, joints with friction from reactions, and forces give a `Model`."""
+"""Mechanisms: rigid bodies, joints with friction from reactions, and forces, built into a
+`Model`.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,37 +1,36 @@
-"""The force that a contact would have to carry for no sliding acceleration.
+"""Applied force of a contact: the force it must carry for zero sliding acceleration.
 
-Laws with true rest ask for it. In a mechanism it follows from the equations of motion with their
-constraints,
+Laws with true sticking need it. In a mechanism it follows from the constrained equations of motion,
 
     F_e = F + ds/dt / W,   W = G P G'     (see below)
 
 for the sliding velocity s and the friction force F: with F_e instead of F, and all other friction
-forces as they are, s would not change. It is an algebraic unknown F_e of its own. A contact at
-rest carries it, F = F_e, so that the equation says ds/dt = 0 whatever W is; contacts that rest
-independently of each other share what holds them by their equations together.
+forces unchanged, s would be constant. It is an algebraic unknown F_e. A sticking contact carries
+it, F = F_e, so the equation is ds/dt = 0 for any W; contacts that stick independently of each other
+share the forces by their equations together.
 
-In a loop of one degree of freedom all contacts rest together: s_i = g_i(q) omega, with omega the
-speed along the tangent of its constraints. No equation tells how they share the force that holds
-the loop, T = sum g_i F_i. They hold it as long as they can, and that is with equal shares of what
-each can hold at most,
+In a loop of one degree of freedom all contacts stick together: s_i = g_i(q) omega, with omega the
+speed along the tangent of its constraints. The distribution of the force that holds the loop,
+T = sum g_i F_i, is undetermined. The contacts hold it as long as they can, which is with equal
+fractions of their static levels,
 
     F_i = sign(g_i) S_i T / sum |g_k| S_k,   |T| <= sum |g_k| S_k,   S_i = mu_s N_i
 
-A contact whose g_i passes through zero (a slider in its dead centre) turns and does not stop.
+A contact whose g_i passes through zero (a slider in its dead centre) reverses and does not stop.
 Laws without modes get g_i in place of sign(g_i), which does not jump there: the contact that moves
 most carries most.
 
-A law by modes slides without asking for F_e; what it needs is the sign of |F_e| - mu_s N at rest.
-For it W is a constant, that of the start, and costs nothing, and F_e is that of rest only at rest.
-Limits: a loop of several degrees of freedom takes as many such contacts as are independent; a loop
-of one has no constraint that moves with time.
+A law with modes does not need F_e in sliding; it needs the sign of |F_e| - mu_s N in stick. For it
+W is a constant, that of the start, which costs nothing, and F_e is exact only in stick. Limits: a
+loop of several degrees of freedom allows as many such contacts as are independent; a loop of one
+has no constraint that moves with time.
 
-Accelerations under forces, and how easily a contact is moved:
+Accelerations under forces, and the mobility of a contact:
 
     M^-1 right,   W_i = G_i P G_i',   P = M^-1 - M^-1 phi_q' (phi_q M^-1 phi_q')^-1 phi_q M^-1
 
-G_i is the row of sliding velocities s_i = G_i q' + ..., W_i the sliding acceleration that a unit
-friction force takes away while all other forces stay.
+G_i is the row of sliding velocities s_i = G_i q' + ..., W_i the decrease of the sliding
+acceleration per unit friction force with all other forces unchanged.
 """
 
 from collections.abc import Sequence
@@ -58,9 +57,9 @@ from symfric.multibody.spatial import GROUND, euler_e
 
 
 def mirrored(M: ca.SX) -> ca.SX:
-    """A symmetric matrix from one that is symmetric in value, but not in its zeros.
+    """Return a symmetric matrix from one that is symmetric in value, but not in its zeros.
 
-    What cancels on one side of the diagonal by itself may stand as 0 x there on the other.
+    An entry that cancels on one side of the diagonal may be 0 x on the other.
     """
     if M.sparsity().is_symmetric():
         return M
@@ -69,7 +68,7 @@ def mirrored(M: ca.SX) -> ca.SX:
 
 
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
-    """M^-1 times the columns of `right`, by blocks where bodies float freely."""
+    """Return M^-1 times the columns of `right`, by blocks if bodies float freely."""
     topology = eq.kin.topology
     if not _free(eq):
         D, L, order = ca.ldl(mirrored(eq.mass))
@@ -86,13 +85,13 @@ def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
 
 
 def _free(eq: Equations) -> bool:
-    """Return True if all bodies hang freely on the ground."""
+    """Return True if all bodies are connected to the ground by floating joints."""
     links = eq.kin.topology.links
     return bool(links) and all(isinstance(x.joint, Floating) and x.base == GROUND for x in links)
 
 
 def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """W of each row of `G`, and what it would be without the constraints, shape (k, 1) each."""
+    """Return W of each row of `G`, and its value without the constraints, shape (k, 1) each."""
     J, k = eq.Phi_q, G.size1()
     right = ca.densify(ca.vertcat(G, J).T)
     columns = ca.horzsplit(right) if _free(eq) else [right]
@@ -107,7 +106,10 @@ def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def null_direction(J: ca.SX) -> ca.SX:
-    """The unit vector Z with J Z = 0 of a matrix (n - 1, n), of its minors: smooth at full rank."""
+    """Return the unit vector Z with J Z = 0 of a matrix (n - 1, n), from its minors.
+
+    It is smooth at full rank.
+    """
     n = J.size2()
     minors = [ca.det(ca.densify(J[:, [j for j in range(n) if j != k]])) for k in range(n)]
     Z = ca.vertcat(*((-1) ** k * minor for k, minor in enumerate(minors)))
@@ -116,32 +118,33 @@ def null_direction(J: ca.SX) -> ca.SX:
 
 Array = NDArray[np.float64]
 IMMOVABLE = 1e-10
-"""Share of W that constraints leave of what it is without them, below which they hold a contact."""
+"""Fraction of the unconstrained W below which the constraints hold a contact."""
 MINORS = 8
-"""Coordinates of a loop of one degree of freedom at most; its tangent is made of their minors."""
+"""Most coordinates of a loop of one degree of freedom; its tangent is made of their minors."""
 UNLOADED = 1e-12
-"""Force [N] that keeps shares finite where nothing presses; at break-away it must not show."""
+"""Force [N] that keeps fractions finite without load; it must be negligible at break-away."""
 CALM = 0.1
-"""Time [s] in which a rest forgets a sliding velocity that rounding has left in it, so that none
-drifts; to laws by modes F_e matters at rest alone."""
+"""Time constant [s] by which stick removes a sliding velocity left by rounding, so that there is no
+drift; for laws with modes F_e matters only in stick.
+"""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Contacts that come to rest together, and the force that then holds them.
+    """Contacts that stick together, and the force that then holds them.
 
     Attributes:
         name: of the contact, or of the loop.
         members: numbers of the contacts.
         along: g_i = s_i / omega of each.
-        rate: omega; the sliding velocity of a contact by itself.
-        change: its rate of change, at rest at least.
+        rate: omega; the sliding velocity of a single contact.
+        change: its rate of change, at least in stick.
         force: F_e or T, an algebraic variable.
         inertia: 1 / W of omega.
-        by_modes: whether its laws rest by a mode.
-        direction: of a loop by modes, the sign of omega, 0 at rest.
-        still: names of the joint rates that are zero at rest.
+        by_modes: True if its laws stick by a mode.
+        direction: of a loop with modes, the sign of omega, 0 in stick.
+        still: names of the joint rates that are zero in stick.
     """
 
     name: str
@@ -156,7 +159,7 @@ class Rest:
     still: tuple[str, ...]
 
     def shares(self, levels: Sequence[ca.SX]) -> list[ca.SX]:
-        """F_e of each member, of which `levels` [N] are what they can hold."""
+        """Return F_e of each member; `levels` [N] are their static levels."""
         if not self.is_loop:
             return [self.force.symbol]
         above = [S + UNLOADED for S in levels]
@@ -166,7 +169,7 @@ class Rest:
         return [w / total * self.force.symbol for w in weights]
 
     def capacity(self, levels: Sequence[ca.SX]) -> ca.SX:
-        """The largest force along omega that `levels` hold."""
+        """Return the largest force along omega that `levels` hold."""
         pairs = zip(self.along, levels, strict=True)
         return sum((smooth.magnitude(g, 0.0) * S for g, S in pairs), start=ca.SX(0))
 
@@ -176,19 +179,19 @@ class Rest:
         return not self.along[0].is_one()
 
     def needed(self, forces: Sequence[ca.SX]) -> ca.SX:
-        """What is zero at the right force, shape (1, 1)."""
+        """Return the residual of the applied force, zero at the right one, shape (1, 1)."""
         held = sum((g * F for g, F in zip(self.along, forces, strict=True)), start=ca.SX(0))
         change = self.change + self.rate / CALM if self.by_modes else self.change
         return held + self.inertia * change - self.force.symbol
 
 
 def forward(x: ca.SX) -> ca.SX:
-    """1 where x >= 0, else -1."""
+    """Return 1 where x >= 0, else -1."""
     return ca.SX(smooth.choose(x < 0, -1.0, 1.0))
 
 
 def sliding_change(eq: Equations, slip: ca.SX) -> ca.SX:
-    """Rate of change of a sliding velocity, in the accelerations of `eq`."""
+    """Return the rate of change of a sliding velocity, in terms of the accelerations of `eq`."""
     change = ca.jtimes(slip, eq.q, eq.qd) + ca.jtimes(slip, eq.qd, eq.a)
     return change + ca.jacobian(slip, eq.kin.t)
 
@@ -196,18 +199,20 @@ def sliding_change(eq: Equations, slip: ca.SX) -> ca.SX:
 def switches_at(
     law: Law | SpatialSlip, v: ca.SX, N: ca.SX, z: ca.SX, F_e: ca.SX
 ) -> tuple[Switch, ...]:
-    """Changes of mode of a law that may ask for F_e."""
+    """Return the changes of mode of a law that may need F_e."""
     return law.switches(v, N, z, **({FORCE: F_e} if law.inputs else {}))
 
 
 def some_switches(law: Law | SpatialSlip) -> tuple[Switch, ...]:
-    """The changes of mode of a law, in no matter what numbers."""
+    """Return the changes of mode of a law, with arbitrary arguments."""
     one = ca.SX(1.0)
     return switches_at(law, one, one, ca.SX.ones(len(law.states)), one)
 
 
 def capacity_of(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
-    """What a contact can hold [N] for its share in a loop; what presses it where no mode tells."""
+    """Return the static level [N] of a contact in a loop; its normal force for laws without
+    modes.
+    """
     if isinstance(law, SpatialSlip) or not some_switches(law):
         return N
     return ca.SX(law.static_level(N))
@@ -216,26 +221,26 @@ def capacity_of(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
 @final
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Coordinates that constraints couple: their numbers, and those of the constraints."""
+    """Coordinates coupled by constraints: their numbers, and those of the constraints."""
 
     columns: tuple[int, ...]
     rows: tuple[int, ...]
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return len(self.columns) - len(self.rows)
 
 
 def loops_of(eq: Equations) -> list[Loop]:
-    """Coordinates in groups that no constraint couples to each other; those that some couples."""
+    """Return groups of coordinates that constraints couple, independent of each other."""
     pattern = ca.DM(eq.Phi_q.sparsity(), 1).full() != 0
     return [Loop(tuple(columns), tuple(rows)) for columns, rows in coupled(pattern)]
 
 
 @final
 class _Maker:
-    """Makes the groups of contacts that rest together, of one mechanism at its start."""
+    """Builder of the groups of contacts that stick together, of a mechanism at its start."""
 
     def __init__(
         self, where: str, eq: Equations, start: tuple[Variables, Variables, Array], p: Variables
@@ -245,38 +250,40 @@ class _Maker:
         self.p = p
 
     def numbers(self, expression: ca.SX) -> Array:
-        """An expression at the start, without friction."""
+        """Return an expression at the start, without friction."""
         symbols = ca.vertcat(symbols_of(self.q), symbols_of(self.qd), self.eq.a, self.eq.kin.t)
         values = ca.vertcat(starts_of(self.q), starts_of(self.qd), ca.SX(self.a0), 0.0)
         return at_start(ca.substitute(ca.SX(expression), symbols, values), self.p).full()
 
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
-        """The error for contacts whose laws cannot rest here."""
+        """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
         joints = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in contacts))
         return ValueError(
             f"{self.where} > joint {joints} > friction > law: expected {expected}, got {law}, "
-            f"which asks for the force of rest; {advice}"
+            f"which needs the applied force; {advice}"
         )
 
     def made(
         self, name: str, members: Sequence[int], along: Sequence[ca.SX], rate: ca.SX,
         change: ca.SX, G: ca.SX, columns: Sequence[int],
     ) -> Rest:  # fmt: skip
-        """One group; `G` are the derivatives of its rate by the joint rates."""
+        """Return one group; `G` are the derivatives of its rate by the joint rates."""
         contacts = [self.eq.contacts[i] for i in members]
         W, loose = mobility(self.eq, G)
         here, free = (float(self.numbers(x)[0, 0]) for x in (W, loose))
         if not here > IMMOVABLE * free:
             raise self.refuse(
                 contacts,
-                "one that needs v and N alone where constraints prescribe the sliding",
+                "one that needs only v and N, because constraints prescribe the sliding",
                 "start elsewhere if this is a dead centre",
             )
         modes = {bool(some_switches(c.law)) for c in contacts}
         if len(modes) > 1:
             raise self.refuse(
-                contacts, "laws that all rest by modes, or none, in one loop", "give all one form"
+                contacts,
+                "laws in one loop that all stick by modes, or none",
+                "use one form",
             )
         by_modes, single = modes == {True}, columns == ()
         start = float(self.numbers(change)[0, 0]) / here
@@ -284,11 +291,11 @@ class _Maker:
         direction: Variables = ()
         if by_modes and not single:
             begin = ca.SX(smooth.sign(rate, 0.0))
-            doc = "sense in which the loop moves, 0 at rest"
+            doc = "direction of the motion of the loop, 0 in stick"
             variable = Variable(f"{name}_direction", "1", start=begin, doc=doc, kind=kinds.MODE)
             direction = (variable,)
         unit = contacts[0].unit("N") if single else ""
-        doc = f"friction force of no sliding acceleration of {name}"
+        doc = f"friction force of {name} for zero sliding acceleration"
         force = Variable(
             f"{name}_{FORCE}", unit, start=start, nominal=max(1.0, abs(start)), doc=doc
         )
@@ -299,21 +306,21 @@ class _Maker:
         )  # fmt: skip
 
     def single(self, i: int) -> Rest:
-        """A contact by itself."""
+        """Return the group of a single contact."""
         contact = self.eq.contacts[i]
         change = sliding_change(self.eq, contact.slip)
         G = ca.jacobian(contact.slip, self.eq.qd)
         return self.made(contact.name, [i], [ca.SX(1)], contact.slip, change, G, ())
 
     def loop(self, loop: Loop, members: Sequence[int]) -> Rest:
-        """All contacts of a loop of one degree of freedom."""
+        """Return the group of all contacts of a loop of one degree of freedom."""
         eq, columns = self.eq, list(loop.columns)
         contacts = [eq.contacts[i] for i in members]
         J = eq.Phi_q[list(loop.rows), columns]
         if ca.depends_on(eq.phi[list(loop.rows), 0], eq.kin.t):
             raise self.refuse(
-                contacts, "one that needs v and N alone in a loop that moves with time",
-                "a smooth law goes on",
+                contacts, "one that needs only v and N in a loop that moves with time",
+                "use a smooth law",
             )  # fmt: skip
         if len(columns) > MINORS:
             raise self.refuse(
@@ -321,7 +328,7 @@ class _Maker:
             )
         if {s.name for c in contacts for s in some_switches(c.law)} - {"stick", "slip"}:
             raise self.refuse(
-                contacts, "one that stops at v = 0 alone in a loop", "ExactCoulomb does"
+                contacts, "one that stops only at v = 0 in a loop", "use ExactCoulomb"
             )
         Z = ca.SX(eq.n, 1)
         Z[columns] = null_direction(J)
@@ -333,7 +340,7 @@ class _Maker:
 def rests(
     where: str, eq: Equations, start: tuple[Variables, Variables, Array], p: Variables
 ) -> tuple[Rest, ...]:
-    """Contacts whose laws ask for F_e, in groups that rest together.
+    """Return the contacts whose laws need F_e, in groups that stick together.
 
     Args:
         where: for messages.
@@ -342,7 +349,7 @@ def rests(
         p: parameters.
 
     Raises:
-        ValueError: constraints hold a contact, or leave open what contacts at rest carry.
+        ValueError: constraints hold a contact, or the forces of sticking contacts are undetermined.
     """
     asking = [i for i, c in enumerate(eq.contacts) if c.law.inputs]
     if not asking:
@@ -365,13 +372,13 @@ def rests(
         raise make.refuse(
             [eq.contacts[i] for i in alone],
             "no more of them in a loop than it has degrees of freedom",
-            "how they share what they hold is open; a smooth law in the others goes on",
+            "the distribution of their forces is undetermined; use smooth laws in the others",
         )
     return tuple(sorted(found, key=lambda rest: rest.members))
 
 
 def applied_forces(groups: Sequence[Rest], levels: Sequence[ca.SX]) -> dict[int, ca.SX]:
-    """Number of a contact -> its F_e, given what every contact can hold [N]."""
+    """Return number of a contact -> its F_e, for the static levels of all contacts [N]."""
     pairs = (
         zip(
             rest.members,

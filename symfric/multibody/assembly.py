@@ -1,12 +1,12 @@
-"""From the equations of a mechanism to a `Model`.
+"""Assembly of a `Model` from the equations of a mechanism.
 
-Accelerations are eliminated: a = -M^-1 (balance at a = 0). For bodies that hang freely on the
-ground (absolute coordinates) the inverse has a closed form,
+Accelerations are eliminated: a = -M^-1 (balance at a = 0). For free bodies (absolute coordinates)
+the inverse has a closed form,
 
     M^-1 = diag(I/m, E' J_W^-1 E / 4 + p p' / weight),
 
 with J_W the inertia in world components; otherwise M is factorised as L D L'. The multipliers of
-loops, the forces that laws with true rest must carry and those normal forces that depend on
+loops, the applied forces of laws with true sticking and those normal forces that depend on
 reactions are algebraic variables.
 """
 
@@ -35,8 +35,9 @@ from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflect
 from symfric.multibody.topology import Topology
 
 AT_REST = 1e-9
-"""Sliding velocity [m/s] below which a law that rests by modes does so in pictures: it is exact but
-for rounding."""
+"""Sliding velocity [m/s] below which a law with modes sticks in figures: its stick is exact up to
+rounding.
+"""
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
 Drawn = Callable[[Mapping[str, float]], Sketch]
 
@@ -72,14 +73,14 @@ def assemble(
     index: int,
     cut: Equations | None = None,
 ) -> Model:
-    """The model of a mechanism.
+    """Return the model of a mechanism.
 
     Args:
         eq: its equations, in the symbols of q and qd.
         labels: names of the multipliers.
         guess: accelerations "a", multipliers "lam" and normal forces "N" without friction, at the
             start.
-        more: what writes further results and the sketch.
+        more: functions for further results and the sketch.
         index: 0 or 1, see `Holonomic`.
         cut: the equations of a long chain once more, with cuts.
     """
@@ -123,7 +124,7 @@ def _model(
     machine: _Machine, contacts: Sequence[Slip], groups: Sequence[Rest], inner: Inner | None,
     frictional: tuple[Contact, ...], opening: Callable[[], Model] | None,
 ) -> Model:  # fmt: skip
-    """The model of a machine whose contacts have the forces that `contacts` say."""
+    """Return the model of a machine with the contact forces of `contacts`."""
     eq, p = machine.eq, machine.p
     pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
     forces = stacked(s.force for s in contacts)
@@ -185,7 +186,7 @@ def _model(
 
 
 def _frictional(contacts: Sequence[Slip]) -> tuple[Contact, ...]:
-    """The contacts of a model; not those of balls, whose slip is a vector without two sides."""
+    """Return the contacts of a model, except balls, whose slip is a vector without two sides."""
     return tuple(
         Contact(
             s.contact.name,
@@ -209,13 +210,13 @@ def _pressed(slip: Slip) -> bool:
 
 
 def _rounding(contact: Rubbing) -> Variable:
-    """The width of |f| in a normal force, as a parameter."""
+    """Return the width of |f| in a normal force, as a parameter."""
     eps = contact.friction.eps
     return Variable(f"{contact.pressed}_eps", "N", start=eps, lower=0.0, doc="width of |f|")
 
 
 def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact, ...]) -> Model:
-    """The model with friction forces as inputs; balls keep their laws."""
+    """Return the model with friction forces as inputs; balls keep their laws."""
     eps: dict[str, Scalar] = {s.contact.pressed: s.contact.friction.eps for s in contacts}
     widths = {v.name: v for c in frictional for v in c.widths.values()}
     eps |= {name: widths[f"{name}_eps"].symbol for name in eps if f"{name}_eps" in widths}
@@ -236,7 +237,9 @@ def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact
 
 
 def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.SX) -> Inner | None:
-    """Balance and normal forces with inner unknowns, eliminated link by link from the tips."""
+    """Return balance and normal forces with inner unknowns, eliminated link by link from the
+    tips.
+    """
     cuts, links = cut.kin.cuts, eq.kin.topology.links
     if cuts is None:
         return None
@@ -253,7 +256,7 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.S
         of_link[s.contact.joint] += [v.symbol for v in (*s.unknown, *s.states)]
     groups: list[ca.SX] = []
     for k, link in reversed(list(enumerate(links))):
-        # inner unknowns first: nothing stands on their right-hand sides, so they cost no stage
+        # inner unknowns first: their right-hand sides are zero, so they cost no stage
         groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
         groups.append(stacked(of_link[link.joint.name]))
@@ -261,21 +264,22 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.S
 
 
 def _scale(slip: Slip, p: Variables) -> float:
-    """Sliding velocity on which the law changes, at the start values of `p` [m/s]."""
+    """Return the velocity scale of the law at the start values of `p` [m/s]."""
     return float(at_start(slip.contact.friction.law.velocity_scale, p))
 
 
 def _watched(slip: Slip) -> tuple[Monitor, ...]:
-    """Its sliding velocities, on the scale of its law."""
+    """Return the monitors of its sliding velocities, on the scale of its law."""
     scale = slip.contact.friction.law.velocity_scale
     return tuple(Monitor(v, scale) for v in ca.vertsplit(slip.contact.slip))
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:
-    """Normal forces that could turn negative, what they are, and what to try where none fits.
+    """Return normal forces that could become negative, their names, and advice if there is no
+    solution.
 
-    Those are the unknown ones, and those that inputs or parameters give; a sum of absolute values
-    of reactions that no law asks for cannot.
+    These are the unknown ones, and those given by inputs or parameters; a sum of absolute values of
+    reactions that no law needs cannot become negative.
     """
     values, words, bristles = list[ca.SX](), list[str](), list[Slip]()
     for s in contacts:
@@ -291,10 +295,10 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
 
 
 def _advice(bristles: Sequence[Slip]) -> str:
-    """What to write instead of laws whose bristles keep the deflection of a larger load; once.
+    """Return advice to replace laws whose bristles keep the deflection of a larger load, once.
 
-    The load under which nothing changes is the least of those at the start: in all joints bristles
-    are then no softer than they were.
+    The load of the replacement is the least of those at the start: bristles in all joints are then
+    at least as stiff as before.
     """
     if not bristles:
         return ""
@@ -312,7 +316,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
 
 
 def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
-    """Sliding velocity and friction force; their smooth sizes where they are vectors."""
+    """Return sliding velocity and friction force; their smooth sizes if they are vectors."""
     law = slip.contact.law
     if not isinstance(law, SpatialSlip):
         return slip.contact.slip, slip.force
@@ -323,7 +327,7 @@ def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
 def _outputs(
     eq: Equations, contacts: Sequence[Slip], put: Put, multipliers: list[str]
 ) -> dict[str, Output]:
-    """Results of the contacts, energies, and what is left of the constraints.
+    """Return results of the contacts, energies, and the residuals of the constraints.
 
     `multipliers` are their units.
     """
@@ -340,12 +344,12 @@ def _outputs(
             )
         speed, size = _sizes(slip)
         rate = contact.unit("m/s")
-        found[f"{name}_slip"] = Output(speed, rate, "sliding velocity, of a ball its size")
+        found[f"{name}_slip"] = Output(speed, rate, "sliding velocity, for a ball its magnitude")
         found[f"{name}_friction"] = Output(
             size, contact.unit("N"), "friction force opposing the slip", kinds.FRICTION
         )
         power = ca.dot(slip.force, contact.slip)
-        found[f"{name}_power"] = Output(power, "W", "power taken by friction", kinds.FRICTION)
+        found[f"{name}_power"] = Output(power, "W", "power dissipated by friction", kinds.FRICTION)
     for name, value, doc in (
         ("kinetic", eq.kinetic, "kinetic energy"),
         ("potential", eq.potential, "potential energy"),

@@ -25,15 +25,15 @@ Position = Callable[[Array], tuple[ca.DM, ca.DM, ca.DM]]
 FITS = 1e-8
 """Largest violation of a constraint at the start [m, m/s]."""
 FASTEST = 1e4
-"""Rates that follow others may be so many times as large; they are larger at a dead centre only."""
+"""Largest ratio of dependent to independent rates; it is exceeded at a dead centre only."""
 RANK = 1e-9
-"""Singular values below this times the largest count as zero."""
+"""Singular values below this fraction of the largest count as zero."""
 SINGULAR = 1e-12
 """Eigenvalues of a mass matrix of unit diagonal below this count as zero."""
 
 
 def texts(part: object) -> Iterator[str]:
-    """Names and places of a part that are no texts."""
+    """Yield messages about names and places of a part that are not texts."""
     for item in fields(part):  # type: ignore[arg-type]
         value = getattr(part, item.name)
         if item.type is str and not isinstance(value, str):
@@ -47,7 +47,7 @@ def naming(
     constraints: Sequence[Constraint],
     inputs: Variables = (),
 ) -> Iterator[str]:
-    """Names that are repeated or no C identifiers, places and joints that do not exist."""
+    """Yield messages about repeated or invalid names, and missing places and joints."""
     names = [("body", b.name) for b in bodies] + [("joint", j.name) for j in joints]
     names += [("force", f.name) for f in forces] + [(c.kind, c.name) for c in constraints]
     names += [("input", v.name) for v in inputs]
@@ -79,7 +79,7 @@ def _identifier(name: object) -> bool:
 
 
 def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]) -> Iterator[str]:
-    """Joints that do not exist, and directions in which they do not move."""
+    """Yield messages about missing joints, and directions in which they do not move."""
     known = {joint.name: joint for joint in joints}
     for name, direction in pairs:
         if name not in known:
@@ -104,7 +104,7 @@ def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:
 
 
 def weights(bodies: Sequence[Body], p: ca.SX, values: ca.DM) -> Iterator[str]:
-    """Masses and inertias that cannot be."""
+    """Yield messages about invalid masses and inertias."""
     for body in bodies:
         if body.name == GROUND:
             continue
@@ -115,7 +115,7 @@ def weights(bodies: Sequence[Body], p: ca.SX, values: ca.DM) -> Iterator[str]:
 
 
 def bearings(joints: Sequence[Joint], p: ca.SX, u: ca.SX) -> Iterator[str]:
-    """Start values, lengths and friction that cannot be."""
+    """Yield messages about invalid start values, lengths and friction."""
     for joint in joints:
         where = f"joint '{joint.name}'"
         own = [value for name, value in vars(joint).items() if name != "friction"]
@@ -148,11 +148,11 @@ def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterat
 
 
 def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str) -> Iterator[str]:
-    """Symbols in `values` that nobody declared."""
+    """Yield messages about undeclared symbols in `values`."""
     flat = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]
     stray = strays(ca.veccat(*(x for x in flat if isinstance(x, ca.SX))), known)
     if stray:
-        hint = f"hand the variable over, build(p=({stray[0]},))"
+        hint = f"pass the variable, build(p=({stray[0]},))"
         yield f"{where}: expected only declared {expected}, got {', '.join(stray)}; {hint}"
 
 
@@ -161,12 +161,12 @@ def _finite(x: object) -> bool:
 
 
 def connected(bodies: Sequence[Body], topology: Topology) -> Iterator[str]:
-    """Bodies that hang on nothing; nothing that could move."""
+    """Yield messages about bodies without a connection, and mechanisms that cannot move."""
     hung = {GROUND, *(link.body for link in topology.links)}
     loose = [body.name for body in bodies if body.name not in hung]
     for name in loose:
         yield (
-            f"body '{name}': expected joints with coordinates that lead to the ground, found "
+            f"body '{name}': expected joints with coordinates up to the ground, found "
             "none; a Floating joint lets it move freely"
         )
     if not loose and not topology.n:
@@ -176,13 +176,13 @@ def connected(bodies: Sequence[Body], topology: Topology) -> Iterator[str]:
 @final
 @dataclass(frozen=True, eq=False)
 class Rank:
-    """Which constraints determine the motion.
+    """Constraints that determine the motion.
 
     Attributes:
         kept: indices of independent constraints.
         redundant: indices of the others.
         undetermined: multiplier combinations without effect on the motion, shape (m, k).
-        singular: whether the rank falls at the start position itself.
+        singular: True if the rank drops at the start position itself.
     """
 
     kept: tuple[int, ...]
@@ -192,11 +192,11 @@ class Rank:
 
 
 def rank(at: Position, q: Array, first: Sequence[int] = ()) -> Rank:
-    """Independent constraints near q, by elimination with full pivoting.
+    """Return independent constraints near q, by elimination with full pivoting.
 
     Args:
         at: q -> (phi, phi_q, phi_t).
-        first: constraints that are kept whatever the others are, independent of each other.
+        first: constraints that are kept in any case, independent of each other.
     """
     here = at(q)[1].full()
     near = here
@@ -218,9 +218,9 @@ def _rank(A: Array) -> int:
 
 
 def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
-    """Indices of r independent rows: those of `first`, then Gram-Schmidt, the row with most left.
+    """Return indices of r independent rows: `first`, then by Gram-Schmidt the largest remainder.
 
-    Of equal rows the first is taken, so that the joints named first are kept whole.
+    Of equal rows the first is taken, so that the joints named first are kept completely.
     """
     left, chosen = A.copy(), list[int]()
     for k in range(r):
@@ -233,9 +233,9 @@ def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
 
 
 def weightless(M: Array) -> NDArray[np.bool_]:
-    """Which coordinates keep the mass matrix M, shape (n, n), from being positive definite.
+    """Return a mask of coordinates that make the mass matrix M (n, n) not positive definite.
 
-    Each is measured by its own inertia, so that units and sizes do not matter.
+    Each is scaled by its own inertia, so that units and sizes do not matter.
     """
     own = np.diag(M)
     if not (own > 0).all():
@@ -245,9 +245,10 @@ def weightless(M: Array) -> NDArray[np.bool_]:
 
 
 def following(J: Array, wanted: Array, phi_t: Array) -> Array:
-    """Rates near `wanted` that satisfy J rates + phi_t = 0.
+    """Return rates near `wanted` that satisfy J rates + phi_t = 0.
 
-    Those other than zero are kept, and the others follow; where they cannot, the nearest are taken.
+    Nonzero rates are kept if possible, and the others follow; otherwise the nearest rates are
+    taken.
     """
     if not J.size:
         return wanted
@@ -262,7 +263,9 @@ def following(J: Array, wanted: Array, phi_t: Array) -> Array:
 
 
 def project(at: Position, q: Array, iterations: int = 30) -> Array | None:
-    """The nearest q that satisfies the constraints, by Gauss-Newton; None if there is none near."""
+    """Return the nearest q that satisfies the constraints, by Gauss-Newton; None if there is
+    none.
+    """
     for _ in range(iterations):
         phi, J, _ = (m.full() for m in at(q))
         if not phi.size or np.abs(phi).max() < 1e-13:

@@ -1,11 +1,11 @@
-"""Constraints that are no joints: prescribed motion, couplings, expressions of positions.
+"""Constraints other than joints: prescribed motion, couplings, expressions of positions.
 
     phi(q, t) = 0,   phi_q q' + phi_t = 0,   phi_q a + (phi_q q')_q q' + 2 phi_qt q' + phi_tt = 0
 
-A constraint that fixes displacements s_j of joints, phi = f(t) - sum c_j s_j, loads joint j with
-c_j lam: a multiplier is a force or moment and has a name that says so. Where a joint closes a loop,
-and of all joints in absolute coordinates, the pose gives an angle between -pi and pi. Then phi is
-taken modulo its period: full turns are made, and the nearest of equivalent positions is meant.
+A constraint on displacements s_j of joints, phi = f(t) - sum c_j s_j, loads joint j with c_j lam: a
+multiplier is a force or moment, and named accordingly. For a joint that closes a loop, and for all
+joints in absolute coordinates, the pose gives an angle between -pi and pi. Then phi is taken modulo
+its period: full turns are possible, and the nearest of equivalent positions is used.
 """
 
 from abc import ABC, abstractmethod
@@ -37,7 +37,7 @@ class Held:
         labels: names of its multipliers.
         loads: multipliers (m, 1) -> loads on the bodies.
         unit: of the multipliers, as text.
-        problems: why it cannot be; then it has no rows.
+        problems: reasons why it is invalid; then it has no rows.
     """
 
     phi: ca.SX
@@ -48,30 +48,30 @@ class Held:
 
 
 def impossible(*problems: str) -> Held:
-    """No equations, and why."""
+    """Return no equations, with the problems."""
     return Held(ca.SX(0, 1), (), lambda lam: (), problems=problems)
 
 
 @dataclass(frozen=True, eq=False)
 class Constraint(Keywords, ABC):
-    """Something that restricts the motion of bodies."""
+    """Constraint on the motion of bodies."""
 
     kind: ClassVar[str] = "constraint"
-    """What messages call it."""
+    """Name of the type in messages."""
 
     name: str
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """The joints it names, each with a direction."""
+        """Return the joints it names, each with a direction."""
         return ()
 
     def problems(self) -> Iterator[str]:
-        """Problems of its numbers."""
+        """Yield problems of its numbers."""
         return iter(())
 
     @abstractmethod
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
-        """Its equations and the loads of its multipliers."""
+        """Return its equations and the loads of its multipliers."""
 
 
 Term = tuple[Joint, str, Scalar]
@@ -81,7 +81,7 @@ Term = tuple[Joint, str, Scalar]
 def linear(
     kin: Kinematics, name: str, terms: Sequence[Term], rest: Scalar, period: Scalar | None
 ) -> Held:
-    """The constraint rest - sum c_j s_j = 0, modulo `period` if there is one.
+    """Return the constraint rest - sum c_j s_j = 0, modulo `period` if there is one.
 
     Its multiplier is the force or moment on the last of the joints.
     """
@@ -89,7 +89,7 @@ def linear(
     for joint, direction, c in terms:
         phi -= c * kin.along(joint, direction)[0]
     if period is not None:
-        # the derivative of floor is zero, so that those of phi stay what they are
+        # the derivative of floor is zero, so those of phi are unchanged
         phi -= period * ca.floor(phi / period + 0.5)
     last, along, _ = terms[-1]
     what, unit = ("force", "N") if last.linear(along) else ("moment", "N m")
@@ -109,18 +109,18 @@ def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
 @final
 @dataclass(frozen=True, eq=False)
 class PrescribedMotion(Constraint):
-    """A joint moves as a function of time says: s = motion(t).
+    """Prescribed motion of a joint: s = motion(t).
 
-    A joint with one direction needs no `direction`; of others it is "turn" where nothing is said.
+    A joint with one direction needs no `direction`; for others the default is "turn".
 
     `motion` takes the SX symbol of time and returns a displacement [m] or angle [rad], twice
-    differentiable; it may contain parameters, but no input, whose derivatives nobody knows. Its
-    multiplier is the force `<name>_force` [N] or moment `<name>_moment` [N m] on the joint's child
-    that the drive needs for it; the drive's power is that times s'.
+    differentiable; it may contain parameters, but no input, whose derivatives are unknown. Its
+    multiplier is the force `<name>_force` [N] or moment `<name>_moment` [N m] that the drive exerts
+    on the joint's child; the drive's power is that times s'.
 
     Limits: positions and velocities of the start must be motion(0) and motion'(0); a jump of
-    motion' would be an impact and is not seen. Joints that close loops and absolute coordinates
-    know the angle modulo 2 pi: full turns are made, motion and motion + 2 pi are the same.
+    motion' would be an impact and is not detected. Joints that close loops and absolute coordinates
+    have the angle modulo 2 pi: full turns are possible, motion and motion + 2 pi are the same.
     """
 
     kind: ClassVar[str] = "drive"
@@ -130,22 +130,22 @@ class PrescribedMotion(Constraint):
     direction: str = ""
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """The joint that is driven, and along which direction."""
+        """Yield the joint that is driven, and its direction."""
         return ((self.joint, self.direction),)
 
     def problems(self) -> Iterator[str]:
-        """A motion that is no function."""
+        """Yield a message if the motion is not a function."""
         if not callable(self.motion):
             yield f"motion: expected a function of time, got {self.motion!r}; write lambda t: ..."
 
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
-        """motion(t) - s = 0."""
+        """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"
         try:
             target = ca.SX(expression("motion", self.motion(kin.t)))
         except (TypeError, ValueError, ArithmeticError, RuntimeError) as error:
             reason = str(error).rpartition(", got ")[2].partition("\n")[0]
-            return impossible(f"{what}, got {reason}; write casadi functions for those of math")
+            return impossible(f"{what}, got {reason}; use casadi functions, not those of math")
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
         joint = joints[self.joint]
@@ -159,11 +159,11 @@ class PrescribedMotion(Constraint):
 class UserConstraint(Constraint):
     """Expressions of positions and time that vanish.
 
-    `expression` takes the kinematics, which answers `point("body.frame")` with a position (and a
-    velocity, which must not be used), `motion["body"]` with R and p, `along(joint, direction)` with
-    a displacement, and has the time `t`; it returns one expression or a column of them. Their
-    multipliers are `<name>_lambda`, or `_1`, `_2`, ...; bodies are loaded with -phi_p' lam at their
-    origins, so that reactions of joints and their friction are right.
+    `expression` takes the kinematics, with `point("body.frame")` for a position (and a velocity,
+    which must not be used), `motion["body"]` with R and p, `along(joint, direction)` for a
+    displacement, and the time `t`; it returns one expression or a column of them. Their multipliers
+    are `<name>_lambda`, or `_1`, `_2`, ...; bodies are loaded with -phi_p' lam at their origins, so
+    that reactions of joints and their friction are correct.
 
     Limits: holonomic constraints only.
     """
@@ -171,12 +171,12 @@ class UserConstraint(Constraint):
     expression: Callable[[Kinematics], Scalar]
 
     def problems(self) -> Iterator[str]:
-        """An expression that is no function."""
+        """Yield a message if the expression is not a function."""
         if not callable(self.expression):
             yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
-        """The expressions, and their derivatives by the pose of every body."""
+        """Return the expressions, and their derivatives by the pose of every body."""
         probe = _probe(kin)
         given: Any = self.expression(probe)
         try:
@@ -223,7 +223,7 @@ class UserConstraint(Constraint):
 
 
 def _probe(kin: Kinematics) -> Kinematics:
-    """The same kinematics with the motions of all bodies as symbols."""
+    """Return the same kinematics with the motions of all bodies as symbols."""
     motion = {GROUND: kin.motion[GROUND]}
     for name in kin.motion:
         if name != GROUND:
@@ -233,11 +233,11 @@ def _probe(kin: Kinematics) -> Kinematics:
 
 
 TEETH = 1000
-"""Largest denominator of a ratio where both angles are known modulo 2 pi."""
+"""Largest denominator of a ratio if both angles are known modulo 2 pi."""
 
 
 class Coupling(Constraint):
-    """One displacement of a joint follows another: gears, rolling without slipping, screws.
+    """Coupling of the displacements of two joints: gears, rolling without slipping, screws.
 
         s_b = ratio s_a + offset
 
@@ -246,18 +246,17 @@ class Coupling(Constraint):
     the child of b; ratio times its opposite acts on the child of a.
 
     Joint coordinates count full turns. A joint that closes a loop, and every joint in absolute
-    coordinates, knows its angle modulo 2 pi. The coupling still makes full turns, as the gear does
-    that cannot tell its teeth from each other: where one of the two angles is known that way for
-    every ratio, where both are for ratios of integers.
+    coordinates, has its angle modulo 2 pi. The coupling still allows full turns: for any ratio if
+    one of the two angles is known modulo 2 pi, for ratios of integers if both are.
 
-    Limits: the bearings of the joints feel forces and moments along the axes only, not the pressure
-    between teeth; a `UserConstraint` puts that where it acts. No backlash, no friction of teeth.
+    Limits: the bearings of the joints get forces and moments along the axes only, not the pressure
+    between teeth; use a `UserConstraint` for that. No backlash, no friction of teeth.
     """
 
     kind: ClassVar[str] = "coupling"
 
     ratio_field: ClassVar[str] = "ratio"
-    """The number that is the ratio, or makes it."""
+    """Field that is the ratio, or defines it."""
 
     a: str
     b: str
@@ -275,11 +274,13 @@ class Coupling(Constraint):
         return getattr(self, self.ratio_field)
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Both joints that are coupled, and along which directions."""
+        """Yield both coupled joints with their directions."""
         return self._ends
 
     def problems(self) -> Iterator[str]:
-        """A ratio of zero, numbers that are none, one displacement coupled to itself."""
+        """Yield messages about a zero ratio, invalid numbers, or a displacement coupled to
+        itself.
+        """
         name, ratio, offset = self.ratio_field, getattr(self, self.ratio_field), self.offset
         if not is_symbolic(ratio) and not (is_number(ratio) and 0 < abs(ratio) < ca.inf):
             yield f"{name}: expected a finite number other than 0, got {ratio!r}"
@@ -290,7 +291,7 @@ class Coupling(Constraint):
             yield f"expected two displacements, got {a[1]} of {a[0]} twice"
 
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
-        """Offset + ratio s_a - s_b = 0."""
+        """Return offset + ratio s_a - s_b = 0."""
         (a, along_a), (b, along_b) = ((joints[name], d) for name, d in self._ends)
         ratio, offset, period = self._ratio, self.offset, None
         cyclic = wraps(kin, a, along_a), wraps(kin, b, along_b)
@@ -299,7 +300,7 @@ class Coupling(Constraint):
                 return impossible(
                     f"{self.ratio_field}: expected a ratio of integers up to {TEETH}, as the "
                     f"angles of {a.name} and {b.name} are known modulo 2 pi only, got {ratio}; in "
-                    "joint coordinates joints that close no loop take any number"
+                    "joint coordinates, joints outside loops allow any number"
                 )
             fraction = _fraction(ratio)
             ratio, period = float(fraction), 2 * pi / fraction.denominator
@@ -319,10 +320,10 @@ def _rational(ratio: Scalar) -> bool:
 @final
 @dataclass(frozen=True, eq=False)
 class Gear(Coupling):
-    """Two angles: angle_b = ratio angle_a + offset.
+    """Coupling of two angles: angle_b = ratio angle_a + offset.
 
-    `ratio` is -z_a/z_b for gears with z teeth that mesh from outside, +z_a/z_b for a belt or an
-    internal gear, if both axes point the same way. Result: `<name>_moment` [N m] on the child of b.
+    `ratio` is -z_a/z_b for external gears with z teeth, +z_a/z_b for a belt or an internal gear, if
+    both axes point the same way. Result: `<name>_moment` [N m] on the child of b.
     """
 
     a: str
@@ -336,12 +337,12 @@ class Gear(Coupling):
 @final
 @dataclass(frozen=True, eq=False)
 class Rolling(Coupling):
-    """An angle and a displacement: s_b = radius angle_a + offset.
+    """Coupling of an angle and a displacement: s_b = radius angle_a + offset.
 
-    A pinion on its rack, a wheel that rolls without slipping, a drum with its rope; a negative
-    radius turns the sense. Result: `<name>_force` [N] on the child of b. A disc in a plane has
-    both in one `Planar` joint, directions "turn" and "x": then that is the force that the track
-    must take without slipping.
+    Examples are a pinion on its rack, a wheel that rolls without slipping, a drum with its rope; a
+    negative radius reverses the direction. Result: `<name>_force` [N] on the child of b. For a disc
+    in a plane both are directions of one `Planar` joint, "turn" and "x"; then it is the force that
+    the track must transmit without slipping.
     """
 
     ratio_field = "radius"
@@ -357,7 +358,7 @@ class Rolling(Coupling):
 @final
 @dataclass(frozen=True, eq=False)
 class Screw(Coupling):
-    """A cylindrical joint with a thread: slide = lead / (2 pi) turn + offset.
+    """Cylindrical joint with a thread: slide = lead / (2 pi) turn + offset.
 
     Result: `<name>_force` [N] along the axis on its child.
     """

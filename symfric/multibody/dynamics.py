@@ -1,12 +1,12 @@
-"""Equations of motion by Newton and Euler: one recursion inwards from the tips of the tree.
+"""Equations of motion by Newton and Euler, in one recursion from the tips of the tree inwards.
 
 With the accelerations a of the coordinates and the multipliers lam of the loops as unknowns,
 
     balance(q, q', a, lam) = M a + Phi_q' lam - Q = 0,   Phi_q a + gamma = 0
 
 where each row of the balance is the wrench that a joint of the tree transmits, projected on its
-motion subspace. What remains of that wrench is the reaction that presses the bearing; for a joint
-that closes a loop it follows from its multipliers. Both are wrenches on the joint's child about the
+motion subspace. The rest of that wrench is the reaction that loads the bearing; for a joint that
+closes a loop it follows from its multipliers. Both are wrenches on the joint's child about the
 origin of the joint's frame there and in the axes of that frame.
 """
 
@@ -47,13 +47,13 @@ class Loop:
     relative: Relative
 
     def reaction(self, lam: ca.SX) -> Wrench:
-        """Wrench on the child at its joint point, in the parent's joint frame."""
+        """Return the wrench on the child at its joint point, in the parent's joint frame."""
         own = lam[self.rows, 0]
         return -self.C_v.T @ own, -self.C_w.T @ own
 
 
 def loops(kin: Kinematics) -> tuple[Loop, ...]:
-    """The constraints of all joints that are not in the tree."""
+    """Return the constraints of all joints that are not in the tree."""
     found: list[Loop] = []
     first = 0
     for joint in kin.topology.loops:
@@ -73,12 +73,12 @@ def loops(kin: Kinematics) -> tuple[Loop, ...]:
 
 
 def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Norms of the Euler parameters, (p'p - 1)/2 = 0, and what they add to the balance.
+    """Return norms of the Euler parameters, (p'p - 1)/2 = 0, and their terms in the balance.
 
     Returns:
         Constraints (k, 1); the directions p in which the mass matrix is singular, as the columns
-        of (n, k); weights (k, 1) that make it regular: adding weight p (p'a + p''p') changes
-        nothing where the constraints hold.
+        of (n, k); weights (k, 1) that make it regular: adding weight p (p'a + p''p') has no effect
+        if the constraints hold.
     """
     links = [link for link in kin.topology.links if link.joint.quaternion is not None]
     phi, along, weights = ca.SX(0, 1), ca.SX(kin.topology.n, 0), ca.SX(0, 1)
@@ -95,7 +95,7 @@ def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 
 def _pairs(kin: Kinematics, axial: Axial) -> tuple[Load, Load]:
-    """An axial load of a joint that closes a loop, as loads on both bodies."""
+    """Return an axial load of a joint that closes a loop, as loads on both bodies."""
     relative, joint = kin.relative(axial.joint), axial.joint
     along = relative.R_WP @ joint.axis(axial.direction, relative.R) * axial.value
     none = ca.SX(3, 1)
@@ -110,9 +110,9 @@ def _pairs(kin: Kinematics, axial: Axial) -> tuple[Load, Load]:
 def balance(
     kin: Kinematics, applied: Iterable[Load | Axial], closed: tuple[Loop, ...], lam: ca.SX
 ) -> tuple[ca.SX, dict[str, Wrench]]:
-    """Rows of the equations of motion, and the reaction in every joint.
+    """Return the rows of the equations of motion, and the reaction in every joint.
 
-    The weight of the normalisations is not in it.
+    The weight of the normalisations is not included.
     """
     links = kin.topology.links
     loads: list[Load] = []
@@ -160,10 +160,10 @@ def _floats(kin: Kinematics, link: Link) -> bool:
 
 
 def _floating(kin: Kinematics, link: Link, loads: list[Load]) -> ca.SX:
-    """Balance of a body that nothing hangs on and that hangs on nothing.
+    """Return the balance of a free body that carries no other body.
 
-    Its forces stay in world components: turned into the body and back, R R' would be multiplied out
-    in every derivative.
+    Its forces stay in world components: transformed into the body and back, R R' would be
+    multiplied out in every derivative.
     """
     body, motion, rows = kin.topology.bodies[link.body], kin.motion[link.body], link.rows
     ground = kin.motion[GROUND]
@@ -178,14 +178,16 @@ def _floating(kin: Kinematics, link: Link, loads: list[Load]) -> ca.SX:
 
 
 def _moment_about(body: Body, motion: Motion, load: Load) -> ca.SX:
-    """Moment of a load about the centre of mass, in the body's components."""
+    """Return the moment of a load about the centre of mass, in the body's components."""
     com = motion.point(body.c)[0]
     arm = motion.R.T @ (load.point - com) if load.arm is None else load.arm - body.c
     return motion.R.T @ load.moment + ca.cross(arm, motion.R.T @ load.force)
 
 
 def _inertial(kin: Kinematics, link: Link, loads: list[Load]) -> Wrench:
-    """Inertial minus applied wrench of a body about its centre of mass, in its components."""
+    """Return inertial minus applied wrench of a body about its centre of mass, in its
+    components.
+    """
     body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
     w, J = motion.w_B, body.J
     force = body.mass * motion.acceleration(body.c)
@@ -200,11 +202,11 @@ def _inertial(kin: Kinematics, link: Link, loads: list[Load]) -> Wrench:
 def _project(
     kin: Kinematics, link: Link, carried: dict[str, Wrench], axial: dict[str, list[Axial]]
 ) -> tuple[ca.SX, Wrench]:
-    """Balance of a link's coordinates and the wrench its joint puts on the joint's child.
+    """Return the balance of a link's coordinates and the wrench of its joint on the joint's child.
 
     `carried` holds the wrench that each body needs from its joint, about its centre of mass and in
-    its own components; that of the base A grows by what this link passes on. The reaction is in
-    the axes of the joint's frame on the child, about its origin.
+    its own components; that of the base A is increased by the wrench of this link. The reaction is
+    in the axes of the joint's frame on the child, about its origin.
     """
     body, q = kin.topology.bodies[link.body], kin.q[link.rows, 0]
     R_PC, p = link.pose(q)
@@ -228,7 +230,7 @@ def _project(
 
 
 def kinetic_energy(kin: Kinematics) -> ca.SX:
-    """Kinetic energy of all bodies [J]."""
+    """Return the kinetic energy of all bodies [J]."""
     total = ca.SX(0)
     for link in kin.topology.links:
         body, motion = kin.topology.bodies[link.body], kin.motion[link.body]

@@ -1,4 +1,4 @@
-"""All expressions of a mechanism in one choice of coordinates."""
+"""Expressions of a mechanism in one choice of coordinates."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,17 +27,17 @@ class Equations:
         q, qd, a: coordinates, rates, accelerations, shape (n, 1).
         lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
         F: friction forces of the contacts [N].
-        held: constraints that are no joints.
-        turns: angles of loops that forces ask for.
-        norms: how many Euler parameters there are, whose norms are the last constraints.
+        held: constraints other than joints.
+        turns: angles of loops that forces need.
+        norms: number of Euler parameter norms, which are the last constraints.
         phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
-        contacts: where friction acts.
+        contacts: of all joints with friction.
         normals: normal force of each contact [N], in terms of q, qd, a, lam.
         kinetic, potential: energies [J].
         power: power of all applied forces, of friction and of drives on the bodies [W].
         reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
-        pressing: the wrenches that press bearings; of joints that only close loops, their own.
+        pressing: the wrenches that load bearings; of joints that only close loops, their own.
     """
 
     kin: Kinematics
@@ -105,11 +105,11 @@ def equations(
         topology: tree and loops.
         joints: all joints.
         forces: all applied forces.
-        constraints: what restricts the motion besides joints.
+        constraints: other than joints.
         q, qd: symbols of the coordinates and their rates, shape (n, 1).
         t: symbol of time.
         kept: indices of the independent constraints; None keeps all.
-        cuts: takes symbols for what bodies pass on to each other; None writes everything out.
+        cuts: introduces symbols for quantities passed between bodies; None writes everything out.
     """
     a = ca.SX.sym("a", topology.n)
     gravity = [f for f in forces if isinstance(f, Gravity)]
@@ -169,7 +169,7 @@ def equations(
 
 
 def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:
-    """Normal force of each contact, rounded over the widths `eps` of what is `pressed`."""
+    """Return the normal force of each contact, rounded over the widths `eps` by `pressed` name."""
     joints = {link.joint.name: link.joint for link in eq.kin.topology.links}
     joints |= {loop.joint.name: loop.joint for loop in eq.loops}
     return tuple(
@@ -184,7 +184,9 @@ def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:
 
 
 def _without(wrench: Wrench, name: str, kin: Kinematics, loads: Sequence[Load | Axial]) -> Wrench:
-    """What the constraints of a joint in the tree transmit, without its axial loads."""
+    """Return the wrench that the constraints of a joint in the tree transmit, without axial
+    loads.
+    """
     if name not in kin.topology.link_of:
         return wrench
     force, moment = ca.SX(wrench[0]), ca.SX(wrench[1])
@@ -201,7 +203,7 @@ def _without(wrench: Wrench, name: str, kin: Kinematics, loads: Sequence[Load | 
 
 
 def _holding(held: Sequence[Held], lam: ca.SX) -> list[Load | Axial]:
-    """Loads of constraints that are no joints, whose multipliers `lam` begins with."""
+    """Return loads of constraints other than joints, whose multipliers come first in `lam`."""
     loads: list[Load | Axial] = []
     first = 0
     for part in held:
@@ -212,7 +214,7 @@ def _holding(held: Sequence[Held], lam: ca.SX) -> list[Load | Axial]:
 
 
 def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
-    """Contacts of all joints with friction."""
+    """Return the contacts of all joints with friction."""
     found: list[Contact] = []
     for joint in joints:
         if joint.friction is None:
@@ -230,7 +232,7 @@ def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
 
 
 def _rubbing(kin: Kinematics, joint: Joint, contact: Contact) -> list[Load | Axial]:
-    """Friction on the child of a joint, and on the parent."""
+    """Return the friction on the child of a joint, and on the parent."""
     if contact.direction != "ball":
         return [Axial(joint, contact.direction, contact.load)]
     parent, child = body_of(joint.parent), body_of(joint.child)
@@ -243,7 +245,7 @@ def _rubbing(kin: Kinematics, joint: Joint, contact: Contact) -> list[Load | Axi
 
 
 def _normal(kin: Kinematics, contact: Contact, joint: Joint, reactions: dict[str, Wrench]) -> ca.SX:
-    """Normal force of a contact [N]."""
+    """Return the normal force of a contact [N]."""
     F, T = reactions[joint.name]
     if contact.direction not in ("x", "y"):
         return joint.normal_force(contact.friction, F, T)
@@ -252,7 +254,7 @@ def _normal(kin: Kinematics, contact: Contact, joint: Joint, reactions: dict[str
 
 
 def _power(kin: Kinematics, loads: Sequence[Load | Axial]) -> ca.SX:
-    """Power of loads on the bodies [W]."""
+    """Return the power of loads on the bodies [W]."""
     total = ca.SX(0)
     for load in loads:
         if isinstance(load, Load):

@@ -1,8 +1,8 @@
 """Applied forces: gravity, springs, dampers, actuators, user expressions.
 
-A force says which loads it puts on which bodies and what potential energy it has. The power of a
-load is force times velocity of its point plus moment times angular velocity; where the energy is
-conservative, power = -dV/dt (a test checks it for every force).
+A force defines its loads on bodies and its potential energy. The power of a load is force times
+velocity of its point plus moment times angular velocity; for conservative forces power = -dV/dt (a
+test checks it for every force).
 """
 
 from abc import ABC, abstractmethod
@@ -25,9 +25,9 @@ ZERO = ca.SX(3, 1)
 @final
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A force [N] at a point and a moment [N m] on a body, in world components.
+    """Force [N] at a point and a moment [N m] on a body, in world components.
 
-    `arm` is the point from the origin of the body in its own components, where it is fixed to it.
+    `arm` is the vector from the origin of the body to the point, in body components.
     """
 
     body: str
@@ -37,7 +37,7 @@ class Load:
     arm: ca.SX | None = None
 
     def power(self, kin: Kinematics) -> ca.SX:
-        """Power on the body [W]."""
+        """Return the power on the body [W]."""
         motion = kin.motion[self.body]
         v = motion.v + ca.cross(motion.w, self.point - motion.p)
         return ca.dot(self.force, v) + ca.dot(self.moment, motion.w)
@@ -46,7 +46,7 @@ class Load:
 @final
 @dataclass(frozen=True, eq=False)
 class Axial:
-    """A force [N] or moment [N m] on the child of a joint in one of its directions.
+    """Force [N] or moment [N m] on the child of a joint in one of its directions.
 
     Its opposite acts on the parent.
     """
@@ -58,20 +58,20 @@ class Axial:
 
 @dataclass(frozen=True, eq=False)
 class Force(ABC):
-    """Something that loads bodies."""
+    """Applied force on bodies."""
 
     name: str
 
     def places(self) -> Iterable[str]:
-        """The "body.frame" texts it names."""
+        """Yield the "body.frame" texts it names."""
         return ()
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """The joints it names, each with a direction."""
+        """Yield the joints it names, each with a direction."""
         return ()
 
     def problems(self) -> Iterator[str]:
-        """Numbers that are not finite."""
+        """Yield messages about numbers that are not finite."""
         for item in fields(self):
             value = getattr(self, item.name)
             good = is_symbolic(value) or (is_number(value) and abs(value) < ca.inf)
@@ -80,39 +80,39 @@ class Force(ABC):
 
     @property
     def conservative(self) -> bool:
-        """Return True if its power is nothing but the change of its potential energy."""
+        """True if its power is exactly the change of its potential energy."""
         return False
 
     @abstractmethod
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """Loads on the bodies."""
+        """Yield the loads on the bodies."""
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
-        """Potential energy [J]; zero where it has none."""
+        """Return the potential energy [J]; zero if it has none."""
         return ca.SX(0)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Gravity(Force):
-    """The weight m g of every body at its centre of mass; g [m/s^2] in world components."""
+    """Weight m g of every body at its centre of mass; g [m/s^2] in world components."""
 
     g: Vector = (0.0, 0.0, -9.81)
 
     @property
     def conservative(self) -> bool:
-        """Gravity always is: what it takes comes back."""
+        """Always True for gravity."""
         return True
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """The weight of every body at its centre of mass."""
+        """Yield the weight of every body at its centre of mass."""
         for name, body in kin.topology.bodies.items():
             if name != GROUND:
                 com, _ = kin.motion[name].point(body.c)
                 yield Load(name, body.mass * vector(self.g), com, arm=body.c)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
-        """-m g . p."""
+        """Return -m g . p."""
         weights = self.loads(kin, joints)
         return sum((-ca.dot(w.force, w.point) for w in weights if isinstance(w, Load)), ca.SX(0))
 
@@ -136,12 +136,12 @@ class SpringDamper(Force):
     actuator: Scalar = 0.0
 
     def places(self) -> Iterable[str]:
-        """The two places between which it acts."""
+        """Yield the two places between which it acts."""
         return (self.a, self.b)
 
     @property
     def conservative(self) -> bool:
-        """As a spring alone."""
+        """True for a pure spring."""
         return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
 
     @property
@@ -149,7 +149,7 @@ class SpringDamper(Force):
         return all(equals(x, 0.0) for x in (self.free_length, self.damping, self.actuator))
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """Opposite forces on the line between the points."""
+        """Yield opposite forces on the line between the points."""
         (p_a, v_a), (p_b, v_b) = kin.point(self.a), kin.point(self.b)
         d = p_b - p_a
         if self._linear:
@@ -164,7 +164,7 @@ class SpringDamper(Force):
         yield Load(body_of(self.b), -pull, p_b, arm=kin.offset(self.b))
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
-        """Stiffness (l - free_length)^2 / 2."""
+        """Return stiffness (l - free_length)^2 / 2."""
         d = kin.point(self.b)[0] - kin.point(self.a)[0]
         if equals(self.free_length, 0.0):
             return self.stiffness * ca.dot(d, d) / 2
@@ -176,14 +176,14 @@ class SpringDamper(Force):
 class JointSpringDamper(Force):
     """Spring, damper and actuator in one of the directions of a joint: "slide", "turn", ...
 
-    A joint with one direction needs none; of others it is "turn" where nothing is said.
+    A joint with one direction needs no `direction`; for others the default is "turn".
 
         f = -stiffness (s - rest) - damping s' + actuator
 
-    with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent.
-    The angle counts full turns. Where the joint closes a loop, it is a state of the model with the
+    with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent. The
+    angle counts full turns. If the joint closes a loop, the angle is a state of the model with the
     joint's name. It starts with the turns that the joints of the loop have made, if all axes of the
-    loop are parallel; else nearest to the joint's `start`, as the pose tells it modulo a turn.
+    loop are parallel; otherwise nearest to the joint's `start`, as the pose gives it modulo a turn.
     """
 
     joint: str
@@ -194,16 +194,16 @@ class JointSpringDamper(Force):
     actuator: Scalar = 0.0
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """The joint along whose direction it acts."""
+        """Yield the joint along whose direction it acts."""
         return ((self.joint, self.direction),)
 
     @property
     def conservative(self) -> bool:
-        """As a spring alone."""
+        """True for a pure spring."""
         return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """One load along the direction of its joint: actuator, spring and damper."""
+        """Yield one load along the direction of its joint: actuator, spring and damper."""
         joint = joints[self.joint]
         direction = joint.way(self.direction)
         f = ca.SX(self.actuator)
@@ -214,7 +214,7 @@ class JointSpringDamper(Force):
         yield Axial(joint, direction, f)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
-        """Stiffness (s - rest)^2 / 2."""
+        """Return stiffness (s - rest)^2 / 2."""
         if equals(self.stiffness, 0.0):
             return ca.SX(0)
         joint = joints[self.joint]
@@ -225,27 +225,27 @@ class JointSpringDamper(Force):
 @final
 @dataclass(frozen=True, eq=False)
 class UserForce(Force):
-    """A force [N] and a moment [N m] on a place, expressions of any body's motion.
+    """Force [N] and moment [N m] on a place, expressions of the motion of any body.
 
-    `expression` takes the kinematics, which answers `point("body.frame")` with position and
-    velocity, `motion["body"]` with R, p, w, v, `along(joint, direction)` with a displacement or an
-    angle over full turns and its rate, and returns force and moment in world components.
+    `expression` takes the kinematics, with `point("body.frame")` for position and velocity,
+    `motion["body"]` with R, p, w, v, `along(joint, direction)` for a displacement or an angle over
+    full turns and its rate, and returns force and moment in world components.
     """
 
     place: str
     expression: Callable[[Kinematics], tuple[Vector, Vector]]
 
     def problems(self) -> Iterator[str]:
-        """An expression that is no function."""
+        """Yield a message if the expression is not a function."""
         if not callable(self.expression):
             yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def places(self) -> Iterable[str]:
-        """The place at which it acts."""
+        """Yield the place at which it acts."""
         return (self.place,)
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """Force and moment as the user's expression gives them."""
+        """Yield force and moment of the user's expression."""
         given: Any = self.expression(kin)
         pair: Sequence[Any] = given if isinstance(given, tuple | list) else ()
         if len(pair) != 2 or not all(is_vector(x) and is_finite(vector(x)) for x in pair):

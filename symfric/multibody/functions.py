@@ -1,4 +1,4 @@
-"""The equations of a mechanism as named CasADi Functions, for those who write their own."""
+"""Equations of a mechanism as named CasADi Functions, for the user's own formulations."""
 
 import casadi as ca
 
@@ -13,21 +13,21 @@ from symfric.multibody.spatial import GROUND
 def functions(
     mechanism: Mechanism, p: Variables = (), formulation: str = "joint"
 ) -> dict[str, ca.Function]:
-    """Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
+    """Return Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
 
-    Those that depend on time, through prescribed motion or forces, take it as last argument t.
+    Functions that depend on time, through prescribed motion or forces, take it as last argument t.
 
     Args:
-        mechanism: what is described.
+        mechanism: the mechanism.
         p: parameters, as for `Mechanism.build`.
         formulation: "joint" or "absolute".
 
     Returns:
         mass: (q, p) -> M, shape (n, n).
-        bias: (q, qd, u, p) -> Coriolis forces minus applied forces, without friction: what
-            M a + phi_q' lam must balance.
+        bias: (q, qd, u, p) -> Coriolis forces minus applied forces, without friction: the negative
+            of M a + phi_q' lam.
         constraints: (q, p) -> phi, shape (m, 1), and its Jacobian phi_q.
-        inverse_dynamics: (q, qd, a, lam, z, u, p) -> the generalised forces that are missing for
+        inverse_dynamics: (q, qd, a, lam, z, u, p) -> the additional generalised forces required for
             the accelerations a, friction included; its normal forces follow from a and lam
             without a loop. z are the internal states of the laws.
         energy: (q, qd, p) -> kinetic and potential energy [J].
@@ -36,8 +36,8 @@ def functions(
     Raises:
         ValueError: as `Mechanism.build`.
 
-    Limits: in space q alone does not count the full turns of a joint that closes a loop; springs
-    about its axis are taken at the angle nearest to the start there.
+    Limits: q alone does not count the full turns of a joint that closes a loop; springs about its
+    axis are evaluated at the angle nearest to the start.
     """
     eq = mechanism.prepare(p, formulation).eq
     q, qd, a, lam = eq.q, eq.qd, eq.a, eq.lam
@@ -47,9 +47,9 @@ def functions(
     if asking := [c for c in eq.contacts if c.law.inputs]:
         raise ValueError(
             f"mechanism '{mechanism.name}' > joint '{asking[0].joint}' > friction > law: expected "
-            "one that needs v and N alone, got "
-            f"{type(asking[0].friction.law).__name__}, whose force at rest is what the motion asks "
-            "for; `build` gives a model of it"
+            "one that needs only v and N, got "
+            f"{type(asking[0].friction.law).__name__}, whose force in stick depends on the motion; "
+            "use `build` for a model"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     z = stacked(s.symbol for c in contacts for s in c.states)

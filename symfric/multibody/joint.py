@@ -1,16 +1,16 @@
-"""The base of all joints: pose and motion subspace, its constraints, and how it is shown.
+"""Base class of joints: pose, motion subspace, constraints, drawing style, and friction.
 
 A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
 p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
-angular velocity w_PC_C = H_w q' in components of C, where Euler parameters have it simplest, and
-the velocity p_PC' = H_v q' in those of P. The constraints are
-expressions of the pose that vanish for every q; they close a loop, where the joint has no
-coordinates. The axis of a joint is z of both frames.
+angular velocity w_PC_C = H_w q' in components of C, in which Euler parameters have it simplest, and
+the velocity p_PC' = H_v q' in those of P. The constraints are expressions of the pose that vanish
+for every q; they close a loop, in which the joint has no coordinates. The axis of a joint is z of
+both frames.
 
-Friction laws act on bodies here, with the only minus sign.
+Friction laws act on bodies only here, with the only minus sign.
 
 The reaction of a joint on its child, force F and moment T about the joint point in the axes of the
-child's frame, presses the bearing at two stations a apart on z:
+child's frame, loads the bearing at two stations a apart on z:
 
     f_x2 = -T_y / a,  f_y2 = T_x / a,  f_x1 = -F_x - f_x2,  f_y1 = -F_y - f_y2
 
@@ -24,8 +24,7 @@ child's frame, presses the bearing at two stations a apart on z:
 Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it. The ball
 of a spherical joint slips with v = R w, a vector in the axes of the socket, the parent's frame: the
 moment is -R F(v, N), with F along v for laws without states and bristles that are vectors, see
-`Isotropic`.
-Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
+`Isotropic`. Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
 """
 
 from abc import ABC, abstractmethod
@@ -47,30 +46,30 @@ from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 from symfric.model.sketch import Symbol
 
 OFFERED = (FORCE,)
-"""What a joint gives a law besides v and N, but in a ball."""
+"""Inputs that a joint gives a law besides v and N, except in a ball."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class JointFriction:
-    """A friction law in a joint; in a universal joint the same in both of its bearings.
+    """Friction law in a joint; in a universal joint the same in both of its bearings.
 
-    A normal force that falls below zero, through an input, a parameter or a negative preload, is
-    an error at its time, not friction that drives.
+    A normal force that falls below zero, through an input, a parameter or a negative preload, is an
+    error at that time, not friction that drives.
 
-    Laws with true rest (`ExactCoulomb`, `Karnopp`, `LeineSwitch`, `Awrejcewicz`) get the force F_e
-    that the contact must carry from the constraints, see `symfric.multibody.applied`. By modes,
-    what stops rests, and what rests breaks away where |F_e| passes the static level; after each
-    change of mode the whole mechanism is solved again, and what then cannot hold breaks away at
-    the same instant, what would slide the wrong way rests again. So several valid states of rest
-    and sliding, which mu_s > mu_d leaves, are told apart by what happened before; at the start
-    what is overloaded breaks away. The contacts of a loop of one degree of freedom rest and break
-    away together, where all of them are at their static levels; smooth laws with mu_s > mu_d break
-    away a little earlier there, as the contact that moves most passes its peak first, and tend to
-    the same motion where mu_s = mu_d.
-    Limits: not in a ball, nor where a drive prescribes the sliding; in a loop of several degrees of
-    freedom as many as are independent. Forms that jump without modes (`Karnopp`, `LeineSwitch` with
-    form = "original") end a run at the jump. What else a `Sum` has must vanish at rest.
+    Laws with true sticking (`ExactCoulomb`, `Karnopp`, `LeineSwitch`, `Awrejcewicz`) get the
+    applied force F_e from the constraints, see `symfric.multibody.applied`. With modes, a contact
+    that stops sticks, and a sticking contact breaks away when |F_e| exceeds the static level. After
+    each change of mode the whole mechanism is solved again; contacts that then cannot hold break
+    away at the same instant, and contacts that would slide the wrong way stick again. mu_s > mu_d
+    allows several valid states of stick and slip; the history selects one, and at the start
+    overloaded contacts break away. The contacts of a loop of one degree of freedom stick and break
+    away together, when all of them are at their static levels; smooth laws with mu_s > mu_d break
+    away slightly earlier there, because the contact that moves most passes its peak first, and tend
+    to the same motion for mu_s = mu_d. Limits: not in a ball, nor where a drive prescribes the
+    sliding; in a loop of several degrees of freedom as many as are independent. Forms that jump
+    without modes (`Karnopp`, `LeineSwitch` with form = "original") end a run at the jump. Other
+    terms of a `Sum` must vanish in stick.
 
     Attributes:
         law: any friction law of v, N and F_e; in a spherical joint an isotropic one of v and N,
@@ -81,8 +80,8 @@ class JointFriction:
         width: width b of a guide that takes the moment about z [m]; None: it does not load it.
         preload: normal force in addition to the reactions [N].
         normal: constant normal force [N] instead of reactions; then no unknown is added.
-        turning: the law is one of the joint's rate [rad/s] and its force a moment [N m], of the
-            level `normal` [N m]; without a radius. So robots' files give friction.
+        turning: True if the law is one of the joint's rate [rad/s] and its force a moment [N m],
+            with the level `normal` [N m]; without a radius. Robot description files use this form.
         eps: width of |f|, sqrt(f^2 + eps^2) - eps [N]. Laws that divide by the normal force
             (bristles) need a preload above zero if the reactions can vanish.
     """
@@ -101,14 +100,14 @@ class JointFriction:
         take_si("friction", self, "radius", "length", "width", "preload", "normal", "eps")
 
     def problems(self, rubs: Sequence[str]) -> Iterator[str]:
-        """Problems for a joint in which friction acts in the directions `rubs`."""
+        """Yield problems for a joint with friction in the directions `rubs`."""
         if not rubs:
-            yield "expected a joint in which something rubs, such as a hinge, a guide or a ball"
+            yield "expected a joint with friction, such as a hinge, a guide or a ball"
         offered = () if "ball" in rubs else OFFERED
         if strange := [i.name for i in self.law.inputs if i.name not in offered]:
             yield (
-                f"law: expected one that needs no more than {', '.join(('v', 'N', *offered))}, got "
-                f"{type(self.law).__name__}, which needs {', '.join(strange)}; "
+                f"law: expected one that needs only {', '.join(('v', 'N', *offered))}, got "
+                f"{type(self.law).__name__}, which also needs {', '.join(strange)}; "
                 f"a {'ball' if 'ball' in rubs else 'joint'} has no such input"
             )
         elif "ball" in rubs and (reason := anisotropy(self.law)):
@@ -123,7 +122,7 @@ class JointFriction:
             if self.radius is not None:
                 yield f"radius: expected none with turning, got {self.radius!r}"
             if self.normal is None:
-                yield "normal: expected the level [N m] of friction that turns, got none"
+                yield "normal: expected the level of the friction moment [N m], got none"
         elif turns and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"
         limits = {
@@ -140,23 +139,23 @@ class JointFriction:
 
     @property
     def arm(self) -> Scalar:
-        """The bearing's radius [m]; 1 for friction along z only, and for a law of the moment."""
+        """Radius of the bearing [m]; 1 for friction along z only, and for a law of the moment."""
         return 1.0 if self.radius is None else self.radius
 
     def magnitude(self, *components: ca.SX) -> ca.SX:
-        """Smooth length of a force with these components [N]."""
+        """Return the smooth length of a force with these components [N]."""
         squares = sum((f * f for f in components), start=self.eps * self.eps)
         return ca.sqrt(squares) - self.eps
 
     def stations(self, F: ca.SX, T: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Bearing forces f_x1, f_y1, f_x2, f_y2 [N]."""
+        """Return the bearing forces f_x1, f_y1, f_x2, f_y2 [N]."""
         if self.length is None:
             return -F[0], -F[1], ca.SX(0), ca.SX(0)
         fx2, fy2 = -T[1] / self.length, T[0] / self.length
         return -F[0] - fx2, -F[1] - fy2, fx2, fy2
 
     def normal_force(self, rubs: Sequence[str], F: ca.SX, T: ca.SX) -> ca.SX:
-        """Sum of the bearing forces [N] under the reaction F, T.
+        """Return the sum of the bearing forces [N] under the reaction F, T.
 
         Components are those of the child's frame, of a universal joint those of the bearing.
         """
@@ -179,7 +178,7 @@ class JointFriction:
 @final
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Friction of a joint in one of the directions in which it rubs.
+    """Friction of a joint in one of its friction directions.
 
     Attributes:
         name: of its results.
@@ -187,7 +186,7 @@ class Contact:
         direction: "slide", "turn", "x", "y" or "ball".
         friction: law and geometry.
         law: the law, for a ball in its form for vectors.
-        pressed: what its normal force is called; directions of one bearing share it.
+        pressed: name of its normal force; directions of one bearing share it.
         slip: sliding velocity [m/s], shape (1, 1), of a ball (3, 1).
         F: symbols of the friction force [N], of the same shape.
     """
@@ -202,7 +201,7 @@ class Contact:
     F: ca.SX
 
     def unit(self, of_sliding: str) -> str:
-        """A unit of the law: that of sliding, or of turning."""
+        """Return a unit of the law, of sliding or of turning."""
         return turned(of_sliding) if self.friction.turning else of_sliding
 
     @property
@@ -214,16 +213,16 @@ class Contact:
 HINTS = {
     "axis": "the axis of a joint is the z axis of both frames, m.frame('arm.pin', z=(0, 1, 0))",
     "friction": "friction acts in joints, such as Revolute(..., friction=JointFriction(law))",
-    "damping": "damping is a part of its own, m.force(JointSpringDamper(...))",
+    "damping": "damping is a separate part, m.force(JointSpringDamper(...))",
 }
-"""What to do instead of giving a keyword that other tools have."""
+"""Advice about keywords that other tools have."""
 
 
 class Keywords:
-    """A dataclass that answers an unknown keyword with those that it has."""
+    """Dataclass that lists its keywords if an unknown one is given."""
 
     def __new__(cls, *_: object, **given: object) -> Self:
-        """Refuse unknown keywords.
+        """Check the keywords.
 
         Raises:
             ValueError: a keyword that is not a field.
@@ -244,7 +243,7 @@ COMPONENTS = (*FORCE_NAMES, "Mx", "My", "Mz")
 
 
 def unit(k: int) -> ca.SX:
-    """Motion along or about the axis k, shape (3, 1)."""
+    """Return a motion along or about the axis k, shape (3, 1)."""
     column = ca.SX(3, 1)
     column[k] = 1
     return column
@@ -252,13 +251,13 @@ def unit(k: int) -> ca.SX:
 
 @dataclass(frozen=True, eq=False)
 class Joint(Keywords, ABC):
-    """A joint between two bodies.
+    """Joint between two bodies.
 
     Attributes:
-        name: C identifier; coordinates and results carry it.
-        parent, child: "body" or "body.frame"; "ground" is the body that does not move.
-        start: joint coordinates at the start [m, rad]; a number where there is one coordinate.
-            What closes a loop needs none.
+        name: C identifier; coordinates and results contain it.
+        parent, child: "body" or "body.frame"; "ground" is the fixed body.
+        start: joint coordinates at the start [m, rad]; a number for a single coordinate. Joints
+            that close a loop need none.
         rate: their rates [m/s, rad/s].
         friction: law and geometry of the bearing, or None.
     """
@@ -270,9 +269,9 @@ class Joint(Keywords, ABC):
     closes: ClassVar[bool] = False
     """True if it can only close loops, having no coordinates of its own."""
     rubs: ClassVar[tuple[str, ...]] = ()
-    """Directions in which friction acts; "ball" is that of a ball in its socket."""
+    """Directions in which friction acts; "ball" is a ball in its socket."""
     directions: ClassVar[Mapping[str, int]] = {}
-    """Where forces and motions may be prescribed: "slide", "turn", ... -> joint coordinate."""
+    """Directions of forces and motions: "slide", "turn", ... -> joint coordinate."""
     quaternion: ClassVar[int | None] = None
     """Index of the first of four Euler parameters among the coordinates."""
     plane: ClassVar[int | None] = None
@@ -280,7 +279,7 @@ class Joint(Keywords, ABC):
     transmits: ClassVar[tuple[str, ...]] = COMPONENTS
     """Components of force and moment that it can transmit, in the axes of the child's frame."""
     symbol: ClassVar[Symbol] = Symbol()
-    """How it is drawn."""
+    """Drawing style."""
 
     name: str
     parent: str
@@ -291,22 +290,22 @@ class Joint(Keywords, ABC):
 
     @abstractmethod
     def pose(self, q: ca.SX) -> Pair:
-        """(R_PC, p_PC) at the joint coordinates q."""
+        """Return (R_PC, p_PC) at the joint coordinates q."""
 
     @abstractmethod
     def subspace(self, q: ca.SX) -> Pair:
-        """(H_w, H_v), shape (3, n) each."""
+        """Return (H_w, H_v), shape (3, n) each."""
 
     @abstractmethod
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
+        """Return expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
 
     def problems(self) -> Iterator[str]:
-        """Problems of its own numbers."""
+        """Yield problems of its own numbers."""
         return iter(())
 
     def way(self, direction: str) -> str:
-        """The direction that is meant; of none, the only one, else "turn" where it can turn."""
+        """Return the given direction; by default the only one, or "turn" if available."""
         if direction:
             return direction
         (only,) = self.directions if len(self.directions) == 1 else ("turn",)
@@ -317,39 +316,41 @@ class Joint(Keywords, ABC):
         return self.coordinates[self.directions[direction]][1] == "m"
 
     def coordinate(self, k: int) -> str:
-        """Name of a joint coordinate."""
+        """Return the name of a joint coordinate."""
         suffix = self.coordinates[k][0]
         return f"{self.name}_{suffix}" if suffix else self.name
 
     def axis(self, direction: str, R: ca.SX) -> ca.SX:
-        """Axis of a direction in P, shape (3, 1)."""
+        """Return the axis of a direction in P, shape (3, 1)."""
         return unit("xyz".index(direction) if direction in "xyz" else 2)
 
     def bearing(self, direction: str, R: ca.SX) -> ca.SX:
-        """Turns components in C into those of the bearing, whose own axis is the last."""
+        """Return the matrix from components in C to those of the bearing, whose axis is the
+        last.
+        """
         return ca.SX.eye(3)
 
     def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
-        """The coordinate of a direction at a pose; an angle between -pi and pi."""
+        """Return the coordinate of a direction at a pose; an angle between -pi and pi."""
         if self.linear(direction):
             return p["xyz".index(direction) if direction in "xyz" else 2]
         return ca.atan2(R[1, 0], R[0, 0])
 
     def normal_force(self, friction: JointFriction, F: ca.SX, T: ca.SX) -> ca.SX:
-        """Normal force [N] of its bearing under the reaction F, T on the child.
+        """Return the normal force [N] of its bearing under the reaction F, T on the child.
 
-        In the axes of the child's frame, of a joint that only closes loops in the parent's.
+        It is in the axes of the child's frame, for a joint that only closes loops in the parent's.
         """
         return friction.normal_force(self.rubs, F, T)
 
     @property
     def starts(self) -> tuple[Scalar, ...]:
-        """Joint coordinates at the start; zero, or no rotation, where none are given."""
+        """Joint coordinates at the start; zero, or no rotation, by default."""
         return _several(self.start, len(self.coordinates), self.quaternion)
 
     @property
     def rates(self) -> tuple[Scalar, ...]:
-        """Their rates at the start; zero where none are given."""
+        """Joint rates at the start; zero by default."""
         return _several(self.rate, len(self.coordinates), None)
 
 

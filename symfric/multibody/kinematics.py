@@ -1,4 +1,6 @@
-"""Positions, velocities and accelerations of all bodies: one recursion outwards from the ground."""
+"""Positions, velocities and accelerations of all bodies, in one recursion from the ground
+outwards.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -18,14 +20,14 @@ from symfric.multibody.topology import Link, Topology, body_of, frame_at
 
 @final
 class Cuts:
-    """Collects symbols l and their values in the order of the recursions; mutable.
+    """Collection of symbols l and their values in the order of the recursions; mutable.
 
     Written out, the balance of every link depends on the coordinates of all others, and its
-    derivatives fill a matrix. With a symbol for what a body passes on (its orientation, its
-    velocities and accelerations outwards, its wrench inwards), every equation knows its neighbours
-    only, and eliminating link by link, from the tips to the ground, takes a number of operations
-    that grows with the links alone: what the articulated-body algorithm does for accelerations,
-    here for all unknowns of an implicit step.
+    derivatives fill a matrix. With a symbol for each quantity passed between bodies (orientation,
+    velocities and accelerations outwards, wrench inwards), every equation depends on neighbours
+    only, and elimination link by link, from the tips to the ground, takes a number of operations
+    proportional to the number of links, like the articulated-body algorithm for accelerations, here
+    for all unknowns of an implicit step.
 
     Attributes:
         symbols: l, shape (k, 1).
@@ -38,7 +40,7 @@ class Cuts:
         self.links: list[int] = []
 
     def __call__(self, link: int, expression: ca.SX) -> ca.SX:
-        """`expression` with a symbol for every entry that is more than a number or a symbol."""
+        """Return `expression` with a symbol for every entry that is not a number or a symbol."""
         cut = ca.SX(expression)
         for k in range(cut.nnz()):
             value = ca.SX(cut.nz[k])
@@ -51,7 +53,7 @@ class Cuts:
         return cut
 
     def needed(self, expression: ca.SX) -> list[int]:
-        """Numbers of those l that `expression` depends on, directly or through others."""
+        """Return numbers of those l that `expression` depends on, directly or through others."""
         found = np.zeros(len(self.links), dtype=bool)
         found[ca.jacobian_sparsity(expression, self.symbols).get_triplet()[1]] = True
         own = ca.jacobian_sparsity(self.values, self.symbols)
@@ -63,13 +65,13 @@ class Cuts:
 
 
 PARALLEL = 1e-9
-"""Differences of the derivatives of a rate from one position to another that are rounding."""
+"""Differences of the derivatives of a rate between positions that are rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """An angle as a state, and its rate [rad/s]."""
+    """Angle as a state, and its rate [rad/s]."""
 
     angle: Variable
     rate: ca.SX
@@ -78,14 +80,14 @@ class Turn:
 @final
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """Coordinates and rates of the tree and where it starts, SX (n, 1)."""
+    """Coordinates and rates of the tree and their start, SX (n, 1)."""
 
     q: ca.SX
     qd: ca.SX
     start: ca.SX
 
     def turned(self, rate: ca.SX) -> tuple[ca.SX, ca.SX] | None:
-        """How far a joint of this rate has turned, and had at the start; None in space."""
+        """Return how far a joint of this rate has turned, now and at the start; None in space."""
         slopes = ca.densify(ca.jacobian(rate, self.qd))
         at = ca.symvar(slopes)
         anywhere = np.random.default_rng(0)
@@ -99,12 +101,12 @@ class Moved:
 
 @final
 class Turns:
-    """Collects the angles, over full turns, of joints that close loops; mutable.
+    """Collection of the angles, over full turns, of joints that close loops; mutable.
 
     The pose of two bodies gives the angle between them modulo 2 pi. A force that grows with the
     angle needs all of it: the angle becomes a state phi of the model, with the relative angular
     velocity as its rate. It starts at the angle of the pose, with as many turns as the start of the
-    joint has, and as the other joints of its loop have made where all axes are parallel:
+    joint has, and as the other joints of its loop have made if all axes are parallel:
 
         phi' = a' q'  with constant a,   so that   phi - phi_0 = a' (q - q_0)
     """
@@ -115,7 +117,9 @@ class Turns:
     def __call__(
         self, joint: Joint, direction: str, angle: ca.SX, rate: ca.SX, moved: "Moved"
     ) -> ca.SX:
-        """The angle of a joint as a symbol, given that of its pose, its rate and what moves it."""
+        """Return the angle of a joint as a symbol, given that of its pose, its rate and the
+        motion.
+        """
         k = joint.directions[direction]
         name = joint.coordinate(k)
         if name not in self._found:
@@ -131,12 +135,12 @@ class Turns:
 
     @property
     def found(self) -> tuple[Turn, ...]:
-        """All that were asked for."""
+        """Angles that were requested."""
         return tuple(self._found.values())
 
 
 def angles(turns: Sequence[Turn]) -> ca.SX:
-    """Their symbols, shape (k, 1)."""
+    """Return their symbols, shape (k, 1)."""
     return symbols_of(turn.angle for turn in turns)
 
 
@@ -173,15 +177,17 @@ class Motion:
         return self.R @ self.v_B
 
     def point(self, offset: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Position and velocity in the world of a point fixed to the body."""
+        """Return position and velocity in the world of a point fixed to the body."""
         return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
     def cut(self, cuts: Cuts, link: int) -> "Motion":
-        """The same in new symbols."""
+        """Return the same motion in new symbols."""
         return Motion(*(cuts(link, getattr(self, part.name)) for part in fields(self)))
 
     def acceleration(self, offset: ca.SX) -> ca.SX:
-        """Acceleration, less gravity, of a point fixed to the body, in components of B."""
+        """Return the acceleration, less gravity, of a point fixed to the body, in components of
+        B.
+        """
         w, r = self.w_B, offset
         return self.dv_B + ca.cross(self.dw_B, r) + ca.cross(w, ca.cross(w, r))
 
@@ -212,7 +218,7 @@ class Relative:
 class Kinematics:
     """Motions of all bodies in terms of coordinates q, rates qd and accelerations qdd.
 
-    What a force or a constraint may ask: `motion`, `point`, `along`, `rate` and the time `t`.
+    Forces and constraints may use `motion`, `point`, `along`, `rate` and the time `t`.
     """
 
     topology: Topology
@@ -225,18 +231,18 @@ class Kinematics:
     turns: Turns | None = None
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
-        """Position and velocity in the world of the origin of the frame "body.frame"."""
+        """Return position and velocity in the world of the origin of the frame "body.frame"."""
         body, _, frame = place.partition(".")
         if body not in self.motion or frame not in self.topology.bodies[body].frames:
             raise ValueError(f"kinematics: expected a place 'body.frame', got {place}")
         return self.motion[body].point(self.offset(place))
 
     def offset(self, place: str) -> ca.SX:
-        """Position of the frame "body.frame" on its body, in the body's components."""
+        """Return the position of the frame "body.frame" on its body, in the body's components."""
         return frame_at(self.topology.bodies, place).p
 
     def relative(self, joint: Joint) -> Relative:
-        """Pose and motion of the child frame of `joint` in its parent frame."""
+        """Return pose and motion of the child frame of `joint` in its parent frame."""
         P, C = (frame_at(self.topology.bodies, place) for place in (joint.parent, joint.child))
         parent, child = self.motion[body_of(joint.parent)], self.motion[body_of(joint.child)]
         R_WP = parent.R @ P.R
@@ -254,12 +260,12 @@ class Kinematics:
         )
 
     def rotation(self, joint: Joint) -> ca.SX:
-        """R_PC of a joint."""
+        """Return R_PC of a joint."""
         link = self.topology.link_of.get(joint.name)
         return self.relative(joint).R if link is None else joint.pose(self.q[link.rows, 0])[0]
 
     def spin(self, joint: Joint) -> ca.SX:
-        """Relative angular velocity w_PC of a joint, in the parent's components."""
+        """Return the relative angular velocity w_PC of a joint, in the parent's components."""
         link = self.topology.link_of.get(joint.name)
         if link is None:
             return self.relative(joint).w
@@ -267,7 +273,7 @@ class Kinematics:
         return joint.pose(q)[0] @ (joint.subspace(q)[0] @ qd)
 
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
-        """Displacement or angle of a joint in one of its `directions`, and its rate.
+        """Return displacement or angle of a joint in one of its `directions`, and its rate.
 
         For a constraint the angle of a joint that closes a loop lies between -pi and pi.
         """
@@ -286,7 +292,7 @@ class Kinematics:
         return Moved(self.q, self.qd, stacked(x for link in links for x in link.joint.starts))
 
     def rate(self, joint: Joint, direction: str) -> ca.SX:
-        """Rate of the displacement or angle of a joint in one of its `directions`."""
+        """Return the rate of the displacement or angle of a joint in one of its `directions`."""
         link = self.topology.link_of.get(joint.name)
         if link is not None:
             return self.qd[link.first + joint.directions[direction]]
@@ -304,14 +310,14 @@ def kinematics(
     g: ca.SX = ZERO,
     cuts: Cuts | None = None,
 ) -> Kinematics:
-    """The recursion from the ground outwards.
+    """Return the motions of all bodies, by recursion from the ground outwards.
 
     Args:
         topology: tree.
         q, qd, qdd: coordinates, rates, accelerations, shape (n, 1).
         t: symbol of time.
         g: gravity [m/s^2]; the ground is accelerated by -g instead, and all bodies with it.
-        cuts: takes symbols for what bodies pass on to each other.
+        cuts: introduces symbols for quantities passed between bodies.
     """
     motion = {GROUND: Motion(ca.SX.eye(3), ZERO, ZERO, ZERO, ZERO, ca.sparsify(-g))}
     for k, link in enumerate(topology.links):
@@ -321,10 +327,10 @@ def kinematics(
 
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:
-    """Motion of the body of `link`, given that of its base A.
+    """Return the motion of the body of `link`, given that of its base A.
 
-    P is the joint's frame on the base, C that on the body; everything is turned into the body
-    before it is added up, so that what the joint adds stays what it is in its own axes.
+    P is the joint's frame on the base, C that on the body; all terms are rotated into the body
+    before they are added, so that the contribution of the joint stays simple in its own axes.
     """
     q, qd, qdd = q[link.rows, 0], qd[link.rows, 0], qdd[link.rows, 0]
     R_PC, p = link.pose(q)

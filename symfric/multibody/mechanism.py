@@ -1,4 +1,4 @@
-"""The builder: collects bodies, joints and forces, checks them and writes the model."""
+"""Builder: collects bodies, joints and forces, checks them and writes the model."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -46,7 +46,7 @@ FORMULATIONS = ("joint", "absolute")
 
 
 class Mechanism(Showing):
-    """Collects bodies, joints, forces and constraints; `build` writes the `Model`.
+    """Mechanism of bodies, joints, forces and constraints; `build` writes the `Model`.
 
     Example:
         m = Mechanism("pendulum")
@@ -56,8 +56,8 @@ class Mechanism(Showing):
         m.joint(Revolute("hinge", "ground.pivot", "bob.pivot", start=0.3))
         model = m.build()
 
-    Numbers may be variables, which are handed to `build(p=(mass, length))`. Bodies, frames and
-    joints may come in any order; what is wrong with them, all of it, is the ValueError of `build`.
+    Numbers may be variables, which are passed to `build(p=(mass, length))`. Bodies, frames and
+    joints may be added in any order; `build` reports all mistakes in one ValueError.
 
     Args:
         name: C identifier.
@@ -80,13 +80,13 @@ class Mechanism(Showing):
             self.forces.append(Gravity("gravity", gravity))
 
     def shown(self) -> Shown:
-        """Parts that were added so far."""
+        """Describe the parts added so far."""
         return shown_of(
             self.name, self.bodies, self.joints, self.forces, self.constraints, self.inputs
         )
 
     def thumbnail(self) -> "Figure | None":
-        """The machine at its start, small; nothing where it cannot be built yet."""
+        """Return a small figure of the machine at its start; None if it cannot be built yet."""
         try:
             made = self.prepare()
         except ValueError:
@@ -96,15 +96,15 @@ class Mechanism(Showing):
         return thumbnail(drawn, places.full())
 
     def to_pack(self) -> dict[str, Any]:
-        """All that was added."""
+        """Return all added parts."""
         return vars(self)
 
     def __copy__(self) -> "Mechanism":
-        """One with the same symbols."""
+        """Return a mechanism with the same symbols."""
         return packed.shallow(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds all that was added, in symbols that stay themselves."""
+        """Pickle all added parts; symbols keep their identity."""
         return packed.loads, (packed.dumps(self),)
 
     def body(
@@ -142,15 +142,15 @@ class Mechanism(Showing):
             )
 
     def joint(self, joint: Joint) -> None:
-        """Add a joint; `build` reports what is wrong with it, with its path."""
+        """Add a joint; `build` reports its mistakes, with its path."""
         self._take(self.joints, joint, Joint)
 
     def force(self, force: Force) -> None:
-        """Add a force; `build` reports what is wrong with it, with its path."""
+        """Add a force; `build` reports its mistakes, with its path."""
         self._take(self.forces, force, Force)
 
     def constraint(self, constraint: Constraint) -> None:
-        """Add a constraint that is no joint: prescribed motion, a coupling, an expression."""
+        """Add a constraint other than a joint: prescribed motion, a coupling, an expression."""
         self._take(self.constraints, constraint, Constraint)
 
     def _take(self, group: list[Any], part: object, wanted: type) -> None:
@@ -179,9 +179,9 @@ class Mechanism(Showing):
             p: parameters, whose symbols the numbers of bodies, joints and forces may contain.
             formulation: "joint" has the coordinates of the joints of a spanning tree and
                 constraints for its loops; "absolute" has position and Euler parameters of every
-                body and constraints for every joint, several times dearer.
-            index: how constraints are kept; 0 integrates in their tangent space, 1 in all
-                coordinates with a projection at the end of every step; None takes what is faster,
+                body and constraints for every joint, several times more expensive.
+            index: treatment of the constraints: 0 integrates in their tangent space, 1 in all
+                coordinates with a projection at the end of every step; None takes the faster one,
                 0 for absolute coordinates and 1 for those of joints. Same solution, to the
                 tolerance.
 
@@ -203,7 +203,7 @@ class Mechanism(Showing):
         )
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
-        """The equations of motion with their variables, checked.
+        """Return the equations of motion with their variables, checked.
 
         Raises:
             ValueError: all mistakes at once, each with its path.
@@ -240,12 +240,12 @@ class Mechanism(Showing):
             raise ValueError("\n".join(found))
 
     def _hung(self, p: ca.SX, values: ca.DM, closed: bool = True) -> tuple[list[Body], Topology]:
-        """The bodies in their places and the tree on which they hang.
+        """Return the bodies in their places and their spanning tree.
 
-        `closed`: whether the start has to close the loops.
+        `closed`: True if the start has to close the loops.
 
         Raises:
-            ValueError: all mistakes that can be told without equations, and those of the start.
+            ValueError: all mistakes that can be found without equations, and those of the start.
         """
         bodies, problems = self._placed()
         u = symbols_of(self.inputs)
@@ -269,7 +269,7 @@ class Mechanism(Showing):
         return bodies, tree
 
     def _placed(self) -> tuple[list[Body], list[str]]:
-        """Bodies with their frames."""
+        """Return the bodies with their frames."""
         problems = list(self._wrong)
         if not isinstance(self.name, str) or not self.name.isidentifier():  # pyright: ignore[reportUnnecessaryIsInstance]
             problems.append(f"name: expected a C identifier, got {shown(self.name)}")
@@ -296,14 +296,15 @@ class Mechanism(Showing):
         return placed, problems
 
     def _written(self, tree: Topology, p: ca.SX, values: ca.DM) -> Prepared:
-        """Equations in joint coordinates."""
+        """Return the equations in joint coordinates."""
         q, qd = coordinates(tree)
         return written(tree, self.joints, self.forces, self.constraints, q, qd, p, values)
 
     def assembled(self, p: Variables = ()) -> "Mechanism":
-        """A copy whose joints start at the nearest position and velocity that close all loops.
+        """Return a copy whose joints start at the nearest position and velocity that close all
+        loops.
 
-        Rates that are given, those other than zero, stay where the other joints can follow them.
+        Nonzero rates are kept if the other joints can follow them.
 
         Args:
             p: parameters, at whose start values they close.
@@ -339,18 +340,18 @@ class Mechanism(Showing):
 
 
 def _inseparable(bodies: Iterable[Body], p: ca.SX, values: ca.DM) -> Iterator[str]:
-    """Bodies that cannot be balanced without those they hang on."""
+    """Yield messages about bodies that have no equations of their own."""
     for body in bodies:
         strict = replace(body, ideal=False)
         if body.ideal and body.name != GROUND and any(strict.problems(p, values)):
             yield (
                 f"body '{body.name}': expected a rigid body in absolute coordinates, got a "
-                "massless link, a point or what no body is; joint coordinates take it"
+                "massless link, a point or an unphysical body; use joint coordinates"
             )
 
 
 def _left_open(made: Prepared) -> Iterator[str]:
-    """Friction that depends on reactions which redundant constraints leave open."""
+    """Yield messages about friction that depends on undetermined reactions."""
     for name in made.undetermined:
         yield (
             f"joint '{name}' > friction: expected reactions that the motion determines, got a "

@@ -22,8 +22,9 @@ from symfric.multibody.topology import Topology
 
 Array = NDArray[np.float64]
 LONG, LONG_WITH_FRICTION = 16, 12
-"""Links of a chain from which on cuts pay: below, full derivatives take fewer operations. Friction
-from reactions makes them dearer."""
+"""Number of links of a chain from which cuts save operations. Friction from reactions makes the
+full derivatives more expensive.
+"""
 
 
 @final
@@ -37,11 +38,11 @@ class Prepared:
         q0, qd0: the same as numbers.
         labels: names of the multipliers.
         redundant: names of the constraints that were left out.
-        undetermined: joints whose normal force redundant constraints leave open.
-        open_reactions: joints whose reactions they leave open.
-        singular: whether constraints that are independent nearby are not at the start.
-        problems: constraints that cannot be.
-        misfits: why the start violates constraints, redundant ones included.
+        undetermined: joints whose normal force is undetermined because of redundant constraints.
+        open_reactions: joints whose reactions are undetermined.
+        singular: True if constraints that are independent nearby are not at the start.
+        problems: invalid constraints.
+        misfits: violations of constraints at the start, redundant ones included.
     """
 
     eq: Equations
@@ -59,12 +60,12 @@ class Prepared:
 
 
 def _misfits(made: Prepared, at: checks.Position) -> Iterator[str]:
-    """Start positions or velocities that violate constraints; offers the nearest that fit."""
+    """Yield violations of constraints at the start, with the nearest consistent values."""
     phi, J, phi_t = (m.full() for m in at(made.q0))
     worst = int(np.abs(phi).argmax())
     if abs(phi[worst, 0]) > checks.FITS:
         near = checks.project(at, made.q0)
-        offer = "no position near it does"
+        offer = "no position near it satisfies them"
         if near is not None:
             pairs = zip(made.q, near, strict=True)
             offer = "near it " + ", ".join(f"{v.name} = {x:.10g}" for v, x in pairs)
@@ -98,7 +99,7 @@ def in_absolute_coordinates(
     p: ca.SX,
     values: ca.DM,
 ) -> Prepared:
-    """The same mechanism in absolute coordinates, from the same start."""
+    """Return the same mechanism in absolute coordinates, from the same start."""
     kin = tree.eq.kin
     starts: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
     for link in topology.links:
@@ -135,7 +136,7 @@ def in_absolute_coordinates(
 def undeclared(
     eq: Equations, joints: Sequence[Joint], forces: Sequence[Force], p: ca.SX, u: ca.SX
 ) -> Iterator[str]:
-    """Symbols in forces that nobody declared."""
+    """Yield messages about undeclared symbols in forces."""
     by_name = {joint.name: joint for joint in joints}
     known = ca.vertcat(eq.q, eq.qd, angles(eq.turns), p, u, eq.kin.t)
     for force in forces:
@@ -149,7 +150,7 @@ def undeclared(
 def infinite(
     made: Prepared, joints: Sequence[Joint], forces: Sequence[Force], p: ca.SX, values: ca.DM
 ) -> Iterator[str]:
-    """Forces that are not finite at the start, inputs zero, as along a line without a length."""
+    """Yield messages about forces that are not finite at the start, with zero inputs."""
     eq, by_name = made.eq, {joint.name: joint for joint in joints}
     given = ca.vertcat(eq.q, eq.qd, p)
     numbers = np.concatenate([made.q0, made.qd0, values.full().ravel()])
@@ -166,7 +167,7 @@ def infinite(
 
 
 def without_inertia(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
-    """Coordinates that no mass resists, at the start or anywhere near it, as ideal bodies make."""
+    """Yield messages about coordinates without inertia, at the start or near it."""
     eq = made.eq
     if not any(eq.kin.topology.bodies[link.body].ideal for link in eq.kin.topology.links):
         return
@@ -178,13 +179,13 @@ def without_inertia(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
         names = ", ".join(v.name for v, is_one in zip(made.q, found, strict=True) if is_one)
         yield (
             f"expected a mass matrix that is positive definite, got one that is not in {names}: "
-            "what these move has no mass (links without any, points on an axis, parallel axes) or "
-            "an inertia that no body has"
+            "the bodies they move have no mass (massless links, points on an axis, parallel axes) "
+            "or an unphysical inertia"
         )
 
 
 def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Array]:
-    """Accelerations, multipliers and normal forces at the start if there were no friction."""
+    """Return accelerations, multipliers and normal forces at the start without friction."""
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     rows = ca.vertcat(eq.balance, eq.phi_ddot)
@@ -211,7 +212,7 @@ def _skew(a: ca.DM) -> Array:
 
 
 def numeric(eq: Equations, p: ca.SX, values: ca.DM) -> checks.Position:
-    """Q -> (phi, phi_q, phi_t) at time 0 and the start values of the parameters."""
+    """Return q -> (phi, phi_q, phi_t) at time 0 and the start values of the parameters."""
     parts = [eq.phi, ca.densify(eq.Phi_q), ca.densify(eq.phi_t)]
     every = ca.Function("at", [eq.q, p, eq.kin.t], parts)
 
@@ -232,7 +233,7 @@ def written(
     p: ca.SX,
     values: ca.DM,
 ) -> Prepared:
-    """Equations of independent constraints."""
+    """Return the equations of independent constraints."""
     q_symbols, qd_symbols = (symbols_of(g) for g in (q, qd))
     starts = (starts_of(g) for g in (q, qd))
     q0, qd0 = (ca.DM(ca.substitute(s, p, ca.SX(values))).full().ravel() for s in starts)
@@ -244,7 +245,7 @@ def written(
         return made
     at = numeric(eq, p, values)
     made = replace(made, misfits=tuple(_misfits(made, at)))
-    # a norm may be implied by closed loops, but its multiplier takes what theirs have along p
+    # a norm may be implied by closed loops, but its multiplier also carries theirs along p
     found = checks.rank(at, q0, range(eq.m - eq.norms, eq.m))
     if not found.redundant:
         return replace(made, singular=found.singular)
@@ -273,7 +274,9 @@ def written(
 
 
 def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) -> Equations | None:
-    """The equations of a long open chain with cuts; None where they would not pay."""
+    """Return the equations of a long open chain with cuts; None if they would not save
+    operations.
+    """
     eq, topology = made.eq, made.eq.kin.topology
     loaded = ca.depends_on(stacked(eq.normals), eq.a)
     asked = any(c.law.inputs for c in eq.contacts)
@@ -283,7 +286,7 @@ def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) 
 
 
 def _held(eq: Equations, constraints: Sequence[Constraint], p: ca.SX) -> Iterator[str]:
-    """Why constraints cannot be held, or what they depend on besides coordinates and time."""
+    """Yield reasons why constraints are invalid, including dependencies on other symbols."""
     known = ca.vertcat(eq.q, eq.kin.t, p)
     for constraint, part in zip(constraints, eq.held, strict=True):
         where = f"{constraint.kind} '{constraint.name}'"
@@ -292,14 +295,14 @@ def _held(eq: Equations, constraints: Sequence[Constraint], p: ca.SX) -> Iterato
         if stray:
             yield (
                 f"{where}: expected an expression of positions, time and parameters, got "
-                f"{', '.join(stray)}; of an input the two derivatives are not known"
+                f"{', '.join(stray)}; the two derivatives of an input are unknown"
             )
 
 
 def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Array) -> Iterator[str]:
-    """Constraints in time whose multipliers take part in the combinations `free`.
+    """Yield constraints in time whose multipliers take part in the combinations `free`.
 
-    Two motions prescribed for one coordinate agree at the start at most.
+    Two motions prescribed for one coordinate agree only at the start.
     """
     phi, t = made.eq.phi, made.eq.kin.t
     involved = np.abs(free).max(axis=1) > checks.RANK
@@ -317,7 +320,7 @@ def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Arra
 def _undetermined(
     made: Prepared, rows: Iterable[tuple[str, ca.SX]], free: Array, p: ca.SX, values: ca.DM
 ) -> tuple[str, ...]:
-    """Joints whose `rows` change with combinations `free` of the multipliers."""
+    """Return joints whose `rows` change with combinations `free` of the multipliers."""
     eq, rng = made.eq, np.random.default_rng(1)
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
     column = ca.substitute(stacked(row for _, row in pairs), eq.kin.t, ca.SX(0))
@@ -332,7 +335,7 @@ def _undetermined(
 
 
 def labels_of(eq: Equations) -> tuple[str, ...]:
-    """Names of the multipliers: joint and number, those of constraints, body and "norm"."""
+    """Return names of the multipliers: joint and number, those of constraints, body and "norm"."""
     labels: list[str] = []
     for loop in eq.loops:
         m = loop.phi.numel()

@@ -1,4 +1,4 @@
-"""Results of a mechanism: its outputs, its sketch, a small picture, and a table of its parts."""
+"""Results of a mechanism: its outputs, its sketch, a small figure, and a table of its parts."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -42,14 +42,14 @@ def results(
     p: ca.SX,
     put: Put,
 ) -> dict[str, Output]:
-    """All further results by name.
+    """Return all further results by name.
 
     Args:
         eq: equations of the mechanism.
         joints, forces: all of them.
         undetermined: names of joints whose reactions are not unique; they are left out.
         p: symbols of the parameters.
-        put: brings expressions into the symbols of the model.
+        put: converts expressions to the symbols of the model.
     """
     by_name = {joint.name: joint for joint in joints}
     found = [
@@ -67,10 +67,10 @@ def results(
 
 
 def _reactions(eq: Equations, joints: Sequence[Joint]) -> Iterator[tuple[str, Output]]:
-    """Force [N] and moment [N m] on the child of each joint about its joint point.
+    """Yield force [N] and moment [N m] on the child of each joint about its joint point.
 
-    In the axes of the joint's frame on the child; friction, motors and springs along or about the
-    axis of the joint are not in it.
+    They are in the axes of the joint's frame on the child; friction, motors and springs along or
+    about the axis of the joint are not included.
     """
     for joint in joints:
         column = ca.vertcat(*eq.reactions[joint.name])
@@ -86,7 +86,7 @@ def _reactions(eq: Equations, joints: Sequence[Joint]) -> Iterator[tuple[str, Ou
 
 
 def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
-    """Positions [m] and velocities [m/s] of all centres of mass in the world."""
+    """Yield positions [m] and velocities [m/s] of all centres of mass in the world."""
     for name, motion in eq.kin.motion.items():
         if name == GROUND:
             continue
@@ -100,10 +100,10 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
 def _work(
     eq: Equations, joints: dict[str, Joint], forces: Iterable[Force], still: ca.SX
 ) -> Iterator[tuple[str, Output]]:
-    """Powers [W] that change the sum of kinetic energy and of potentials of q alone.
+    """Yield powers [W] that change the sum of kinetic energy and of potentials of q alone.
 
-    A potential that depends on anything but `still` (its spring hangs on an input or on time) is
-    none: the whole power of its force counts.
+    A potential that depends on anything but `still` (for example, a spring attached to an input or
+    to time) does not count as one: the whole power of its force is included.
     """
     kin, conserved = eq.kin, eq.kinetic
     positions = ca.vertcat(eq.q, angles(eq.turns))
@@ -123,16 +123,16 @@ def _work(
                 power += load.power(kin)
         if own:
             power += ca.jtimes(energy, positions, rates)
-        yield f"{force.name}_work_rate", Output(power, "W", f"power put in by '{force.name}'", WORK)
+        yield f"{force.name}_work_rate", Output(power, "W", f"power input of '{force.name}'", WORK)
     if eq.contacts:
         taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))
         yield (
             "friction_work_rate",
-            Output(taken, "W", "power put in by friction, above zero where it drives", WORK),
+            Output(taken, "W", "power input of friction, above zero where it drives", WORK),
         )
     if eq.m and not eq.phi_t.is_zero():
         drive = ca.dot(eq.lam, eq.phi_t)
-        yield "drive_work_rate", Output(drive, "W", "power put in by prescribed motions", WORK)
+        yield "drive_work_rate", Output(drive, "W", "power input of prescribed motions", WORK)
     yield "conserved", Output(conserved, "J", "energy without potentials of time or inputs")
 
 
@@ -141,10 +141,10 @@ CONSTRAINT = {"N": "m", "N m": "rad", "N/m": "m^2"}
 
 
 def multiplier_units(eq: Equations) -> dict[str, str]:
-    """Name of a multiplier -> its unit; "" where the user's expression has none that is known.
+    """Return name of a multiplier -> its unit; "" if the unit of the user's expression is unknown.
 
-    A constraint on places is loaded by a force, one on directions by a moment; that of a rod, on
-    the square of its length, by a force over length.
+    A constraint on places has a force as multiplier, one on directions a moment; that of a rod, on
+    the square of its length, a force over length.
     """
     found: dict[str, str] = {}
     for loop in eq.loops:
@@ -158,12 +158,12 @@ def multiplier_units(eq: Equations) -> dict[str, str]:
 
 
 def _of(along: ca.SX) -> str:
-    """That of the multiplier of a constraint whose rate is `along` times a velocity, and so on."""
+    """Return the unit of the multiplier of a constraint with the rate `along` times a velocity."""
     return "N m" if along.nnz() == 0 or along.is_zero() else "N"
 
 
 def constraint_units(units: list[str]) -> tuple[str, str, str]:
-    """Those of the norms of the constraints on three levels; "" where they are of several kinds."""
+    """Return units of the norms of the constraints on three levels; "" if they differ."""
     kinds = {CONSTRAINT.get(unit, "") for unit in units}
     unit = kinds.pop() if len(kinds) == 1 else ""
     return (unit, f"{unit}/s", f"{unit}/s^2") if unit else ("", "", "")
@@ -172,7 +172,7 @@ def constraint_units(units: list[str]) -> tuple[str, str, str]:
 Array = NDArray[np.float64]
 SPRING, DAMPER = (Symbol(line=line, anchored=True) for line in ("spring", "damper"))
 SIZE = 2.6
-"""Of the small picture [inch]."""
+"""Size of the small figure [inch]."""
 AWAY = 1e-6
 """Extent across a plane, relative to that in it, below which all lies in the plane."""
 
@@ -180,11 +180,11 @@ AWAY = 1e-6
 def sketch(
     eq: Equations, joints: Iterable[Joint], forces: Iterable[Force], scales: Mapping[str, float]
 ) -> Sketch:
-    """The sketch of a mechanism.
+    """Return the sketch of a mechanism.
 
     Args:
         eq: its equations.
-        joints, forces: what is drawn beside bodies.
+        joints, forces: drawn in addition to bodies.
         scales: contact -> velocity [m/s] below which it counts as sticking.
     """
     drawn = [f for f in forces if isinstance(f, SpringDamper)]
@@ -225,7 +225,7 @@ def _mark(
     used: dict[str, int],
     slips: tuple[tuple[str, float], ...] = (),
 ) -> Mark:
-    """A mark whose first end is on the ground, if one is and it may be the first."""
+    """Return a mark whose first end is on the ground, if one is and it may be the first."""
     grounded = GROUND in (body_of(end) for end in ends[: 1 if symbol.slot else 2])
     if grounded and body_of(ends[0]) != GROUND and symbol.turnable:
         ends = ends[1], ends[0]
@@ -233,20 +233,20 @@ def _mark(
 
 
 def _frame(kin: Kinematics, place: str) -> ca.SX:
-    """Axes and position of the frame "body.frame", shape (12, 1)."""
+    """Return axes and position of the frame "body.frame", shape (12, 1)."""
     frame, motion = frame_at(kin.topology.bodies, place), kin.motion[body_of(place)]
     return ca.densify(ca.vertcat(ca.vec(motion.R @ frame.R), motion.point(frame.p)[0]))
 
 
 def _centre(kin: Kinematics, name: str) -> ca.SX:
-    """Axes of a body and its centre of mass, shape (12, 1)."""
+    """Return axes of a body and its centre of mass, shape (12, 1)."""
     motion = kin.motion[name]
     at = motion.point(kin.topology.bodies[name].c)[0]
     return ca.densify(ca.vertcat(ca.vec(motion.R), at))
 
 
 def thumbnail(drawn: Sketch, places: Array) -> "Figure":
-    """Bodies as lines to their frames, joints as dots.
+    """Draw bodies as lines to their frames, joints as dots.
 
     Args:
         drawn: the sketch of a mechanism.
@@ -270,7 +270,9 @@ def thumbnail(drawn: Sketch, places: Array) -> "Figure":
 
 
 def _view(drawn: Sketch, places: Array) -> tuple[Array, Array]:
-    """Directions to the right and upwards: of the plane of the hinges, or seen from aside."""
+    """Return directions to the right and upwards: of the plane of the hinges, or an oblique
+    view.
+    """
     hinges = [places[6:9, mark.b] for mark in drawn.marks if mark.symbol.hinge]
     normal = hinges[0] if hinges else np.array([0.0, 1.0, 0.0])
     if any(np.linalg.norm(np.cross(normal, other)) > AWAY for other in hinges):
@@ -301,10 +303,10 @@ def _line(axis: "Axes", flat: Array, ends: Sequence[int], **how: object) -> None
 
 
 def _called(direction: Array) -> str:
-    """The axis of the world along a direction, or what else it is."""
+    """Return the name of the world axis along a direction."""
     k = int(np.argmax(np.abs(direction)))
     if abs(direction[k]) < 1 - AWAY:
-        return "seen from aside"
+        return "oblique view"
     return ("" if direction[k] > 0 else "-") + "xyz"[k]
 
 
@@ -316,7 +318,7 @@ def shown(
     constraints: Iterable[Constraint],
     inputs: Sequence[Variable],
 ) -> Shown:
-    """A mechanism as a table of its parts; `build` says what is wrong with it."""
+    """Describe a mechanism as a table of its parts; `build` reports its mistakes."""
     bodies = [body for body in bodies if body.name != GROUND]
     loops = max(0, len(joints) - len(bodies))
     counts = [

@@ -1,4 +1,4 @@
-"""Friction laws at work in the contacts of a mechanism: their unknowns, states and events."""
+"""Friction laws in the contacts of a mechanism: their unknowns, states and events."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,16 +22,16 @@ from symfric.multibody.joint import Contact
 @final
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """A contact as the model sees it.
+    """Contact with its unknowns in the model.
 
     Attributes:
-        unknown: its normal force as algebraic variable, where it depends on the reactions and the
-            law depends on it.
-        N: normal force as the law gets it.
-        normal: the expression of it in terms of accelerations and multipliers.
+        unknown: its normal force as algebraic variable, if it depends on the reactions and the law
+            depends on it.
+        N: normal force as passed to the law.
+        normal: its expression in terms of accelerations and multipliers.
         states, rate: of the law.
         force: friction force [N], of a ball a vector.
-        inputs: the applied force for a law that asks for it, by name.
+        inputs: the applied force by name, for a law that needs it.
     """
 
     contact: Contact
@@ -67,12 +67,12 @@ def keeps_deflection(law: Law) -> bool:
 def slips(
     eq: Equations, normal_at_start: Sequence[float], groups: Sequence[Rest] = ()
 ) -> tuple[Slip, ...]:
-    """Friction laws at work in all contacts.
+    """Return the friction laws of all contacts.
 
     Args:
         eq: the equations of motion.
         normal_at_start: normal force of each contact [N].
-        groups: the contacts whose laws ask for the applied force.
+        groups: the contacts whose laws need the applied force.
     """
     unknowns, pressing = _pressing(eq, normal_at_start)
     levels = [capacity_of(c.law, N) if groups else N
@@ -98,7 +98,7 @@ def slips(
 def _pressing(
     eq: Equations, normal_at_start: Sequence[float]
 ) -> tuple[list[Variables], list[ca.SX]]:
-    """Unknown normal force of each contact, where it is the first to have it; what presses it."""
+    """Return the unknown normal force of each contact that introduces it, and all normal forces."""
     found, every, values = dict[str, Variable](), list[Variables](), list[ca.SX]()
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
         pressed, unknown, pressing = contact.pressed, (), normal
@@ -121,7 +121,7 @@ def _pressing(
 
 
 def _states(contact: Contact, begin: ca.SX) -> Variables:
-    """States of a law under their names in the model."""
+    """Return states of a law with their names in the model."""
     return tuple(
         Variable(
             f"{contact.name}_{s.name}",
@@ -136,7 +136,9 @@ def _states(contact: Contact, begin: ca.SX) -> Variables:
 
 
 def _slides(eq: Equations, groups: Sequence[Rest]) -> list[ca.SX]:
-    """Sliding velocities that tell the modes at the start; of a loop that moves none is zero."""
+    """Return sliding velocities that determine the modes at the start; in a moving loop none is
+    zero.
+    """
     found = [c.slip for c in eq.contacts]
     for rest in groups:
         for i, g in zip(rest.members, rest.along, strict=True):
@@ -146,7 +148,7 @@ def _slides(eq: Equations, groups: Sequence[Rest]) -> list[ca.SX]:
 
 
 def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -> tuple[Event, ...]:
-    """Mode changes of all laws, with their states under their names in the model."""
+    """Return the mode changes of all laws, with their states under their names in the model."""
     in_loops = {i for rest in groups if rest.direction for i in rest.members}
     still = {rest.members[0]: rest.still for rest in groups if not rest.direction}
     names = {v.name for v in rates}
@@ -163,9 +165,9 @@ def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -
 
 
 def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
-    """Mode changes of a contact by itself, at whose stop the states in `rest` take their values.
+    """Yield mode changes of a single contact, at whose stop the states in `rest` get their values.
 
-    What stops, rests first: whether it can is only known once the equations of rest are solved.
+    A contact that stops first sticks: only the solution of the stick equations shows if it can.
     """
     contact, z = slip.contact, symbols_of(slip.states)
     found = contact.law.switches(contact.slip, slip.N, z, **slip.inputs)
@@ -187,7 +189,7 @@ def _event(name: str, s: Switch, reset: Mapping[str, Scalar]) -> Event:
 
 
 def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:
-    """End of motion, break-away and dead centres of a loop of one degree of freedom."""
+    """Yield end of motion, break-away and dead centres of a loop of one degree of freedom."""
     m, T, omega = rest.direction[0].symbol, rest.force.symbol, rest.rate
     top = rest.capacity([capacity_of(s.contact.law, s.N) for s in contacts])
     modes = [_modes(s) for s in contacts]
@@ -217,7 +219,7 @@ def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:
 
 
 def _modes(slip: Slip) -> list[str]:
-    """Names of the states of a contact that are its mode."""
+    """Return names of the states of a contact that are its mode."""
     z = symbols_of(slip.states)
     found = switches_at(slip.contact.law, slip.contact.slip, slip.N, z, ca.SX(0.0))
     return [f"{slip.contact.name}_{state}" for s in found if s.halts for state in s.reset]

@@ -25,7 +25,7 @@ Vector = Sequence[Any] | ca.SX | ca.DM
 
 
 def vector(values: Vector) -> ca.SX:
-    """`values` as a column (3, 1)."""
+    """Return `values` as a column (3, 1)."""
     return ca.SX(ca.vertcat(*(values[i] for i in range(3))))
 
 
@@ -54,48 +54,48 @@ def is_scalar(value: Any) -> bool:
 
 
 def skew(a: ca.SX) -> ca.SX:
-    """The matrix a~ with a~ b = a x b."""
+    """Return the matrix a~ with a~ b = a x b."""
     return ca.vertcat(
         ca.horzcat(0, -a[2], a[1]), ca.horzcat(a[2], 0, -a[0]), ca.horzcat(-a[1], a[0], 0)
     )
 
 
 def rotation_x(angle: ca.SX) -> ca.SX:
-    """R of a turn by `angle` about x."""
+    """Return R of a rotation by `angle` about x."""
     c, s = ca.cos(angle), ca.sin(angle)
     return ca.vertcat(ca.horzcat(1, 0, 0), ca.horzcat(0, c, -s), ca.horzcat(0, s, c))
 
 
 def rotation_y(angle: ca.SX) -> ca.SX:
-    """R of a turn by `angle` about y."""
+    """Return R of a rotation by `angle` about y."""
     c, s = ca.cos(angle), ca.sin(angle)
     return ca.vertcat(ca.horzcat(c, 0, s), ca.horzcat(0, 1, 0), ca.horzcat(-s, 0, c))
 
 
 def rotation_z(angle: ca.SX) -> ca.SX:
-    """R of a turn by `angle` about z."""
+    """Return R of a rotation by `angle` about z."""
     c, s = ca.cos(angle), ca.sin(angle)
     return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
 
 
 def euler_e(p: ca.SX) -> ca.SX:
-    """E(p), shape (3, 4)."""
+    """Return E(p), shape (3, 4)."""
     return ca.horzcat(-p[1:4], skew(p[1:4]) + p[0] * ca.SX.eye(3))
 
 
 def euler_g(p: ca.SX) -> ca.SX:
-    """G(p), shape (3, 4)."""
+    """Return G(p), shape (3, 4)."""
     return ca.horzcat(-p[1:4], -skew(p[1:4]) + p[0] * ca.SX.eye(3))
 
 
 def rotation(p: ca.SX) -> ca.SX:
-    """R(p) = E G' = (e0^2 - e'e) I + 2 e e' + 2 e0 e~."""
+    """Return R(p) = E G' = (e0^2 - e'e) I + 2 e e' + 2 e0 e~."""
     e0, e = p[0], p[1:4]
     return (e0 * e0 - ca.dot(e, e)) * ca.SX.eye(3) + 2 * (e @ e.T) + 2 * e0 * skew(e)
 
 
 def turned(p: ca.SX, a: ca.SX) -> ca.SX:
-    """B(p, a) = d(R(p) a)/dp, shape (3, 4), for p of any length."""
+    """Return B(p, a) = d(R(p) a)/dp, shape (3, 4), for p of any length."""
     e0, e = p[0], p[1:4]
     first = 2 * (e0 * a + ca.cross(e, a))
     rest = 2 * (e @ a.T + ca.dot(e, a) * ca.SX.eye(3) - a @ e.T - e0 * skew(a))
@@ -103,7 +103,7 @@ def turned(p: ca.SX, a: ca.SX) -> ca.SX:
 
 
 def euler_parameters(R: ca.DM) -> ca.DM:
-    """Euler parameters (e0, e) with e0 >= 0 of a numerical rotation matrix."""
+    """Return Euler parameters (e0, e) with e0 >= 0 of a numerical rotation matrix."""
     trace = float(R[0, 0] + R[1, 1] + R[2, 2])
     squares = [1 + trace] + [1 - trace + 2 * float(R[i, i]) for i in range(3)]
     k = squares.index(max(squares))
@@ -122,7 +122,7 @@ def euler_parameters(R: ca.DM) -> ca.DM:
 @final
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A place on a body: position of its origin [m] and directions of its axes.
+    """Place on a body: position of its origin [m] and directions of its axes.
 
     Attributes:
         at: position from the origin of the body, in the body's components.
@@ -142,7 +142,7 @@ class Frame:
         z = _unit("z", self.z)
         if self.x is None:
             smallest = min(range(3), key=lambda i: abs(float(z[i])))
-            # cyclic, so that the axes of the body stay the axes of a frame without directions
+            # cyclic: a frame without directions has the axes of the body
             x = ca.DM([float(i == (smallest if abs(float(z[2])) < 1 else 0)) for i in range(3)])
         else:
             x = _unit("x", self.x)
@@ -164,16 +164,16 @@ def _unit(name: str, a: Any) -> ca.DM:
 
 Array = NDArray[np.float64]
 GROUND = "ground"
-"""The name of the body that does not move."""
+"""Name of the fixed body."""
 MOMENTS = "write (Jxx, Jyy, Jzz) or (Jxx, Jyy, Jzz, Jxy, Jxz, Jyz)"
 TRIANGLE = 1e-9
-"""Relative rounding of principal moments that is no mistake."""
+"""Relative rounding of principal moments that is not a mistake."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body.
+    """Rigid body.
 
     Attributes:
         name: C identifier.
@@ -182,9 +182,9 @@ class Body:
             six numbers Jxx, Jyy, Jzz, Jxy, Jxz, Jyz.
         com: centre of mass from the origin of the body [m].
         frames: places where joints and forces act; "" is the origin.
-        ideal: whether mass and inertia are taken as they are: a massless link between two joints,
-            a point mass, numbers that no rigid body has. The mass matrix of the mechanism must
-            be positive definite at the start all the same.
+        ideal: True to accept mass and inertia unchecked: a massless link between two joints, a
+            point mass, unphysical numbers. The mass matrix of the mechanism must still be positive
+            definite at the start.
     """
 
     name: str
@@ -209,7 +209,7 @@ class Body:
         return vector(self.com)
 
     def problems(self, p: ca.SX, values: ca.DM) -> Iterator[str]:
-        """Problems of the numbers, symbols `p` replaced by `values`."""
+        """Yield problems of the numbers, with symbols `p` replaced by `values`."""
         wrong = list(self._no_numbers())
         if wrong:
             yield from wrong
@@ -222,13 +222,13 @@ class Body:
             return
         if self.ideal:
             return
-        hint = "; `ideal=True` takes a massless link or a point mass as it is"
+        hint = "; `ideal=True` accepts a massless link or a point mass"
         if not numbers[0] > 0:
             yield f"mass: expected > 0 kg, got {numbers[0]:g}{hint}"
         yield from (f"{text}{hint}" for text in unphysical(numbers[1:].reshape(3, 3)))
 
     def _no_numbers(self) -> Iterator[str]:
-        """Values that are no numbers, or of a wrong count."""
+        """Yield values that are not numbers, or of a wrong count."""
         given: Any = self.inertia
         if not is_scalar(self.mass):
             yield f"mass: expected a number [kg], got {shown(self.mass)}"
@@ -243,11 +243,11 @@ class Body:
 
 
 def unphysical(J: Array, point: bool = False) -> Iterator[str]:
-    """Why no rigid body has the inertia J [kg m^2] about its centre of mass.
+    """Yield reasons why no rigid body has the inertia J [kg m^2] about its centre of mass.
 
     Args:
         J: shape (3, 3).
-        point: whether principal moments of zero are fine: a point, a thin rod.
+        point: True to allow principal moments of zero: a point, a thin rod.
     """
     principal = np.linalg.eigvalsh(J)
     spread = TRIANGLE * abs(principal[2])

@@ -1,4 +1,4 @@
-"""Which joints carry coordinates: a spanning tree of the mechanism, and the loops that are left."""
+"""Spanning tree of a mechanism, whose joints have coordinates, and the joints that close loops."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,12 +13,12 @@ from symfric.multibody.spatial import GROUND, Body, Frame, skew
 
 
 def body_of(place: str) -> str:
-    """The body in "body.frame"."""
+    """Return the body in "body.frame"."""
     return place.partition(".")[0]
 
 
 def frame_at(bodies: Mapping[str, Body], place: str) -> Frame:
-    """The frame "body.frame"; the origin of the body where no frame is named."""
+    """Return the frame "body.frame"; the origin of the body if no frame is named."""
     body, _, frame = place.partition(".")
     return bodies[body].frames[frame]
 
@@ -26,12 +26,12 @@ def frame_at(bodies: Mapping[str, Body], place: str) -> Frame:
 @final
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A body and the joint that hangs it on a body nearer to the ground.
+    """Body with the joint that connects it to a body nearer to the ground.
 
     Attributes:
         base, body: names; the body moves relative to the base.
         joint: the joint between them.
-        reverse: whether the joint's child is the base.
+        reverse: True if the joint's child is the base.
         at_base, at_body: the joint's frames there.
         first: index of its first coordinate.
     """
@@ -51,16 +51,16 @@ class Link:
 
     @property
     def rows(self) -> slice:
-        """Its coordinates among all."""
+        """Slice of its coordinates."""
         return slice(self.first, self.first + self.n)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Pose of the frame on the body in the frame on the base."""
+        """Return the pose of the frame on the body in the frame on the base."""
         R, p = self.joint.pose(q)
         return (R.T, -R.T @ p) if self.reverse else (R, p)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Motion subspace, as seen from the base."""
+        """Return the motion subspace, as seen from the base."""
         H_w, H_v = self.joint.subspace(q)
         if not self.reverse:
             return H_w, H_v
@@ -97,9 +97,9 @@ class Topology:
 
 
 def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topology:
-    """Hang every body on the ground, over the joints with the most constraints.
+    """Connect every body to the ground, by the joints with the most constraints.
 
-    Every joint in the tree removes its constraints from the equations; those left close loops.
+    Every joint in the tree removes its constraints from the equations; the others close loops.
     Bodies that no joint with coordinates connects to the ground are left out.
     """
     depth = {GROUND: 0}
@@ -123,7 +123,9 @@ def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topolo
 
 
 def absolute(bodies: Mapping[str, Body], joints: Sequence[Joint], names: Sequence[str]) -> Topology:
-    """Every body free, with Euler parameters at its centre of mass; every joint closes a loop."""
+    """Return free bodies, with Euler parameters at their centres of mass; all joints close
+    loops.
+    """
     links = [
         Link(
             GROUND,

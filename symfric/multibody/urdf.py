@@ -1,4 +1,4 @@
-"""URDF import: the mechanism that a robot's file describes."""
+"""URDF import of mechanisms."""
 
 import re
 import warnings
@@ -40,7 +40,7 @@ KINDS: dict[str, type[Joint]] = {
     "floating": Floating,
 }
 FLOATING = "floating_base"
-"""The joint of a root link that moves freely."""
+"""Joint of a root link that moves freely."""
 
 
 def read_urdf(
@@ -54,45 +54,45 @@ def read_urdf(
     gravity: Vector = (0.0, 0.0, -9.81),
     strict: bool = False,
 ) -> Mechanism:
-    """The mechanism that a URDF file describes: a chain or tree of links.
+    """Return the mechanism of a URDF file: a chain or tree of links.
 
-    Joints keep their names, q = 0 is the file's zero. Links that fixed joints hold together are
-    one body with the name of the innermost link; every link is a frame of its body, "body.link".
-    Massless links between joints make these the axes of one joint; joints that move no mass at
-    all are held at zero. Every joint that turns about or slides along its axis gets an input
+    Joints keep their names, q = 0 is the file's zero. Links connected by fixed joints become one
+    body with the name of the innermost link; every link is a frame of its body, "body.link".
+    Massless links between joints make these the axes of one joint; joints that move no mass at all
+    are fixed at zero. Every joint that turns about or slides along its axis gets an input
     `tau_<joint>` [N m, N], unless it mimics another one: then a `Gear` makes it follow.
 
     `<dynamics damping="d" friction="f">` becomes the friction d w + f tanh(w / v_eps) for a joint
     rate w: `Viscous` with sigma_2 = d, and `Coulomb` with mu_d = 1 under the normal force f. That
-    friction is independent of the reactions and adds no unknown; for a joint that turns, read
-    N m and rad/s. `bearings` are for friction that reactions cause.
+    friction is independent of the reactions and adds no unknown; for a joint that turns, read N m
+    and rad/s. Use `bearings` for friction caused by reactions.
 
     Args:
         source: path of the file, or its text.
         law: instead of Coulomb; its normal force is f, so with mu_d = 1 it slides at the file's
-            level (`relative` scales a law so).
+            level (`relative` scales a law in this way).
         laws: joint name -> law, instead of `law`.
         level: f of the joints whose tag has none [N m, N].
-        bearings: joint name -> friction, instead of what the file says of this joint.
-        floating: whether the root link moves freely (joint `floating_base`); otherwise it is the
-            ground, whatever it weighs. A massless root always is.
+        bearings: joint name -> friction, instead of that in the file.
+        floating: True if the root link moves freely (joint `floating_base`); otherwise it is the
+            ground, whatever its mass. A massless root always is.
         gravity: [m/s^2] in the axes of the root link.
-        strict: refuse instead of warn: inertias that no rigid body has, joints that move no mass,
-            joints that mimic one the file does not have.
+        strict: raise errors instead of warnings: inertias that no rigid body has, joints that move
+            no mass, joints that mimic one the file does not have.
 
     Raises:
-        ValueError: all mistakes of the file at once, each with its path; nothing that moves has a
+        ValueError: all mistakes of the file at once, each with its path; no moving part has a
             mass; an unknown name in `bearings` or `laws`.
         OSError: the file cannot be read.
 
     Warns:
-        UserWarning: once, of what is taken as it is though it cannot be meant (see `strict`), of
-            all that is left out (tags such as `<limit>`: nothing stops a joint there, `parse` has
-            the numbers; not of visual, collision and material) and of names that are no C
-            identifiers and are changed.
+        UserWarning: once, about implausible values that are accepted (see `strict`), about all
+            parts that are left out (tags such as `<limit>`: nothing stops a joint there, `parse`
+            returns the numbers; not about visual, collision and material) and about names that are
+            changed because they are not C identifiers.
 
-    Limits: an inertia of which no body is made can make the motion gain energy; `build` refuses it
-    where the mass matrix at the start is not positive definite.
+    Limits: an unphysical inertia can make the motion gain energy; `build` refuses it if the mass
+    matrix at the start is not positive definite.
     """
     if law is not None:
         check_law("urdf: law", law)
@@ -135,8 +135,8 @@ def read_urdf(
     still = grounded and not moved and weights[urdf.root].mass > 0
     texts = [
         ("nothing moves", [f"floating=True frees the root '{urdf.root}'"] if still else []),
-        ("taken as it is", urdf.doubts),
-        ("held at zero, because they move no mass", [f"joint '{name}'" for name in held]),
+        ("accepted unchanged", urdf.doubts),
+        ("fixed at zero, because they move no mass", [f"joint '{name}'" for name in held]),
         ("left out", left),
         ("names changed", changes),
     ]
@@ -149,7 +149,7 @@ def read_urdf(
 def tag_friction(
     joint: UrdfJoint, law: Law | None = None, level: Scalar = 0.0
 ) -> JointFriction | None:
-    """The friction of `<dynamics damping friction>`, as `read_urdf` says; None without it."""
+    """Return the friction of `<dynamics damping friction>`, see `read_urdf`; None without it."""
     laws: list[Law] = []
     normal = joint.friction or level
     if not equals(normal, 0.0):
@@ -163,9 +163,9 @@ def tag_friction(
 
 
 def relative(law: Law) -> Law:
-    """`law` with its coefficients divided by the largest, so that it breaks away at N itself.
+    """Return `law` with its coefficients divided by the largest, so that it breaks away at N.
 
-    Coefficients are the levels of unit 1; a law without any stays.
+    Coefficients are the levels of unit 1; a law without any is unchanged.
     """
     known = {n: p for n, p in parameters(law).items() if p.role == "level" and p.unit == "1"}
     numbers = {name: float(p.value) for name, p in known.items() if is_number(p.value)}
@@ -176,7 +176,7 @@ def relative(law: Law) -> Law:
 @final
 @dataclass(frozen=True, eq=False)
 class _Names:
-    """Names in the mechanism: of bodies by link, of joints; those that differ; what is wrong."""
+    """Names in the mechanism, of bodies by link and of joints; changed names; problems."""
 
     links: dict[str, str] = field(default_factory=dict[str, str])
     joints: dict[str, str] = field(default_factory=dict[str, str])
@@ -185,7 +185,7 @@ class _Names:
 
 
 def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) -> Iterator[str]:
-    """Joints that move no mass, where that is refused, and those that mimic them."""
+    """Yield joints that move no mass, if that is refused, and those that mimic them."""
     for name in held if refused else ():
         yield (
             f"joint '{name}': expected links with a mass > 0 kg that it moves, got none; give one "
@@ -200,13 +200,13 @@ def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) 
 
 
 def _identifier(text: str) -> str:
-    """`text` with underscores where a C identifier allows nothing else."""
+    """Return `text` with underscores in place of characters that C identifiers do not allow."""
     text = re.sub(r"\W", "_", text, flags=re.ASCII)
     return f"_{text}" if text[:1].isdigit() else text
 
 
 def _names(urdf: Urdf, grounded: bool) -> _Names:
-    """C identifiers, each once; joints keep their names first, because results carry them."""
+    """Return unique C identifiers; joints keep their names first, because results contain them."""
     names = _Names(links={urdf.root: GROUND} if grounded else {})
     taken = {GROUND: "the ground", "gravity": "the weight", FLOATING: "the root's joint"}
     groups = (
@@ -214,7 +214,7 @@ def _names(urdf: Urdf, grounded: bool) -> _Names:
         ("link", names.links, [link for link in urdf.links if link not in names.links]),
     )
     for kind, into, olds in groups:
-        # those that are identifiers first, so that they keep their names
+        # identifiers first, so that they keep their names
         for old in sorted(olds, key=lambda old: old != _identifier(old)):
             new = _identifier(old)
             if new in taken:
@@ -238,7 +238,7 @@ def _add_bodies(
     weights: Mapping[str, Inertial],
     names: _Names,
 ) -> None:
-    """Bodies, and every link as a frame."""
+    """Add the bodies, with every link as a frame."""
     for link, weight in weights.items():
         if names.links[link] != GROUND:
             six = weight.J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -259,12 +259,12 @@ def _hang(
     friction: JointFriction | None,
     start: float,
 ) -> Iterator[str]:
-    """Add a joint with its frames and its input; yield what is left out."""
+    """Add a joint with its frames and its input; yield the parts that are left out."""
     name, on = names.joints[joint.name], places[joint.parent]
     parent, child = names.links[on.body], names.links[joint.child]
     across = np.eye(3)[int(np.argmin(np.abs(joint.axis)))]
     R, p = on.R @ joint.R, on.p + on.R @ joint.p
-    # a point keeps joints and links of one name apart
+    # a dot separates joints and links of one name
     ends = f"{parent}.{name}.parent", f"{child}.{name}.child"
     z, x = joint.axis, across
     if joint.kind == "floating":
@@ -287,7 +287,7 @@ def _direction(kind: type[Joint]) -> str:
 
 
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:
-    """Make joints follow those they mimic."""
+    """Add gears that make joints follow those they mimic."""
     directions = {joint.name: _direction(type(joint)) for joint in m.joints}
     for joint in moved:
         if joint.mimic is not None:
@@ -297,6 +297,6 @@ def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:
 
 
 def _plain(values: Array) -> tuple[float, float, float]:
-    """Three floats."""
+    """Return three floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -1,4 +1,4 @@
-"""A URDF file as data: links, joints, bodies of links that are fixed to each other."""
+"""URDF file as data: links, joints, and bodies of links that are fixed to each other."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ class Inertial:
 @final
 @dataclass(frozen=True, eq=False)
 class Mimic:
-    """A joint that follows another one: q = multiplier q_joint + offset."""
+    """Joint that follows another one: q = multiplier q_joint + offset."""
 
     joint: str
     multiplier: float
@@ -45,7 +45,7 @@ class Mimic:
 @final
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """A joint tag.
+    """Joint tag.
 
     Attributes:
         kind: one of `KINDS`.
@@ -73,14 +73,14 @@ class UrdfJoint:
 @final
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """A robot as its file describes it.
+    """Robot of a URDF file.
 
     Attributes:
         name: of the robot.
-        links: what each link weighs; None for a massless one.
+        links: mass and inertia of each link; None for a massless one.
         joints: every link but the root is the child of one.
-        left_out: tags that say something which is not in here, each with where it stands.
-        doubts: what cannot be meant as it stands and is taken as it is, each with its path.
+        left_out: tags with unsupported content, each with its places.
+        doubts: implausible values that are accepted, each with its path.
     """
 
     name: str
@@ -91,19 +91,19 @@ class Urdf:
 
     @property
     def root(self) -> str:
-        """The link that is nobody's child."""
+        """Link that is not a child of another one."""
         children = {joint.child for joint in self.joints}
         return next(link for link in self.links if link not in children)
 
     def zero(self, joint: UrdfJoint) -> float:
-        """Where a joint stands while all joints that mimic no other are at zero [m, rad]."""
+        """Return the position of a joint while all independent joints are at zero [m, rad]."""
         if joint.mimic is None:
             return 0.0
         leader = next(other for other in self.joints if other.name == joint.mimic.joint)
         return joint.mimic.multiplier * self.zero(leader) + joint.mimic.offset
 
     def outwards(self) -> Iterator[UrdfJoint]:
-        """The joints, each after the one that carries its parent."""
+        """Yield the joints, each after the one that carries its parent."""
         below: dict[str, list[UrdfJoint]] = {}
         for joint in self.joints:
             below.setdefault(joint.parent, []).append(joint)
@@ -119,12 +119,12 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
 
     Args:
         source: path of a file, or its text (which begins with "<").
-        strict: refuse what no rigid body has (a negative principal moment, one larger than the sum
-            of the others, an inertia without a mass) and joints that mimic one the file does not
-            have; otherwise the former is taken as it is, the latter move on their own.
+        strict: refuse unphysical inertias (a negative principal moment, one larger than the sum of
+            the others, an inertia without a mass) and joints that mimic one the file does not have;
+            otherwise the former are accepted, the latter move on their own.
 
     Raises:
-        ValueError: no XML, no tree of links, or numbers that cannot be, all problems at once, each
+        ValueError: not XML, not a tree of links, or invalid numbers, all problems at once, each
             with its path ("urdf 'arm' > joint 'elbow' > axis").
         OSError: the file cannot be read.
     """
@@ -158,7 +158,7 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
 
 
 def _tags(content: bytes, encoding: str | None) -> ET.Element:
-    """The outermost tag; prefixes need not be declared, because many files do not."""
+    """Return the outermost tag; prefixes need not be declared, because many files do not."""
     builder, parser = ET.TreeBuilder(), expat.ParserCreate(encoding)
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -194,7 +194,7 @@ def _inertial(tag: ET.Element, notes: Notes) -> Inertial | None:
 
 
 def _weightless(J: Array) -> Iterator[str]:
-    """An inertia without a mass."""
+    """Yield a message about an inertia without a mass."""
     if J.any():
         yield "mass: expected > 0 kg, because there is an inertia, got 0"
 
@@ -212,7 +212,7 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
             notes.left(f"dynamics {key}", where)
     if limit is not None and kind != "fixed":
         notes.left("limit", where)
-    # what a joint does not have says nothing, and exporters write zeros there
+    # attributes of absent properties have no meaning, and exporters write zeros there
     along = None if kind in ("fixed", "floating") else tag.find("axis")
     mimic = tag.find("mimic")
     if kind == "fixed" and mimic is not None:
@@ -256,7 +256,7 @@ def _mimic(where: str, tag: ET.Element | None, notes: Notes) -> Mimic | None:
 
 
 def _check_names(robot: ET.Element, notes: Notes) -> None:
-    """Every link and every joint has a name of its own."""
+    """Check that every link and every joint has a unique name."""
     for kind in ("link", "joint"):
         names = [tag.get("name", "") for tag in robot.findall(kind)]
         for name in dict.fromkeys(names):
@@ -269,7 +269,7 @@ def _check_names(robot: ET.Element, notes: Notes) -> None:
 
 
 def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterator[str]:
-    """Why the joints do not make a tree of the links."""
+    """Yield reasons why the joints do not form a tree of the links."""
     carriers: dict[str, list[str]] = {link: [] for link in links}
     for joint in joints:
         for key, link in (("parent", joint.parent), ("child", joint.child)):
@@ -292,7 +292,7 @@ def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterato
 
 
 def _known_leader(joint: UrdfJoint, joints: Sequence[UrdfJoint], notes: Notes) -> UrdfJoint:
-    """The joint; one that moves on its own where the file lacks the joint that it mimics."""
+    """Return the joint; it moves on its own if the file lacks the joint that it mimics."""
     if joint.mimic is None or any(joint.mimic.joint == other.name for other in joints):
         return joint
     leader = joint.mimic.joint or "one without a name"
@@ -301,7 +301,7 @@ def _known_leader(joint: UrdfJoint, joints: Sequence[UrdfJoint], notes: Notes) -
 
 
 def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:
-    """Followers whose chain of leaders does not end in a joint that turns or slides."""
+    """Yield followers whose chain of leaders does not end in a joint that turns or slides."""
     along = {joint.name: joint for joint in joints if joint.kind in SINGLE}
     for joint in joints:
         leader, steps = joint, 0
@@ -317,7 +317,7 @@ def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:
 @final
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Where a link is: the link whose body it is part of, and its pose there."""
+    """Pose of a link in the link whose body it is part of."""
 
     body: str
     R: Array
@@ -325,7 +325,7 @@ class Carried:
 
 
 def carried(urdf: Urdf) -> dict[str, Carried]:
-    """Every link: a body of its own, or fixed to another one."""
+    """Return the place of every link: a body of its own, or fixed to another one."""
     found = {urdf.root: Carried(urdf.root, np.eye(3), np.zeros(3))}
     for joint in urdf.outwards():
         on = found[joint.parent]
@@ -338,7 +338,7 @@ def carried(urdf: Urdf) -> dict[str, Carried]:
 
 
 def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
-    """Mass, centre of mass and inertia about it of all links of a body."""
+    """Return mass, centre of mass and inertia about it of all links of a body."""
     parts = [
         (at, part)
         for link, at in places.items()
@@ -355,10 +355,10 @@ def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
 
 
 def holding(urdf: Urdf) -> tuple[Urdf, tuple[str, ...]]:
-    """The robot with all joints fixed that move nothing but massless links, and their names.
+    """Return the robot with joints fixed that move only massless links, and their names.
 
-    Nothing would resist their motion, and it moves nothing. A massless link that carries a heavy
-    one, however far out, is no such case: its joints are the axes of one joint.
+    Such joints have no inertia and no effect. A massless link that carries a heavy one, however far
+    out, is different: its joints are the axes of one joint.
     """
     heavy = {link for link, weight in urdf.links.items() if weight is not None}
     for joint in reversed(tuple(urdf.outwards())):

@@ -1,4 +1,4 @@
-"""Notes on a URDF file: mistakes, doubts, parts that are left out; and parsing of its numbers."""
+"""Notes on a URDF file: mistakes, doubts, omitted parts; and parsing of its numbers."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 APPEARANCE = {"visual", "collision", "material"}
-"""Tags that no mechanism has a place for and nobody misses there."""
+"""Tags that a mechanism does not need."""
 SNAP = 1e-15
-"""Entries of rotation matrices nearer to 0 are 0: a quarter turn must not leave 6e-17 behind."""
+"""Limit below which entries of rotation matrices are 0: a quarter turn must not leave 6e-17."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Notes:
-    """What is wrong, what cannot be meant as it stands, what is left out: tag -> where it stands.
+    """Notes on a file: problems, implausible values, and omitted tags -> their places.
 
-    A strict reader takes doubts for problems.
+    A strict reader treats doubts as problems.
     """
 
     strict: bool = False
@@ -38,7 +38,7 @@ class Notes:
                 self.left(other.tag, where)
 
     def doubt(self, text: str) -> None:
-        """Note what others' tools take as it is."""
+        """Note an implausible value that other tools accept."""
         (self.problems if self.strict else self.doubts).append(text)
 
     def left(self, tag: str, where: str) -> None:
@@ -48,7 +48,9 @@ class Notes:
             places.append(where)
 
     def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
-        """The numbers in an attribute, as many as in `default`, which stands for a missing one."""
+        """Return the numbers in an attribute, as many as in `default`, the value of a missing
+        one.
+        """
         text = default if tag is None else tag.get(key, default)
         n = len(default.split())
         try:
@@ -62,18 +64,18 @@ class Notes:
         return np.array(found)
 
     def number(self, where: str, tag: ET.Element | None, key: str, default: str = "0") -> float:
-        """The number in an attribute."""
+        """Return the number in an attribute."""
         return float(self.numbers(where, tag, key, default)[0])
 
     def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
-        """Rotation and position in the tag <origin> of `tag`."""
+        """Return rotation and position in the tag <origin> of `tag`."""
         origin, at = tag.find("origin"), f"{where} > origin"
         turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
         return turn, self.numbers(at, origin, "xyz", "0 0 0")
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """R_z(yaw) R_y(pitch) R_x(roll): turns about the fixed axes x, y, z, one after the other."""
+    """Return R_z(yaw) R_y(pitch) R_x(roll): rotations about the fixed axes x, y, z in turn."""
     (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (roll, pitch, yaw))
     R = np.array([
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],

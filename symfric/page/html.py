@@ -8,7 +8,7 @@ from symfric.foundation.style import COLOURS, dash
 
 
 def page(title: str, language: str, body: str) -> str:
-    """A whole document that needs nothing from elsewhere."""
+    """Return a whole document that needs nothing from elsewhere."""
     return (
         f'<!DOCTYPE html>\n<html lang="{language}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -19,7 +19,7 @@ def page(title: str, language: str, body: str) -> str:
 
 
 def section(anchor: str, heading: str, *parts: str) -> str:
-    """A section with a heading that can be linked to; "" where all parts are empty."""
+    """Return a section with a heading that can be linked to; "" where all parts are empty."""
     inside = "\n".join(part for part in parts if part)
     if not inside:
         return ""
@@ -33,40 +33,40 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def bullets(sentences: Iterable[str]) -> str:
-    """A list; "" of nothing."""
+    """Return a list; "" of nothing."""
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
     return f"<ul>{items}</ul>" if items else ""
 
 
 def title(text: str) -> str:
-    """The heading of the page."""
+    """Return the heading of the page."""
     return f"<h1>{escape(text)}</h1>"
 
 
 def code(text: str) -> str:
-    """A program text."""
+    """Return a program text."""
     return f"<pre><code>{escape(text)}</code></pre>" if text else ""
 
 
 def details(summary: str, *parts: str) -> str:
-    """A part that opens on request."""
+    """Return a part that opens on request."""
     inside = "".join(parts)
     return f"<details><summary>{escape(summary)}</summary>{inside}</details>" if inside else ""
 
 
 def heading(text: str) -> str:
-    """A heading inside a section."""
+    """Return a heading inside a section."""
     return f"<h3>{escape(text)}</h3>"
 
 
 def figure(drawing: str, caption: str = "") -> str:
-    """A chart with words below."""
+    """Return a chart with words below."""
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f"<figure>{drawing}{below}</figure>"
 
 
 def verdict(kind: str, word: str, sentences: Iterable[str]) -> str:
-    """The verdict in a box, a word and sentences: kind "good", "doubtful" or "bad"."""
+    """Return the verdict in a box, a word and sentences: kind "good", "doubtful" or "bad"."""
     text = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
     first = f"<strong>{escape(word)}</strong>" if word else ""
     return f'<div class="verdict {kind}" role="status">{first}{text}</div>'
@@ -85,7 +85,7 @@ def table(
     numbers: Sequence[int] = (),
     kinds: Sequence[str] = (),
 ) -> str:
-    """A table whose first column heads the rows; "" without rows.
+    """Return a table whose first column heads the rows; "" without rows.
 
     Args:
         caption: what it shows.

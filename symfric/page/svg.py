@@ -73,7 +73,7 @@ class Axis:
         return [(k * step, f"{k * step / unit:.{digits}g}") for k in range(first, last + 1)]
 
     def _step(self, most: int) -> float:
-        """The coarsest round step that has about `most` ticks, and three at least."""
+        """Return the coarsest round step that has about `most` ticks, and three at least."""
         rough = (self.high - self.low) / most
         decade = 10.0 ** floor(log10(rough))
         steps = [s * d for d in (decade / 10, decade) for s in STEPS[:-1]] + [10 * decade]
@@ -97,7 +97,7 @@ class Axis:
 def around(
     name: str, unit: str, values: Iterable[Array], margin: float = 0.05, logarithmic: bool = False
 ) -> Axis:
-    """An axis that holds all finite numbers in `values` with a margin."""
+    """Return an axis that holds all finite numbers in `values` with a margin."""
     kept = [y[np.isfinite(y) & ((y > 0) | (not logarithmic))] for y in values]
     every = np.concatenate([*kept, np.zeros(0)])
     if not every.size:
@@ -161,10 +161,10 @@ class Named(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Path(Named):
-    """A line through points."""
+    """Line through points."""
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """A polyline for each run of finite points."""
+        """Return a polyline for each run of finite points."""
         bad = np.flatnonzero(~np.isfinite(self.y))
         runs = [_places(x, y, width, height, *run) for run in self._runs(bad)]
         return "".join(f'<polyline class="{self.kind}" points="{_points(at)}"/>' for at in runs)
@@ -212,7 +212,7 @@ class Stems(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Level(Mark):
-    """A line across, at y; upright, at x, with `upright`."""
+    """Line across, at y; upright, at x, with `upright`."""
 
     value: float
     upright: bool = False
@@ -231,13 +231,13 @@ class Level(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Band(Mark):
-    """The area between two heights."""
+    """Area between two heights."""
 
     low: float
     high: float
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """A rectangle across the frame."""
+        """Return a rectangle across the frame."""
         low, high = np.clip(y.at(np.array([self.low, self.high])), 0.0, 1.0)
         top = height * (1 - high)
         size = f'width="{width:g}" height="{height * (high - low):.1f}"'

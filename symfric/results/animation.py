@@ -120,7 +120,7 @@ def _film(
 
 
 def _page(figure: Figure, show: Callable[[int], None], count: int, fps: float) -> str:
-    """An HTML page that holds all pictures and needs nothing from elsewhere."""
+    """Return an HTML page that holds all pictures and needs nothing from elsewhere."""
     pictures: list[str] = []
     for k in range(count):
         show(k)
@@ -135,7 +135,7 @@ def _page(figure: Figure, show: Callable[[int], None], count: int, fps: float) -
 def picture(
     trajectory: Signals, times: Array, speed: float = 1.0
 ) -> tuple[Figure, Callable[[int], None]]:
-    """A figure of a mechanism, and what makes it show its pose at times[k].
+    """Return a figure of a mechanism, and what makes it show its pose at times[k].
 
     Raises:
         ValueError: a model without bodies.
@@ -271,7 +271,7 @@ def _direction(axis: Array) -> str:
 
 
 def _style(stroke: Stroke) -> dict[str, Any]:
-    """The look of a stroke."""
+    """Return the look of a stroke."""
     shade = colour(stroke.body) if stroke.body >= 0 else EDGE
     styles: dict[str, dict[str, Any]] = {
         "path": {"color": shade, "linewidth": 0.8, "alpha": 0.35},

@@ -1,4 +1,4 @@
-"""The result of many runs: signals of all members, what was varied, and what became of each."""
+"""Result of many runs: signals of all members, what was varied, and what became of each."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -87,7 +87,7 @@ class Ensemble(Showing):
         return _shown(self)
 
     def thumbnail(self) -> "Figure | None":
-        """The first signal of the first members over time, small; None for ends alone."""
+        """Return the first signal of the first members over time, small; None for ends alone."""
         from symfric.results.pictures import thumbnail_of_many  # noqa: PLC0415  (matplotlib is slow to import)
 
         if self.t.ndim > 1 or self.t.size < 2:
@@ -105,7 +105,7 @@ class Ensemble(Showing):
         return self.attempts.size
 
     def unit(self, name: str) -> str:
-        """The unit of a signal or of what was given."""
+        """Return the unit of a signal or of what was given."""
         known = self.units | self.given_units
         checks.check_names(f"ensemble of '{self.scene}'", [name], known)
         return known[name]
@@ -172,7 +172,7 @@ class Ensemble(Showing):
     def _at(
         self, where: str, names: Sequence[str], at: float | str
     ) -> tuple[str, dict[str, Array]]:
-        """The name of the place `at`, and name -> values there, shape (members,)."""
+        """Return the name of the place `at`, and name -> values there, shape (members,)."""
         if isinstance(at, str):
             checks.choice(where, at, PLACES)
             if at == "end":
@@ -212,7 +212,7 @@ class Ensemble(Showing):
         write_table(path, header, rows)
 
     def to_dataframe(self, *names: str) -> Any:
-        """A row for each member and time, as a pandas table with what was varied as columns.
+        """Return a row for each member and time, as a pandas table with what was varied as columns.
 
         Where only ends are known, a row for each member. Units stand in its `attrs`.
 
@@ -258,7 +258,7 @@ class Ensemble(Showing):
         return xarray.Dataset(arrays, coords=coordinates, attrs=self._about)
 
     def _chosen(self, names: Sequence[str]) -> list[str]:
-        """The signals that are named; all if none is."""
+        """Return the signals that are named; all if none is."""
         checks.check_names(f"ensemble of '{self.scene}'", names, self.signals)
         return list(names) or list(self.signals)
 
@@ -282,7 +282,7 @@ ENSEMBLE = Format("symfric ensemble", 2, "load_ensemble", "a saved ensemble", En
 
 
 def load_ensemble(path: str | Path) -> Ensemble:
-    """The ensemble that `study.save(path)` wrote, to the bit.
+    """Return the ensemble that `study.save(path)` wrote, to the bit.
 
     Raises:
         ValueError: no such file, one that something else wrote, a damaged one, or one of a newer

@@ -51,7 +51,8 @@ class Group:
 
 
 def main(model: Model, units: dict[str, str]) -> list[Group]:
-    """The main signals of a run: positions, friction, and energy or, without a balance, power.
+    """Return the main signals of a run: positions, friction, and energy or, without a balance,
+    power.
 
     Speeds instead of positions where no state is a position, as in a clutch. Empty where the model
     has neither positions nor friction.
@@ -119,7 +120,9 @@ def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Gro
 
 
 def shortened(names: list[str]) -> list[str]:
-    """`names` without the last word that they share, as "_friction"; at most 28 letters each."""
+    """Return `names` without the last word that they share, as "_friction"; at most 28 letters
+    each.
+    """
     ending = f"_{names[0].rpartition('_')[2]}"
     if len(names) > 1 and all(n.endswith(ending) and n != ending for n in names):
         names = [n.removesuffix(ending) for n in names]
@@ -127,11 +130,11 @@ def shortened(names: list[str]) -> list[str]:
 
 
 def friction_laws(model: Model) -> str:
-    """The laws of its contacts, each once: "LuGre, Coulomb"; empty where there are none."""
+    """Return the laws of its contacts, each once: "LuGre, Coulomb"; empty where there are none."""
     return ", ".join(dict.fromkeys(_called(contact.law) for contact in model.contacts))
 
 
 def _called(law: Any) -> str:
-    """A law by its class, a sum by its terms."""
+    """Return a law by its class, a sum by its terms."""
     terms = getattr(law, "laws", ())
     return "+".join(map(_called, terms)) if terms else type(law).__name__

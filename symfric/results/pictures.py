@@ -83,7 +83,7 @@ def plot_trajectories(
 
 
 def split(groups: Sequence[Group]) -> list[Group]:
-    """The groups as several simulations are compared: a panel per signal, if these are few.
+    """Return the groups as several simulations are compared: a panel per signal, if these are few.
 
     Of energies the sum is enough.
     """
@@ -116,7 +116,7 @@ def _panel(
     by_t: float,
     log: bool,
 ) -> None:
-    """The signals of a group: a colour each, line styles for several simulations.
+    """Return the signals of a group: a colour each, line styles for several simulations.
 
     Where every panel of the picture holds but one, simulations differ by colour, too.
     """
@@ -161,7 +161,7 @@ def level(axis: Axes, values: Sequence[Array]) -> None:
 
 
 def _title(trajectories: Mapping[str, Signals]) -> str:
-    """The scene, and the laws where these are the same in all."""
+    """Return the scene, and the laws where these are the same in all."""
     first = next(iter(trajectories.values()))
     laws = {friction_laws(run.model) for run in trajectories.values()}
     (law,) = laws if len(laws) == 1 else ("",)
@@ -200,7 +200,7 @@ def thumbnail(run: Signals) -> Figure:
 
 
 def _few(run: Signals) -> list[str]:
-    """The signals of the small picture."""
+    """Return the signals of the small picture."""
     found, kind = list(run.units), kinds(run.model)
     states = [v.name for v in run.model.x][:2]
     rubs = [n for n in found if kind.get(n) == FRICTION or n == "friction"][:1]
@@ -385,7 +385,7 @@ def _across(axis: Axes, x: Array) -> None:
 
 
 def thumbnail_of_many(t: Array, values: Array, label: str) -> Figure:
-    """The first members over time, small."""
+    """Return the first members over time, small."""
     figure = Figure(figsize=(5.2, 1.9), layout="constrained")
     axis = figure.subplots()
     axis.plot(t, np.asarray(values[:SMALL]).T, linewidth=0.6, color=COLOURS[0], alpha=0.4)

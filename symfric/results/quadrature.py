@@ -23,7 +23,7 @@ EXACT, HALVINGS = 1e-12, 24
 
 
 class Run(Protocol):
-    """A run that is integrated."""
+    """Run that is integrated."""
 
     @property
     def step_times(self) -> Array:

@@ -88,7 +88,7 @@ def report(
 
 
 def _verdict(runs: Mapping[str, Trajectory]) -> str:
-    """The ends of the runs."""
+    """Return the ends of the runs."""
     ended = all(run.status.ok for run in runs.values())
     good = ended and not any(run.doubts for run in runs.values())
     said = [f"{name}: {run.message}" for name, run in runs.items()]
@@ -98,7 +98,7 @@ def _verdict(runs: Mapping[str, Trajectory]) -> str:
 
 
 def _picture(runs: Mapping[str, Trajectory]) -> str:
-    """The picture that `plot` gives, inside the page."""
+    """Return the picture that `plot` gives, inside the page."""
     from symfric.foundation.shown import data_uri  # noqa: PLC0415  (matplotlib is slow)
     from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (likewise)
 
@@ -108,7 +108,7 @@ def _picture(runs: Mapping[str, Trajectory]) -> str:
 
 
 def _signals(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """A table of ranges for each run."""
+    """Return a table of ranges for each run."""
     for name, run in runs.items():
         rows = [
             (signal, *map(_number, (run.final[signal], *run.extremes[signal])), run.units[signal])

@@ -85,7 +85,7 @@ class Signals(Showing):
         return self.evaluate(self.looks)
 
     def at_looks(self, name: str) -> Array:
-        """A signal or detail at `looks`: what pictures show."""
+        """Return a signal or detail at `looks`: what pictures show."""
         self.check([name])
         if name in self._looked:
             return self._looked[name]
@@ -122,7 +122,7 @@ class Signals(Showing):
         return {name: output.unit for name, output in self.model.further.items()}
 
     def unit(self, name: str) -> str:
-        """The unit of a signal or detail."""
+        """Return the unit of a signal or detail."""
         return self.units[name] if name in self.units else self.details[name]
 
     def check(self, names: Iterable[str]) -> None:

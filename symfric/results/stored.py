@@ -19,7 +19,7 @@ T = TypeVar("T")
 @final
 @dataclass(frozen=True)
 class Format(Generic[T]):
-    """A kind of file.
+    """Kind of file.
 
     Attributes:
         kind: what such files call themselves.
@@ -69,7 +69,7 @@ class Format(Generic[T]):
 
 
 def module(where: str, name: str) -> Any:
-    """A package that may be missing.
+    """Return a package that may be missing.
 
     Raises:
         ImportError: it is, and what to do.
@@ -118,5 +118,5 @@ class Statistics:
     sensitivity_errors: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields by name; errors that were not measured are left out."""
+        """Return the fields by name; errors that were not measured are left out."""
         return {k: v for k, v in asdict(self).items() if v == v and v != {}}

@@ -1,4 +1,4 @@
-"""A moving sketch as lines and markers: geometry alone, so that any program may draw it."""
+"""Moving sketch as lines and markers: geometry alone, so that any program may draw it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Poses:
 @final
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """A line or markers.
+    """Line or markers.
 
     Attributes:
         role: what it stands for: body, arm (to the end of a spring), path, block, axis, guide,
@@ -61,7 +61,7 @@ class Stroke:
 @final
 @dataclass(frozen=True, eq=False)
 class View:
-    """The direction from which a motion is seen.
+    """Direction from which a motion is seen.
 
     Attributes:
         low, high: what the picture must show [m], shape (3,).
@@ -90,7 +90,7 @@ class View:
 
 
 def look(sketch: Sketch, poses: Poses) -> View:
-    """The view that shows all places at all times."""
+    """Return the view that shows all places at all times."""
     every = np.concatenate([a.transpose(1, 0, 2).reshape(3, -1) for a in (poses.at, poses.paths)],
                            axis=1)  # fmt: skip
     low, high = every.min(axis=1), every.max(axis=1)
@@ -105,7 +105,7 @@ def look(sketch: Sketch, poses: Poses) -> View:
 
 
 def _normal(sketch: Sketch, poses: Poses) -> Array | None:
-    """The normal of the plane in which all moves, towards the eye; None if there is none.
+    """Return the normal of the plane in which all moves, towards the eye; None if there is none.
 
     What moves along a line, or not at all, is seen along its hinges; without hinges, in the plane
     that holds all its places, or from aside where these lie on a line, too.
@@ -132,7 +132,9 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
 
 
 def _aside(line: Array) -> Array:
-    """The direction from which a line is seen best: across it and level; y for one along x or z."""
+    """Return the direction from which a line is seen best: across it and level; y for one along
+    x or z.
+    """
     level = np.array([0.0, -1.0, 0.0]) if abs(line[1]) < UPRIGHT else np.array([1.0, 0.0, 0.0])
     across = level - (level @ line) * line
     return np.asarray(across / np.linalg.norm(across))
@@ -211,14 +213,14 @@ EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(CORNERS[i] - CORNE
 
 
 def _block(axes: Array, at: Array, size: float) -> Array:
-    """The edges of a cube."""
+    """Return the edges of a cube."""
     corners = at + size * np.einsum("ca,aik->cik", CORNERS, axes)
     gap = np.full_like(at, np.nan)
     return np.stack([point for i, j in EDGES for point in (corners[i], corners[j], gap)])
 
 
 def _zigzag(a: Array, b: Array, view: View) -> Array:
-    """A spring of 8 coils between two points, turned towards the eye."""
+    """Return a spring of 8 coils between two points, turned towards the eye."""
     d = b - a
     side = np.cross(d.T, view.eye)
     length = np.linalg.norm(side, axis=1, keepdims=True)

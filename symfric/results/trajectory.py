@@ -1,4 +1,4 @@
-"""The result of a simulation: named signals over time that plot, balance and save themselves."""
+"""Result of a simulation: named signals over time that plot, balance and save themselves."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -67,7 +67,7 @@ class EnergyBalance(Showing):
 
     @property
     def relative(self) -> float:
-        """The largest defect over `scale`; 0 where nothing moved but rounding."""
+        """Largest defect over `scale`; 0 where nothing moved but rounding."""
         largest = float(np.abs(self.defect).max(initial=0.0))
         moved = self.scale > 1e-16 * float(np.abs(self.energy).max(initial=0.0))
         return largest / self.scale if moved else 0.0
@@ -84,7 +84,7 @@ class EnergyBalance(Showing):
 
 
 def energy_balance(trajectory: Signals) -> EnergyBalance:
-    """The balance of a model that has the detail "conserved" and powers of the kind `WORK`.
+    """Return the balance of a model that has the detail "conserved" and powers of the kind `WORK`.
 
     Raises:
         ValueError: the model has no such details.
@@ -122,10 +122,10 @@ CHEAP = 200_000
 
 
 class Kept(Protocol):
-    """A run as data, see `symfric.integrator.stored`."""
+    """Run as data, see `symfric.integrator.stored`."""
 
     def unpacked(self) -> "Trajectory":
-        """The run again."""
+        """Return the run again."""
         ...
 
     def save(self, path: str | Path) -> None:
@@ -166,7 +166,7 @@ class Trajectory(Signals):
     keep: "Callable[[Trajectory], Kept] | None" = None
 
     def shown(self) -> Shown:
-        """The end of the run, and every signal with its extremes."""
+        """Return the end of the run, and every signal with its extremes."""
         return _shown(self)
 
     def thumbnail(self) -> "Figure":
@@ -176,7 +176,7 @@ class Trajectory(Signals):
         return thumbnail(self)
 
     def energy_balance(self) -> EnergyBalance:
-        """The balance of a mechanism's energy: work by cause, and the unexplained rest.
+        """Return the balance of a mechanism's energy: work by cause, and the unexplained rest.
 
         Raises:
             ValueError: a model that does not keep books of its energy.
@@ -249,7 +249,7 @@ class Trajectory(Signals):
         self.packed_as().save(path)
 
     def packed_as(self) -> "Kept":
-        """The run as data."""
+        """Return the run as data."""
         if self.keep is None:
             raise ValueError(f"trajectory of '{self.scene}': expected one of simulate, got another")
         return self.keep(self)
@@ -259,7 +259,7 @@ class Trajectory(Signals):
         return packed.shallow(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what a file does."""
+        """Return a pickle holds what a file does."""
         return packed.loads, (packed.dumps(self),)
 
     def to_csv(self, path: str | Path, *names: str) -> None:
@@ -289,7 +289,7 @@ class Trajectory(Signals):
         return frame
 
     def to_xarray(self, *names: str) -> Any:
-        """The same as an xarray data set, with units as attributes.
+        """Return the same as an xarray data set, with units as attributes.
 
         Raises:
             ImportError: no xarray.
@@ -358,7 +358,7 @@ def _shown(run: Signals) -> Shown:
 
 
 def _measured(run: Signals) -> list[str]:
-    """The measured errors in words."""
+    """Return the measured errors in words."""
     counts = run.statistics
     if not isfinite(counts.error):
         return []

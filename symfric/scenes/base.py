@@ -1,4 +1,4 @@
-"""A scene: a parametric machine that takes a friction law and gives a `Model`."""
+"""Scene: a parametric machine that takes a friction law and gives a `Model`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -38,7 +38,7 @@ LINES = {line: Symbol(line=line, anchored=True) for line in ("spring", "damper")
 @final
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A body on a rail.
+    """Body on a rail.
 
     Attributes:
         x, z: where it is [m], expressions of the model.
@@ -62,7 +62,7 @@ def drawn(
     ticks: Sequence[tuple[Scalar, Scalar]] = (),
     hub: Block | None = None,
 ) -> Sketch:
-    """A machine that is drawn without being a mechanism.
+    """Return a machine that is drawn without being a mechanism.
 
     Args:
         blocks: name -> body.
@@ -103,13 +103,15 @@ def drawn(
 
 
 def around(way: Scalar, low: Scalar, high: Scalar) -> ca.SX:
-    """`way` [m] brought between `low` and `high` by whole turns, as a mark on a belt."""
+    """Return `way` [m] brought between `low` and `high` by whole turns, as a mark on a belt."""
     length = high - low
     return ca.SX(way - length * ca.floor((way - low) / length))
 
 
 def _slips(block: Block) -> tuple[tuple[str, float], ...]:
-    """The sliding velocity of a block and what counts as rest; nothing for a law without scale."""
+    """Return the sliding velocity of a block and what counts as rest; nothing for a law without
+    scale.
+    """
     if not block.slip or block.law is None:
         return ()
     try:
@@ -130,7 +132,7 @@ class GivenInput:
 
 @dataclass(frozen=True, eq=False)
 class Scene(Parametric, ABC):
-    """A machine with one friction law; `model()` writes its equations.
+    """Machine with one friction law; `model()` writes its equations.
 
     Raises:
         ValueError: a parameter of scene or law that is an array or an MX symbol; one machine has
@@ -163,7 +165,8 @@ class Scene(Parametric, ABC):
 
     @classmethod
     def preset(cls, name: str, law: Law, **others: Any) -> Self:
-        """The scene with the numbers of a paper, and `law` with those that the paper gives it.
+        """Return the scene with the numbers of a paper, and `law` with those that the paper gives
+        it.
 
         Args:
             name: one of `presets`.
@@ -189,7 +192,7 @@ class Scene(Parametric, ABC):
         return cls(**arguments)
 
     def law_of(self, place: str) -> Law:
-        """The law of one of `places`; `law` where that has none of its own."""
+        """Return the law of one of `places`; `law` where that has none of its own."""
         own = getattr(self, place)
         return self.law if own is None else own
 
@@ -198,7 +201,7 @@ class Scene(Parametric, ABC):
         cls.__repr__ = Scene.__repr__  # or each dataclass would write one of a single line
 
     def __repr__(self) -> str:
-        """The call that makes it, in lines of a screen."""
+        """Return the call that makes it, in lines of a screen."""
         values = ", ".join(f"{item.name}={getattr(self, item.name)!r}" for item in fields(self))
         text = f"{type(self).__name__}({values})"
         return fill(text, WIDTH, subsequent_indent="    ", break_long_words=False)
@@ -222,10 +225,10 @@ class Scene(Parametric, ABC):
 
     @abstractmethod
     def equations(self, p: Variables) -> Model:
-        """The model of this machine as it stands, with `p` as its parameters."""
+        """Return the model of this machine as it stands, with `p` as its parameters."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
-        """The model, with the parameters named in `free` as symbols in `Model.p`.
+        """Return the model, with the parameters named in `free` as symbols in `Model.p`.
 
         All others are constants of the equations, so terms they switch off vanish.
         """
@@ -275,7 +278,8 @@ def contact(
     *, least: Scalar | None = None, bare: bool | None = None, turning: bool = False,
     **inputs: Scalar,
 ) -> Contact:  # fmt: skip
-    """`law` between bodies that slide at `v` under `N`: puts any law into equations of your own.
+    """Return `law` between bodies that slide at `v` under `N`: puts any law into equations of your
+    own.
 
     Write them with `force` of the contact and give it to the `Model`, which then has the states of
     the law behind its own, its changes of mode as events, and error control that sees the slip:
@@ -350,7 +354,7 @@ def divides_by_load(law: Law) -> bool:
 
 
 def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
-    """The internal states of `law` as model variables, starting in steady sliding at `v`."""
+    """Return the internal states of `law` as model variables, starting in steady sliding at `v`."""
     start = ca.SX(law.steady_state(ca.SX(v), N))
     variables = tuple(
         Variable(
@@ -366,7 +370,7 @@ def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
 
 
 def in_turning(model: Model) -> Model:
-    """The same equations with the units of a machine that turns."""
+    """Return the same equations with the units of a machine that turns."""
     changed: dict[str, Any] = {
         letter: tuple(replace(v, unit=turned(v.unit)) for v in getattr(model, letter))
         for letter in "xzup"

@@ -37,7 +37,7 @@ def sine(t: ca.SX) -> ca.SX:
 @final
 @dataclass(frozen=True, eq=False)
 class Drive(Scene):
-    """A mass driven by a force, with friction and a constant offset force.
+    """Mass driven by a force, with friction and a constant offset force.
 
         x' = v,   m v' = force - F(v, N) - offset
 
@@ -83,7 +83,7 @@ class Drive(Scene):
         return in_turning(model) if self.turning else model
 
     def _sketch(self, x: ca.SX) -> Sketch:
-        """The mass on its guide, or a hand that turns."""
+        """Return the mass on its guide, or a hand that turns."""
         if self.turning:
             return drawn({}, hands={"axis": (x, 1.0)})
         return drawn({"mass": Block(x, 0.0, "x", "v", self.law)})
@@ -172,7 +172,7 @@ class Rabinowicz(Scene):
         )
 
     def _sketch(self, x: ca.SX, t: ca.SX) -> Sketch:
-        """The block on the belt, whose marks move with it, and its spring."""
+        """Return the block on the belt, whose marks move with it, and its spring."""
         way = 0.15 * self.m * self.g / self.k if not equals(self.k, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 2 * way), 0.0) for i in range(9)]
         return drawn(
@@ -285,7 +285,9 @@ class CoupledBlocks(Scene):
         )
 
     def _sketch(self, x_1: ca.SX, x_2: ca.SX, t: ca.SX) -> Sketch:
-        """The blocks on the belt, whose marks move with it; each hangs on a spring of its own."""
+        """Return the blocks on the belt, whose marks move with it; each hangs on a spring of
+        its own.
+        """
         stiff = smallest(self.k_1, self.k_2)
         way = 0.15 * self.m_1 * self.g / stiff if not equals(stiff, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]

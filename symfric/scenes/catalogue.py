@@ -1,4 +1,4 @@
-"""The ready machines by name."""
+"""Ready machines by name."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module

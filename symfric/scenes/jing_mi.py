@@ -1,4 +1,4 @@
-"""The laws' numbers in Jing and Mi, Selection Mechanism of Friction Models, tables 3 and 7."""
+"""Laws' numbers in Jing and Mi, Selection Mechanism of Friction Models, tables 3 and 7."""
 
 from symfric.laws.dynamic.dahl import Dahl
 from symfric.laws.dynamic.dwell import Gonthier

@@ -25,19 +25,20 @@ from symfric.scenes.presets import Numbers, Preset
 
 @dataclass(frozen=True, eq=False)
 class MechanismScene(Scene):
-    """A machine described by a `Mechanism`; `mechanism()` may be changed before it is built."""
+    """Machine described by a `Mechanism`; `mechanism()` may be changed before it is built."""
 
     @abstractmethod
     def mechanism(self) -> Mechanism:
         """Bodies, joints and forces."""
 
     def equations(self, p: Variables) -> Model:
-        """The model in joint coordinates."""
+        """Return the model in joint coordinates."""
         return self.mechanism().build(p)
 
 
 def reach(scene: str, square: Scalar, expected: str) -> Scalar:
-    """The root of `square` > 0, a distance that links of these lengths must bridge at the start.
+    """Return the root of `square` > 0, a distance that links of these lengths must bridge at the
+    start.
 
     Raises:
         ValueError: they do not, or lie in line, where rates of the loop are not determined.
@@ -54,7 +55,7 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 @final
 @dataclass(frozen=True, eq=False)
 class SliderCrank(MechanismScene):
-    """A crank, a slider and a massless rod between them; one degree of freedom.
+    """Crank, a slider and a massless rod between them; one degree of freedom.
 
     The crank turns about x through (0, b, c); its pin stands at r, above at the start. The rod of
     length l ends at the height e on the slider:
@@ -133,7 +134,7 @@ HINGE = (0.0, -1.0, 0.0)
 @final
 @dataclass(frozen=True, eq=False)
 class Pendulum(MechanismScene):
-    """A rod on a hinge with friction.
+    """Rod on a hinge with friction.
 
         (J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N)
 
@@ -198,7 +199,7 @@ class DoublePendulum(MechanismScene):
 @final
 @dataclass(frozen=True, eq=False)
 class PendulumBox(MechanismScene):
-    """A box on rough ground and a pendulum on it, friction under the box and in the hinge.
+    """Box on rough ground and a pendulum on it, friction under the box and in the hinge.
 
     x is the position of the box, phi the angle of the pendulum from hanging; the normal force
     under the box is the whole vertical reaction, that of the hinge the size of its reaction.

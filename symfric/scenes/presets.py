@@ -27,7 +27,8 @@ class Numbers:
     )
 
     def given(self, law: L) -> L:
-        """`law` with these numbers, also inside a sum or a wrapper; its other ones and forms stay.
+        """Return `law` with these numbers, also inside a sum or a wrapper; its other ones and forms
+        stay.
 
         A law that the source does not use gets the common ones that it has. Elements that a law
         comes with and that carry a level together (mu_1, mu_2, ...) carry the new one in the shares
@@ -63,7 +64,7 @@ class Numbers:
 @final
 @dataclass(frozen=True, eq=False)
 class Preset:
-    """The numbers of a source for a scene.
+    """Numbers of a source for a scene.
 
     Attributes:
         doc: what it is, and what the source leaves open.

@@ -50,7 +50,7 @@ def _sled(
 @final
 @dataclass(frozen=True, eq=False)
 class Prescribed(Scene):
-    """A law under measured or imagined motion: velocity in, friction out.
+    """Law under measured or imagined motion: velocity in, friction out.
 
         x' = v,   z' = rate(v, N, z),   friction = F(v, N, z)
 
@@ -142,7 +142,7 @@ LINKAGE = ("k_s", "b_d", "theta", "L_d")
 
 
 def _road(millimetres: int) -> Preset:
-    """The rig of section 3 on the road with this amplitude."""
+    """Return the rig of section 3 on the road with this amplitude."""
     return Preset(
         f"rig of section 3, road of {millimetres} mm, whose first ramp begins at 0.3 s and makes "
         "X_w - X_b = 6.9 mm at 0.5 s, as the text says; the other times, C_e, e_1, mu, sigma_v and "
@@ -158,7 +158,7 @@ def _road(millimetres: int) -> Preset:
 @final
 @dataclass(frozen=True, eq=False)
 class QuarterCar(Scene):
-    """A quarter car over a road that rises to its middle, then by an amplitude, and falls by two.
+    """Quarter car over a road that rises to its middle, then by an amplitude, and falls by two.
 
         M_b X_b'' = f_sd - F(X_b', N),   f_sd = k_s (X_w - X_b) + b_d (X_w' - X_b')
         M_w X_w'' = -f_sd + k_t (X_r - X_w) + b_t (X_r' - X_w')

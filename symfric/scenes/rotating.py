@@ -113,7 +113,7 @@ FALL = {"v_s": 0.155575 / 0.9}
 @final
 @dataclass(frozen=True, eq=False)
 class DrillString(Scene):
-    """A string of inertias under a top drive whose speed is given, friction at the bit.
+    """String of inertias under a top drive whose speed is given, friction at the bit.
 
         twist_i' = w_(i-1) - w_i,   w_0 = w_top
         t_i = n k twist_i + n c (w_(i-1) - w_i)
@@ -220,7 +220,7 @@ class DrillString(Scene):
 
 
 def machine_start(t: ca.SX) -> ca.SX:
-    """The line accelerates to 0.5 m/s within 4 s."""
+    """Return the line accelerates to 0.5 m/s within 4 s."""
     return 0.5 * smooth.clip(t / 4, 0.0, 1.0)
 
 

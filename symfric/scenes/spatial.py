@@ -144,7 +144,7 @@ class FourMass(MechanismScene):
 @final
 @dataclass(frozen=True, eq=False)
 class Robot(MechanismScene):
-    """The robot of a URDF file, with the law at the friction level of every joint.
+    """Robot of a URDF file, with the law at the friction level of every joint.
 
     `source` is the path of the file or its text. The normal force of the law is the joint's
     `<dynamics friction>`, or `level` where it has none; the law `relative(LuGre())` breaks away

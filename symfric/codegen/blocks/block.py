@@ -1,4 +1,4 @@
-"""A discrete-time block: what becomes C functions on structs."""
+"""Discrete-time block, the source of C functions on structs."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -30,24 +30,24 @@ KEYWORDS = frozenset(
     volatile wchar_t while xor xor_eq
     """.split()  # noqa: SIM905
 )
-"""Of C99 and C++."""
+"""Keywords of C99 and C++."""
 
 RESERVED = frozenset(
     {*KEYWORDS, *GROUPS, "status", *FUNCTIONS.values(), *(f"{f}f" for f in FUNCTIONS.values())}
 )
-"""What no variable may be called."""
+"""Names that variables must not have."""
 
 
 @final
 @dataclass(frozen=True)
 class Elements:
-    """Neighbouring variables of a group that C holds in one array, one of each alike element.
+    """Neighbouring variables of a group that C holds in one array, one per identical element.
 
     Attributes:
         group: one of `GROUPS`.
         name: C identifier of the array.
         first: row of the first variable in its group.
-        size: how many they are.
+        size: number of variables.
     """
 
     group: str
@@ -59,31 +59,31 @@ class Elements:
 @final
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A discrete-time block, all of whose groups may be empty.
+    """Discrete-time block, all of whose groups may be empty.
 
         x+ = next(x, u, p),   y = outputs(x, u, p)
 
     Attributes:
-        name: C identifier that the names of its types and functions begin with.
-        doc: what it is, one line or a few.
+        name: C identifier, prefix of its types and functions.
+        doc: description, one line or a few.
         states, inputs, parameters: named variables; `start` is the value after initialisation and
             the default of a parameter.
         next: SX (n, 1), the states after the step.
         outputs: named results.
         resets: further initialisations by name: the states, SX (n, 1), as functions of inputs and
-            parameters, and what they are for.
+            parameters, and their purpose.
         constants: numbers folded into the expressions, by name, for the header.
-        about: what constants are, with their units, by name.
+        about: meaning of constants, with their units, by name.
         equations: formulas that the block solves, line by line, as in a paper.
-        discretisation: how a step solves them, in words and formulas, line by line.
-        use: what to feed in and what each result is good for, a sentence each.
-        limits: what is not valid, a sentence each.
+        discretisation: method of a step, in words and formulas, line by line.
+        use: advice on inputs and results, a sentence each.
+        limits: restrictions, a sentence each.
         sources: of the formulas, one each.
         arrays: variables that are arrays in C, see `symfric.codegen.blocks.variables`.
 
     Raises:
-        ValueError: all problems at once: names that are repeated or no C identifiers, start values
-            that are no numbers, row counts, undeclared symbols.
+        ValueError: all problems at once: names that are repeated or invalid, start values that are
+            not numbers, row counts, undeclared symbols.
     """
 
     name: str
@@ -157,13 +157,13 @@ class Block:
 
     @property
     def sample_time(self) -> float | None:
-        """The step size h [s], a constant or the default of a parameter; None if it has none."""
+        """Step size h [s], a constant or the default of a parameter; None if it has none."""
         starts = {v.name: float(v.start) for v in self.parameters}
         return starts.get("h", self.constants.get("h"))
 
     @property
     def is_function(self) -> bool:
-        """Return True if it is one C function of scalars: no states and a single output."""
+        """True if it is one C function of scalars: no states and a single output."""
         return not self.states and len(self.outputs) == 1
 
     @cached_property
@@ -183,7 +183,9 @@ class Block:
         return sha256(repr(content).encode()).hexdigest()[:16]
 
     def reset(self, name: str) -> ca.Function:
-        """(state, param, in) -> (state_next), the initialisation `name`; the state is not used."""
+        """Return (state, param, in) -> (state_next), the initialisation `name`; the state is
+        not used.
+        """
         return self._function(name, {"state_next": self.resets[name][0]})
 
     def _function(self, name: str, results: Mapping[str, ca.SX]) -> ca.Function:

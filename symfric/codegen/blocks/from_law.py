@@ -1,6 +1,6 @@
-"""A friction law as a block: a function, or a step of its states for held inputs.
+"""Friction law as a block: a function, or a step of its states for held inputs.
 
-A population is one contact as a block, called in a loop over an array of states.
+A population becomes one contact as a block, called in a loop over an array of states.
 """
 
 from collections.abc import Iterable, Sequence
@@ -39,16 +39,16 @@ SIGN = (
     "v is the velocity of the moving side relative to the base side."
 )
 MEAN_VELOCITY = (
-    "v is the mean velocity over the step: the increment of an encoder over h, or what is planned "
-    "for it. With the velocity at one instant the error is of first order in h."
+    "v is the mean velocity over the step: the increment of an encoder over h, or the planned "
+    "one. With the velocity at one instant the error is of first order in h."
 )
 WHICH_FORCE = (
-    "F is the mean over the step: F h is its impulse. A force that is held over the step wants it: "
-    "feed-forward from the velocity that is planned for the step to come. F_end is the force at "
-    "the end of the step, to be compared with a measured one, and half a step newer: feed-forward "
-    "from the increment of the step that is over wants it."
+    "F is the mean over the step: F h is its impulse. Use it for a force that is held over the "
+    "step, such as feed-forward from the velocity planned for the next step. F_end is the force at "
+    "the end of the step, half a step newer: compare it with a measured force, or use it "
+    "for feed-forward from the encoder increment of the last step."
 )
-SLIDING = "Initial state of long sliding at the given inputs, to start while the machine moves."
+SLIDING = "Initial state of long sliding at the given inputs, for a start while the machine moves."
 
 
 def law_block(
@@ -60,12 +60,12 @@ def law_block(
     fold: Fold = None,
     turning: bool = False,
 ) -> Block:
-    """The discrete-time block of `law` with inputs v, N, those of the law, and output F.
+    """Return the discrete-time block of `law` with inputs v, N, those of the law, and output F.
 
-    A law without states becomes F(v, N). A law with states makes a step with v and N held, however
-    large its rates times h are (for LuGre sigma_0 |v| h / g is often far above 2, where explicit
-    Euler diverges). Where the rates are affine in the states, each by itself,
-    dz/dt = a(v, N) - lambda(v, N) z, the step is exact:
+    A law without states becomes F(v, N). A law with states makes a step with v and N held, stable
+    for any product of rate and h (for LuGre sigma_0 |v| h / g is often far above 2, where explicit
+    Euler diverges). If the rates are affine in the states, each by itself, dz/dt = a(v, N) -
+    lambda(v, N) z, the step is exact:
 
         phi1(x) = (exp(x) - 1) / x,   phi2(x) = (phi1(x) - 1) / x,   x = -lambda h
         r  = phi1(x) (a - lambda z)          mean rate over the step
@@ -74,23 +74,23 @@ def law_block(
         F  = force(v, N, zm)                 mean force over the step, with r for the rate in it
 
     Otherwise (elasto-plastic, Bouc-Wen, Maxwell-slip, Dahl's law with n != 1 and others) lambda is
-    the derivative at z and the step ends at the place of rest, if it gets there: of second order,
-    and bounded for every h. So is the force where it is not affine in the states. The event forms
-    of Maxwell-slip, reset integrator and GMS know their steps exactly.
+    the derivative at z and the step ends at the equilibrium, if it reaches it: of second order, and
+    bounded for every h. The same holds for a force that is not affine in the states. The event
+    forms of Maxwell-slip, reset integrator and GMS have exact steps.
 
     F h is the impulse and F v h the work of the step. F_end, the force at the end of the step, is
-    force(v, N, z+) with the rate exp(x) dz/dt in it; laws without states have none, as it is F. For
-    the step to come F is what a controller holds, if v is planned for it; from the increment of the
-    step that is over F_end is the better guess: LuGre at 1 kHz, 2 mm/s at 1 Hz under 10 N errs by
+    force(v, N, z+) with the rate exp(x) dz/dt in it; laws without states have none, since it equals
+    F. For the next step a controller holds F, if v is planned for it; from the encoder increment of
+    the last step F_end is the better estimate: LuGre at 1 kHz, 2 mm/s at 1 Hz under 10 N errs by
     0.026 N with it and by 0.050 N with F. At 0.3 m/s both follow the true mean and end to 1e-4 N,
-    but for the step of a reversal, in which the whole bristle turns: there F errs by 0.022 N
-    and F_end by 0.36 N, since the mean velocity does not tell that at the end, to which the
-    damping goes; the bristle's own force errs by 0.0095 N.
+    except in the step of a reversal, in which the whole bristle turns: there F errs by 0.022 N and
+    F_end by 0.36 N, because the mean velocity does not determine the velocity at the end, on which
+    the damping depends; the bristle's own force errs by 0.0095 N.
 
-    In F the bristle damping sees r = (z+ - z) / h, which is bounded by the bristle's travel, and
-    not the rate at one instant, which after a jump is as large as v. Feed the mean velocity of the
-    step, such as the encoder increment over h; with the velocity at its beginning the error is of
-    first order in h.
+    In F the bristle damping uses r = (z+ - z) / h, which is bounded by the bristle's travel, and
+    not the rate at one instant, which after a jump is as large as v. Use the mean velocity of the
+    step, such as the encoder increment over h; with the velocity at its start the error is of first
+    order in h.
 
     Initial states: zero (a machine at rest, bristles relaxed), or by the reset `init_sliding` those
     of long sliding at v, N (a controller that starts while the machine moves).
@@ -101,18 +101,18 @@ def law_block(
         h: step size [s] as a constant; without it h is a parameter, by default 1 ms. A law without
             states has no step size.
         free: parameters that stay variable at run time, all others become constants.
-        fold: True makes all parameters constants (not h), names these. Those whose value selects a
-            cheaper form are constants in any case, see `runtime_parameters`. Parameters without
-            effect never appear.
-        turning: the contact turns: the same C, with units rad/s and N m in its texts.
+        fold: True makes all parameters constants (not h); or names of those. Parameters whose value
+            selects a cheaper form are constants in any case, see `runtime_parameters`. Parameters
+            without effect never appear.
+        turning: True for a contact that turns: the same C, with units rad/s and N m in its texts.
 
     Raises:
         ValueError: symbols in the law; names in `free` or `fold` that are unknown, repeated or, in
-            `free`, without effect; both of them; a step size of a law without states; states that
-            act on each other in a circle (Leuven, smooth GMS), or are not affine and depend on
-            others in a law that does not say where they rest then; modes that follow zero crossings
-            of v within the step (exact Coulomb, Karnopp and Leine by events); a force that is not
-            finite at rest (a smoothing width of 0 left variable).
+            `free`, without effect; both of them; a step size of a law without states; states with
+            circular dependencies (Leuven, smooth GMS), or states that are not affine, depend on
+            others and have no known equilibrium; modes that follow zero crossings of v within the
+            step (exact Coulomb, Karnopp and Leine by events); a force that is not finite at rest (a
+            smoothing width of 0 left variable).
     """
     check_law("codegen", law)
     where = f"codegen '{law_name(law)}'"
@@ -150,7 +150,7 @@ def law_block(
 
 
 def in_turning(block: Block) -> Block:
-    """The block with the units of a contact that turns."""
+    """Return the block with the units of a contact that turns."""
     groups: dict[str, Any] = {
         group: tuple(replace(v, unit=turned(v.unit)) for v in getattr(block, group))
         for group in ("states", "inputs", "parameters")
@@ -161,7 +161,7 @@ def in_turning(block: Block) -> Block:
 
 
 def step_variable(where: str, h: float | None) -> Variable:
-    """The parameter h [s], which starts at the step size given, by default 1 ms."""
+    """Return the parameter h [s], which starts at the step size given, by default 1 ms."""
     start = STEP_SIZE if h is None else checks.number(f"{where}: h", h, unit="s", above=0.0)
     return Variable("h", "s", start=start, lower=0.0, doc="step size")
 
@@ -175,7 +175,7 @@ def _inputs(law: Law) -> Variables:
 
 
 def _given(inputs: Variables) -> dict[str, ca.SX]:
-    """Symbols of what stands behind v and N."""
+    """Return the symbols after v and N."""
     return {variable.name: variable.symbol for variable in inputs[2:]}
 
 
@@ -227,7 +227,9 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
 def _of_numbers(
     following: ca.SX, forces: dict[str, ca.SX], inputs: Variables, z: ca.SX, own: Variables
 ) -> ca.Function:
-    """(v, N, z, further inputs) -> states, forces with the start values of the parameters `own`."""
+    """Return (v, N, z, further inputs) -> states, forces with the start values of the
+    parameters `own`.
+    """
     v, N, *others = (i.symbol for i in inputs)
     given = ca.vertcat(ca.SX(0, 1), *(p.symbol for p in own))
     numbers = ca.vertcat(ca.SX(0, 1), *(ca.SX(float(p.start)) for p in own))
@@ -247,10 +249,10 @@ def _at_rest(block: Block, zero: str = "") -> bool:
 
 
 def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
-    """Texts of the data sheet from the docstrings of the law and of those that it holds.
+    """Return the texts of the data sheet from the docstrings of the law and its parts.
 
-    Of parameters without effect, `idle`, nothing is said, nor of N = 0, where the block, other than
-    the law, is right.
+    Parameters without effect, `idle`, are omitted, and so is N = 0, where the block, unlike the
+    law, is valid.
     """
     found = texts(law)
     limits = dict.fromkeys(limit for text in found for limit in text.limits)
@@ -271,10 +273,10 @@ STEP = "Keep |v| h below {step:g} m, over which a contact changes."
 
 
 def contact_block(law: Population, *, name: str | None = None, h: float | None = None) -> Block:
-    """The discrete-time block of one contact of `law` with inputs v, N, r and its force F.
+    """Return the discrete-time block of one contact of `law` with inputs v, N, r and its force F.
 
-    The step is that of `Population.advance`, so that a loop in C over what `Population.begin`
-    returns follows NumPy to rounding. Keep |v| h below `Population.step`.
+    The step is that of `Population.advance`, so that a loop in C over the contacts of
+    `Population.begin` equals NumPy to rounding. Keep |v| h below `Population.step`.
 
     Args:
         law: a population; its numbers are constants of the block.

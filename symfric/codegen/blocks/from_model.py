@@ -1,4 +1,4 @@
-"""A model as a block: a plant that advances by fixed steps."""
+"""Model as a block: a plant that advances by fixed steps."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -24,10 +24,10 @@ from symfric.model import Model, Output, Variables, check_model
 
 
 class Machine(Protocol):
-    """A scene: it writes a model with parameters of its own as symbols."""
+    """Scene: an object whose `model` accepts free parameters."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
-        """The model with those in `free` as symbols."""
+        """Return the model with the parameters in `free` as symbols."""
         ...
 
 
@@ -40,14 +40,14 @@ def plant_block(
     free: Sequence[str] | None = None,
     fold: Fold = None,
 ) -> Block:
-    """The discrete-time block of a model or a scene: states, inputs and outputs by their names.
+    """Return the discrete-time block of a model or a scene; names of the model are kept.
 
     A step integrates over h with the inputs held; the outputs are those at its end. Algebraic
-    variables, and time where the equations depend on it, are states of the block, too. Initial
-    states are the model's start values, the algebraic ones consistent with the start values of the
-    inputs; they do not follow parameters that are changed at run time.
+    variables, and time if the equations depend on it, are also states of the block. Initial states
+    are the model's start values, the algebraic ones consistent with the start values of the inputs;
+    they do not follow parameters that are changed at run time.
 
-    Fixed steps have no error control and do not see friction that jams. Rabinowicz's stick-slip
+    Fixed steps have no error control and do not detect friction that jams. Rabinowicz's stick-slip
     over 20 s, largest error relative to the largest position, at a step of 1 ms and 0.1 ms, and
     operations of a step:
 
@@ -58,17 +58,17 @@ def plant_block(
         "backward_euler"  1       1e-2   1e-3   176   1e-2   1e-3    273
         "exponential"     1       8e-3   8e-4    68   1e-2   1e-3    105
 
-    In double the C is CasADi's to the bit. In float one step of this scene differs by up to 3e-5 of
-    a signal's peak (2e-4 by Rodas5P), more than `verify` allows: the sliding velocity is a
-    difference of larger ones. Use double where a contact must break away in time.
+    In double the C is CasADi's bit for bit. In float one step of this scene differs by up to 3e-5
+    of a signal's peak (2e-4 by Rodas5P), more than `verify` allows: the sliding velocity is a
+    difference of larger ones. Use double if the time of break-away matters.
 
-    Where h does not resolve the transition (10 ms here, or 1 ms with v_t = 1e-5 m/s) none of them
-    is accurate; backward Euler stays bounded, the others may grow without bound. Light links with
-    friction rarely let h resolve it: a six-joint arm that falls runs away at 1 ms by all others,
-    which is why mechanisms with friction use it unless told otherwise. Compare with `simulate`.
-    The exponential method is explicit in what couples the equations, and for ODEs only.
+    If h does not resolve the transition (10 ms here, or 1 ms with v_t = 1e-5 m/s) none of them is
+    accurate; backward Euler stays bounded, the others may diverge. With friction on light links h
+    rarely resolves it: a six-joint arm that falls diverges at 1 ms with all others, so backward
+    Euler is the default for mechanisms with friction. Compare with `simulate`. The exponential
+    method is explicit in the coupling of the equations, and for ODEs only.
 
-    All parameters of a scene and of its law can be changed at run time, but for those whose value
+    All parameters of a scene and of its law can be changed at run time, except those whose value
     selects a cheaper form of the law (`runtime_parameters`). Operations of a step with all of them
     constants, by default, and with every one variable (instructions on a Cortex-M4F in float, by
     `symfric.embedded.measure`, for the first two):
@@ -90,7 +90,7 @@ def plant_block(
 
     Raises:
         ValueError: unknown method, or one for ODEs only with a DAE; events; a step size <= 0; start
-            values without consistent algebraic ones; outputs that depend on time where the
+            values without consistent algebraic ones; outputs that depend on time although the
             equations do not.
     """
     folded: dict[str, Parameter] = {}
@@ -112,7 +112,7 @@ def plant_block(
     if model.events:
         raise ValueError(
             f"{where}: expected a model without events, got {len(model.events)}; "
-            "leave out events of your own, and use a smooth or bristle law"
+            "remove your own events, and use a smooth or bristle law"
         )
     size = step_variable(where, h)
     whole = suited_to_start(_held(model), METHODS[method], model)
@@ -120,7 +120,7 @@ def plant_block(
     following = build_fixed(whole, METHODS[method])(whole.y, duration, whole.d)
     block = Block(
         name or model.name,
-        doc=f"Plant '{model.name}': the machine with its friction, to simulate it in real time.",
+        doc=f"Plant '{model.name}': the machine with its friction, for simulation in real time.",
         states=_states(model, whole, where),
         inputs=model.u,
         parameters=model.p + ((size,) if h is None else ()),
@@ -145,20 +145,20 @@ USE = (
     "Inputs are held over the step: they are the mean over it. Outputs and states are those at the "
     "end of the step.",
     "Friction forces oppose the motion of the moving side relative to the base side.",
-    "Start values are consistent with the default parameters and inputs: they do not follow what "
-    "is changed at run time. Give others to the initialisation.",
+    "Start values are consistent with the default parameters and inputs: they do not follow later "
+    "changes. Pass other values to the initialisation.",
 )
 LIMITS = (
-    "Fixed steps have no error control: where h does not resolve the transition of friction "
-    "between rest and sliding no method is accurate, and explicit ones may grow without bound.",
-    "Friction that jams (self-locking) is not seen.",
+    "Fixed steps have no error control: if h does not resolve the transition of friction "
+    "between stick and slip, no method is accurate, and explicit ones may diverge.",
+    "Friction that jams (self-locking) is not detected.",
 )
 
 
 def _opened(
     machine: Machine, free: Sequence[str] | None, fold: Fold
 ) -> tuple[Model, dict[str, Parameter]]:
-    """The model of a scene with its variable parameters, and those that are constants."""
+    """Return the model of a scene with its variable parameters, and the constant ones."""
     if not (isinstance(machine, Parametric) and hasattr(machine, "model")):
         raise checks.refused("codegen", "a model, or a scene such as Rabinowicz(LuGre())", machine)
     names, problems = variable(machine, free, fold)
@@ -169,13 +169,13 @@ def _opened(
 
 
 def _held(model: Model) -> System:
-    """The equations with the inputs as run data."""
+    """Return the equations with the inputs as run data."""
     u = model.vector("u")
     return system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",)))
 
 
 def _states(model: Model, whole: System, where: str) -> Variables:
-    """All unknowns with consistent start values."""
+    """Return all unknowns with consistent start values."""
     known = {v.name: v for v in (*model.x, *model.z)}
     rates = {f"{v.name}_dot": Variable(f"{v.name}_dot", f"({v.unit})/s") for v in model.x}
     time = {"t": Variable("t", "s", doc="time")}
@@ -192,11 +192,11 @@ def _states(model: Model, whole: System, where: str) -> Variables:
 
 
 def _outputs(model: Model, whole: System, following: ca.SX, where: str) -> dict[str, Output]:
-    """The outputs at the end of the step."""
+    """Return the outputs at the end of the step."""
     late = [n for n, o in model.outputs.items() if ca.depends_on(ca.SX(o.expression), model.t)]
     if late and not whole.timed:
         raise ValueError(
-            f"{where}: expected outputs without time where the equations do not depend on it, got "
+            f"{where}: expected outputs without time, since the equations do not depend on it, got "
             f"{', '.join(late)}; make time a state with rate 1"
         )
 

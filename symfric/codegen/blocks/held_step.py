@@ -1,4 +1,4 @@
-"""The step of the states of a law with velocity and load held, and its form without load."""
+"""Step of the states of a law with velocity and load held, and its form without load."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,11 +16,12 @@ from symfric.laws import Law, Sum
 from symfric.laws.base.law import chosen
 
 EXACT, EVENT, SECOND = "exact", "event", "second order"
-"""How a step is made: the exponential of an affine rate, corners solved for, linearised rates."""
+"""Types of a step: exponential of an affine rate, exact with corners, linearised rates."""
 
 FASTEST = 1.0
-"""Largest J h of a linearised rate: growth beyond says nothing of the solution, and may be no
-number."""
+"""Largest J h of a linearised rate: faster growth is no approximation of the solution, and may
+overflow.
+"""
 
 
 @final
@@ -31,7 +32,7 @@ class Step:
     Attributes:
         end, mean: the states after it, and their mean over it.
         mean_rate, end_rate: their rates, likewise.
-        kinds: how it is made: EXACT, EVENT, SECOND, each at most once.
+        kinds: types of the step: EXACT, EVENT, SECOND, each at most once.
     """
 
     end: ca.SX
@@ -51,10 +52,10 @@ def advanced(
     h: ca.SX | float,
     where: str,
 ) -> Step:
-    """States of a law after a step of `h` [s], their means, and their rates.
+    """Return the states of a law after a step of `h` [s], their means, and their rates.
 
-    With v, N and the further inputs `given` held; of a sum term by term, by what the law knows of
-    its step, else by `held_step`.
+    v, N and the further inputs `given` are held. A sum is advanced term by term, by the law's own
+    `held_step` if it has one, else by the function `held_step`.
 
     Raises:
         ValueError: modes that follow zero crossings within the step; as `held_step`.
@@ -73,7 +74,7 @@ def advanced(
         return Step(end, mean, (end - z) / h, ca.substitute(rate, z, end), (EVENT,))
     if law.switches(v, N, z, **chosen(law, given)):
         raise ValueError(
-            f"{where}: expected a law without modes, or one that knows its step, got one whose "
+            f"{where}: expected a law without modes, or one with its own step, got one whose "
             "modes follow zero crossings within the step; karnopp and leine_switch with "
             "form = 'original' are functions of v, N and F_e"
         )
@@ -84,7 +85,7 @@ def advanced(
 
 
 def _stacked(parts: Sequence[Step]) -> Step:
-    """The states of several terms below each other."""
+    """Return the states of several terms below each other."""
 
     def column(name: str) -> ca.SX:
         return ca.vertcat(*(getattr(part, name) for part in parts))
@@ -97,27 +98,27 @@ def _stacked(parts: Sequence[Step]) -> Step:
 def held_step(
     rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str, *, each: bool = False
 ) -> Step:
-    """States after a step of h [s], their means over it, and their rates, columns.
+    """Return states after a step of h [s], their means over it, and their rates, columns.
 
-    Each state by itself, those that others need first, with the means of these: exact where the
-    rate is affine in its own state and does not depend on others; otherwise
+    States are advanced one by one, those that others need first, with the means of these. The step
+    is exact if the rate is affine in its own state and does not depend on others; otherwise
 
         dz = h phi1(J h) f,   m = h phi2(J h) f,   J = df_i/dz_i
         z+ = z + s dz,   mean z = z + s [(1 - s) dz + s m]
 
-    of second order (Rosenbrock-Euler, exponential), with J h not above `FASTEST`. s = min(1,
-    (rest - z)/dz) ends the way where the state comes to rest, which the solution cannot pass and
+    of second order (Rosenbrock-Euler, exponential), with J h limited to `FASTEST`. s = min(1,
+    (rest - z)/dz) ends the step at the equilibrium of the state, which the solution cannot pass but
     the linearised one may. The rate at the end is exp(J h) f, without the difference of large
-    numbers that it is at z+ in fast sliding; 0 where the state has come to rest.
+    numbers that it would be at z+ in fast sliding; 0 if the state has reached its equilibrium.
 
     Args:
         rate: of the states `z`.
-        rest: where each state comes to rest.
+        rest: equilibrium of each state.
         each: `rest` is that of each state at the values of the others in `z`.
 
     Raises:
-        ValueError: states that act on each other in a circle, or a rate that depends on others and
-            is not affine in its own state, whose place of rest is not known (without `each`).
+        ValueError: states with circular dependencies, or a rate that depends on others and is not
+            affine in its own state, without known equilibrium (without `each`).
     """
     count = z.numel()
     means, rates = [z[i] for i in range(count)], [z[i] for i in range(count)]
@@ -146,19 +147,21 @@ def held_step(
 
 
 def _share(way: ca.SX, gap: ca.SX) -> ca.SX:
-    """The share of `way` up to the place of rest that is `gap` away; 1 where it lies beyond."""
+    """Return the fraction of `way` up to the equilibrium at the distance `gap`; 1 if it is
+    beyond.
+    """
     ratio = gap / ca.if_else(way == 0, 1, way)
     return ca.if_else(ca.logic_and(ratio > 0, ratio < 1), ratio, 1)
 
 
 def _order(pattern: NDArray[np.bool_], where: str) -> list[int]:
-    """The states, each after those that its rate depends on."""
+    """Return the states, each after those that its rate depends on."""
     needs = {i: set(row.nonzero()[0].tolist()) - {i} for i, row in enumerate(pattern)}
     found: list[int] = []
     while needs:
         ready = [i for i, others in needs.items() if others <= set(found)]
         if not ready:
-            raise ValueError(f"{where}: {_expected('act on each other in a circle')}")
+            raise ValueError(f"{where}: {_expected('have circular dependencies')}")
         found += ready
         needs = {i: others for i, others in needs.items() if i not in ready}
     return found
@@ -167,14 +170,14 @@ def _order(pattern: NDArray[np.bool_], where: str) -> list[int]:
 def _expected(what: str) -> str:
     return (
         "expected a rate that is affine in its own state or depends on no other, so that a step "
-        f"of any length is right, got states that {what}; gms with form = 'event' has a step"
+        f"of any length is accurate, got states that {what}; gms with form = 'event' has a step"
     )
 
 
 def force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The force with symbols r for the rates that occur in it, and r.
+    """Return the force with symbols r for the rates that occur in it, and r.
 
-    Its mean is then taken at the mean rates and not at the rates of the mean state, which are equal
+    Its mean is then taken at the mean rates and not at the rates of the mean state; these are equal
     in an affine law but, in float at high velocities, the difference of two large numbers.
     """
     r = ca.SX.sym("r", rate.numel())
@@ -189,26 +192,26 @@ def force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 LEAST_LOAD = 1e-9
-"""Times the nominal load: a contact under less carries none."""
+"""Load, relative to the nominal load, below which a contact carries no force."""
 
 NO_LOAD = (
-    "Without load (N below {least:g} N) there is no dry friction, and what the contact remembers "
-    "of its deflection is forgotten; when the load returns, it begins anew."
+    "Without load (N below {least:g} N) there is no dry friction, and the contact forgets its "
+    "deflection; when the load returns, it starts anew."
 )
 
 
 def forces_at(force: ca.SX, own: ca.SX, at: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
-    """The force with the values `at`, by name, for the states and rates `own`, a column."""
+    """Return the force with the values `at`, by name, for the states and rates `own`, a column."""
     return {name: ca.substitute(force, own, values) for name, values in at.items()}
 
 
 def with_unloaded_case(
     following: ca.SX, force: ca.SX, own: ca.SX, at: Mapping[str, ca.SX], N: Variable
 ) -> tuple[ca.SX, dict[str, ca.SX]]:
-    """States and forces of a step with a case of their own for a contact without load.
+    """Return states and forces of a step with a separate case for a contact without load.
 
-    A state whose step depends on the load becomes 0, as that of a contact that has just closed; the
-    others (a lag, a temperature) go on. What is left of the force is viscous friction.
+    A state whose step depends on the load becomes 0, as in a contact that has just closed; the
+    others (a lag, a temperature) continue. Only viscous friction remains of the force.
 
     Args:
         following: states after the step.
@@ -223,7 +226,10 @@ def with_unloaded_case(
     found: dict[str, ca.SX] = {}
     for name, normal in forces_at(force, own, at).items():
         values, left = ca.vertcat(kept, kept) * at[name], ca.SX()
-        for load in (0.0, least):  # not zero where that is 0/0: a corner as wide as a share of it
+        for load in (
+            0.0,
+            least,
+        ):  # not 0 if that gives 0/0: a corner as wide as a part of it
             given = ca.densify(ca.vertcat(values, load))
             left = ca.substitute(force, ca.vertcat(own, N.symbol), given)
             if _is_finite(left):
@@ -233,9 +239,9 @@ def with_unloaded_case(
 
 
 def needs_unloaded_case(law: Law, own: ca.Function, cases: ca.Function) -> bool:
-    """Return True if the formulas of `law` are not finite at N = 0, or hold a force at rest there.
+    """Return True if the formulas of `law` are not finite at N = 0, or give a force at rest there.
 
-    Elements of event forms let go at once. A law that has a level of its own there, such as by a
+    Elements of event forms release at once. A law with a level of its own there, such as by a
     preload, keeps its formulas.
 
     Args:
@@ -258,7 +264,7 @@ def needs_unloaded_case(law: Law, own: ca.Function, cases: ca.Function) -> bool:
 
 
 def _level(law: Law) -> float:
-    """The dry friction [N] that the law holds without load; 0 where it does not say."""
+    """Return the dry friction [N] of the law without load; 0 if it is not defined."""
     try:
         return max(abs(float(law.static_level(0.0, side))) for side in (1, -1))
     except ValueError:
@@ -266,7 +272,7 @@ def _level(law: Law) -> float:
 
 
 def _is_finite(expression: ca.SX) -> bool:
-    """Return True if no 0/0 is in an expression, at numbers that no formula treats specially."""
+    """Return True if an expression has no 0/0, at numbers that no formula treats specially."""
     symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(expression))
     value = ca.evalf(ca.substitute(expression, symbols, 0.7 * ca.SX.ones(symbols.numel())))
     return bool(np.isfinite(float(value)))

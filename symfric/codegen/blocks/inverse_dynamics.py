@@ -28,19 +28,19 @@ EQUATIONS = "tau = M(q) qdd + c(q, qd) + g(q) + T     by Newton and Euler, from 
 RUBBING = """\
 T = R F(R qd, N)     turning, radius R; F(qd, N) for a law of the moment, and sliding
 N = |f_1| + |f_2| + |f_z|     of a hinge: reactions of its two stations and its face, which
-                              q, qd, qdd tell; or the constant that a joint has instead"""
+                              q, qd, qdd give; or the constant of a joint"""
 
 MEAN = "The friction of laws with states is the mean over the step (F below, not F_end)."
 
 USE = (
-    "tau moves a joint in its positive direction; friction is a part of it: what it takes.",
-    "Feed the position, velocity and acceleration that are planned: a measured velocity that "
-    "trembles about zero makes friction that trembles, too.",
+    "tau moves a joint in its positive direction; friction is included.",
+    "Use the planned position, velocity and acceleration: a measured velocity that "
+    "fluctuates about zero gives fluctuating friction.",
 )
 
 LIMITS = (
-    "Rigid bodies and joints; what pushes from outside, other than the payload, is not in tau and "
-    "does not press the bearings.",
+    "Rigid bodies and joints; external forces other than the payload are not in tau and "
+    "do not load the bearings.",
 )
 
 SOURCES = (
@@ -61,42 +61,41 @@ def inverse_dynamics_block(
     fold: bool = False,
     h: float | None = None,
 ) -> Block:
-    """The forces that a motion needs: tau(q, qd, qdd), friction of the joints included.
+    """Return the block of the forces that a motion needs: tau(q, qd, qdd), with joint friction.
 
         tau = M(q) qdd + c(q, qd) + g(q) + friction(qd, N(q, qd, qdd), z)
 
-    by the recursion of Newton and Euler. A bearing that reactions load has the normal force N that
-    this very motion makes in it, payload and acceleration included; it does not depend on friction,
-    so nothing is solved. Bristles are states of the block and make a step with velocity and normal
-    force held, as `law_block` says; feed the velocity and acceleration that are planned for the
-    step.
+    by the recursion of Newton and Euler. The normal force N of a bearing loaded by reactions is
+    that of this motion, payload and acceleration included; it does not depend on friction, so
+    nothing is solved. Bristles are states of the block and make a step with velocity and normal
+    force held, see `law_block`; use the velocity and acceleration that are planned for the step.
 
     Inputs q_1 ... q_n, qd_1 ..., qdd_1 ... in the order of the joints that the header names;
     outputs tau_1 ... [N m or N], positive along the joint. Parameters and states of the laws, and
-    constant normal forces, have the numbers of their joints, and can be changed at run time.
-    Inputs of the mechanism are taken at their start values, those of motors at zero.
+    constant normal forces, have the numbers of their joints, and can be changed at run time. Inputs
+    of the mechanism have their start values, those of motors are zero.
 
     Couplings of constant ratio, such as the fingers that mimic another one in URDF files, leave the
-    joints that lead; tau is then what these need to move the others along.
+    leading joints; tau includes the forces to move the others.
 
     Args:
-        mechanism: or a URDF file, or its text; `read_urdf(file, law=..., bearings=...)` chooses
-            its friction.
+        mechanism: or a URDF file, or its text; `read_urdf(file, law=..., bearings=...)` selects its
+            friction.
         name: C identifier; default that of the mechanism.
         p: parameters of the mechanism that stay variable, as for `Mechanism.build`.
         payload: the frame "body.frame", or the body or link, that carries a load whose mass
-            payload_m and centre of mass payload_c are parameters, zero at first.
-        payload_inertia: whether the load has moments of inertia payload_J, too.
+            payload_m and centre of mass payload_c are parameters, initially zero.
+        payload_inertia: True if the load has moments of inertia payload_J, too.
         tunable_gravity: the vector of gravity is a parameter: a robot on a wall, on a vehicle.
-        separate: the share of friction as outputs friction_1 ..., too (tau contains it).
+        separate: friction also as outputs friction_1 ... (tau contains it).
         fold: the parameters of friction become constants.
         h: step size [s] of laws with states as a constant; without it h is a parameter.
 
     Raises:
         ValueError: closed loops, balls or free bodies, prescribed motion; laws without a step of
-            their states (Leuven, smooth GMS) or that ask for the applied force (exact
-            Coulomb, Karnopp); friction whose normal force depends on other friction; a payload at
-            an unknown place; as `Mechanism.build`.
+            their states (Leuven, smooth GMS) or that need the applied force (exact Coulomb,
+            Karnopp); friction whose normal force depends on other friction; a payload at an
+            unknown place; as `Mechanism.build`.
     """
     checks.flag(f"{WHERE}: separate", separate)
     checks.flag(f"{WHERE}: fold", fold)
@@ -120,9 +119,9 @@ def inverse_dynamics_block(
     )
     motion, rubbed = machine.leading(still), machine.leading(rubbed)
     following, sliding = machine.moved(following), machine.moved(sliding)
-    outputs = machine.outputs("tau", motion + rubbed, "force that the motion needs")
+    outputs = machine.outputs("tau", motion + rubbed, "force required by the motion")
     if separate:
-        outputs |= machine.outputs("friction", rubbed, "friction, a part of it")
+        outputs |= machine.outputs("friction", rubbed, "friction, included in tau")
     own = () if h is not None or not states else (size,)
     made = Block(
         name or machine.identifier,
@@ -150,9 +149,10 @@ def gravity_block(
     payload: str | None = None,
     tunable_gravity: bool = False,
 ) -> Block:
-    """The forces that hold a mechanism at rest: tau = g(q), springs included, without friction.
+    """Return the block of the forces that hold a mechanism at rest, tau = g(q), without friction.
 
-    Arguments as of `inverse_dynamics_block`; the default name ends in _gravity.
+    Springs are included. Arguments as of `inverse_dynamics_block`; the default name ends in
+    _gravity.
     """
     machine = _machine(mechanism, p, payload, False, tunable_gravity)
     eq = machine.eq
@@ -171,13 +171,13 @@ def gravity_block(
 @final
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """Equations of a mechanism in the coordinates that lead.
+    """Equations of a mechanism in its leading coordinates.
 
     Attributes:
-        joints: the coordinates that lead: name, unit.
+        joints: the leading coordinates: name, unit.
         inputs: q, qd, qdd of them.
-        symbols, values: what stands for the coordinates of all joints, and what is put there.
-        T: rates of all joints are T times those that lead, shape (n, k).
+        symbols, values: symbols of the coordinates of all joints, and their values.
+        T: rates of all joints are T times the leading ones, shape (n, k).
     """
 
     name: str
@@ -191,36 +191,36 @@ class _Machine:
 
     @property
     def identifier(self) -> str:
-        """Its name as one of C: files of robots may begin with a digit."""
+        """Name as a C identifier: names in robot files may begin with a digit."""
         return self.name if self.name[:1].isalpha() else f"robot_{self.name.lstrip('_')}"
 
     def along(self, contact: Contact) -> str:
-        """The coordinate that a contact resists."""
+        """Return the coordinate that a contact resists."""
         joint = self.eq.kin.topology.link_of[contact.joint].joint
         return joint.coordinate(joint.directions[contact.direction])
 
     def label(self, coordinate: str) -> str:
-        """The number of a coordinate that leads; the name of one that follows."""
+        """Return the number of a leading coordinate; the name of a following one."""
         names = [v.name for v in self.joints]
         return str(names.index(coordinate) + 1) if coordinate in names else coordinate
 
     def moved(self, expression: ca.SX) -> ca.SX:
-        """An expression of all coordinates in those that lead."""
+        """Return an expression of all coordinates in terms of the leading ones."""
         return ca.substitute([expression], list(self.symbols), list(self.values))[0]
 
     def leading(self, forces: ca.SX) -> ca.SX:
-        """Forces along all coordinates as forces along those that lead."""
+        """Return forces along all coordinates as forces along the leading ones."""
         return ca.densify(ca.SX(self.T.T) @ self.moved(forces))
 
     def outputs(self, stem: str, column: ca.SX, doc: str) -> dict[str, Output]:
-        """One output a joint."""
+        """Return one output per joint."""
         return {
             f"{stem}_{k}": Output(column[k - 1], _force(v.unit), doc)
             for k, v in enumerate(self.joints, start=1)
         }
 
     def texts(self, what: str, parts: Sequence[ContactStep]) -> dict[str, Any]:
-        """Texts of the data sheet."""
+        """Return the texts of the data sheet."""
         laws = {part.law.name: part.law for part in parts}
         order = ", ".join(f"{k} {v.name}" for k, v in enumerate(self.joints, start=1))
         where = (
@@ -247,14 +247,14 @@ class _Machine:
 
 
 def _force(unit: str) -> str:
-    """Of the force along a coordinate."""
+    """Return the unit of the force along a coordinate."""
     return "N m" if unit == "rad" else "N"
 
 
 def _machine(
     mechanism: Mechanism | str | Path, p: Variables, payload: str | None, inertia: bool, g: bool
 ) -> _Machine:
-    """Equations of a mechanism with its payload, of which the inertia, and gravity g variable."""
+    """Return the equations of a mechanism, with variable payload and gravity if requested."""
     checks.flag(f"{WHERE}: payload_inertia", inertia)
     checks.flag(f"{WHERE}: tunable_gravity", g)
     if inertia and payload is None:
@@ -303,7 +303,7 @@ def _machine(
 
 
 def _check(eq: Equations, mechanism: Mechanism) -> None:
-    """Refuse what this recursion does not know.
+    """Check that this recursion supports the mechanism.
 
     Raises:
         ValueError: with the names of joints and constraints.
@@ -313,41 +313,41 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
         names = ", ".join(loop.joint.name for loop in eq.loops)
         raise ValueError(
             f"{where}: expected an open chain or tree, got loops that close in {names}, whose "
-            "multipliers share the load as more than the motion tells; `plant_block` and "
-            "`functions` take loops"
+            "multipliers are not determined by the motion alone; `plant_block` and "
+            "`functions` support loops"
         )
     balls = [v.joint.name for v in eq.kin.topology.links if v.joint.quaternion is not None]
     if balls:
         raise ValueError(
             f"{where}: expected joints that turn about or slide along axes, got Euler parameters "
-            f"in {', '.join(balls)}; a base that is given needs a Fixed joint or the ground"
+            f"in {', '.join(balls)}; a fixed base needs a Fixed joint or the ground"
         )
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
-        raise ValueError(f"{where}: expected forces and constraints without time, got some with it")
+        raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
     if ca.depends_on(stacked(eq.normals), eq.F):
         pressed = [
             c.joint for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
         ]
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "
-            f"{', '.join(dict.fromkeys(pressed))}, which other friction presses; give it a "
+            f"{', '.join(dict.fromkeys(pressed))}, which depends on other friction; give it a "
             "constant normal force"
         )
 
 
 def _couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
-    """T, c and the coordinates that lead: all coordinates are T times those, plus c.
+    """Return T, c and the leading coordinates: all coordinates are T times those, plus c.
 
     Raises:
-        ValueError: a constraint that is not linear in coordinates, or with a ratio that is no
-            number; constraints that say nothing about the coordinates that are left.
+        ValueError: a constraint that is not linear in coordinates, or whose ratio is not a number;
+            constraints that do not determine the other coordinates.
     """
     J = ca.jacobian(eq.phi, eq.q)
     if not (J.is_constant() and ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n)).is_constant()):
         raise ValueError(
-            f"{WHERE}: expected constraints of constant ratios, numbers, got others; leave them "
-            "out, or take `plant_block`"
+            f"{WHERE}: expected constraints with constant ratios, got others; leave them "
+            "out, or use `plant_block`"
         )
     matrix = ca.DM(ca.densify(J)).full()
     constant = ca.DM(ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n))).full()

@@ -1,4 +1,4 @@
-"""The joints of a mechanism as parts of a block: their friction, a payload, gravity at run time."""
+"""Joints of a mechanism in a block: friction, a payload, gravity at run time."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -26,9 +26,9 @@ class ContactStep:
 
     Attributes:
         along: the coordinate that it resists.
-        law: the block of its law alone, whose texts are those of the data sheet.
+        law: the block of its law, whose texts are those of the data sheet.
         force: friction [N], for a law of the moment [N m].
-        parameters, states: under the names that the law gives them.
+        parameters, states: with the names of the law.
         following: the states after the step.
         sliding: the states of long sliding.
     """
@@ -45,22 +45,22 @@ class ContactStep:
 def contact_step(
     contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool
 ) -> ContactStep:
-    """The friction of a contact under the normal force `normal` [N], in a step of `h` [s].
+    """Return the friction of a contact under the normal force `normal` [N], in a step of `h` [s].
 
     A constant normal force is a parameter N.
 
     Args:
         along: the coordinate that it resists.
-        fold: whether all parameters are constants.
+        fold: True if all parameters are constants.
 
     Raises:
-        ValueError: as `law_block`; a law that asks for more than v and N.
+        ValueError: as `law_block`; a law that needs more than v and N.
     """
     law, friction = contact.friction.law, contact.friction
     if law.inputs:
         raise ValueError(
             f"inverse dynamics: joint '{contact.joint}' > friction > law: expected one that needs "
-            f"v and N alone, got {type(law).__name__}, which asks for "
+            f"only v and N, got {type(law).__name__}, which also needs "
             f"{', '.join(i.name for i in law.inputs)}"
         )
     block = law_block(law, free=() if fold else None, turning=friction.turning)
@@ -83,7 +83,7 @@ def contact_step(
 
 
 def _level(friction: JointFriction) -> Variables:
-    """The constant normal force of a joint as a parameter, where it has one."""
+    """Return the constant normal force of a joint as a parameter, if it has one."""
     if friction.normal is None or not is_number(friction.normal):
         return ()
     start, turning = float(friction.normal), friction.turning
@@ -93,21 +93,21 @@ def _level(friction: JointFriction) -> Variables:
 
 
 def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Mechanism, Variables]:
-    """A copy whose body at `place` carries a rigid load, and the load's parameters.
+    """Return a copy whose body at `place` carries a rigid load, and the load's parameters.
 
-    The two are one body: of the mass m + m_l, with the centre of mass c + r (c_l - c) and the
+    The two form one body of the mass m + m_l, with the centre of mass c + r (c_l - c) and the
     inertia J + J_l + r m (|d|^2 - d d'), d = c_l - c, r = m_l / (m + m_l).
 
     Args:
         place: "body", "body.frame", or the name of a frame or a link that occurs once.
-        inertia: whether the load has moments of inertia; otherwise it is a point.
+        inertia: True if the load has moments of inertia; otherwise it is a point.
 
     Returns:
         The copy; payload_m [kg], payload_c_1 ... 3 [m] in the axes of the frame and, with
         `inertia`, payload_J_1 ... 6 [kg m^2] about its centre of mass; all of them zero.
 
     Raises:
-        ValueError: an unknown place, one that several bodies have, the ground.
+        ValueError: an unknown or ambiguous place, the ground.
     """
     name, frame = _found(mechanism, place)
     m = Variable("payload_m", "kg", lower=0.0, upper=1e6, doc="mass of the payload")
@@ -133,7 +133,7 @@ def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Me
 
 
 def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
-    """The body at a place, and the frame on it."""
+    """Return the body at a place, and the frame on it."""
     places = dict(mechanism.frames)
     bodies = [body.name for body in mechanism.bodies]
     if place in bodies:
@@ -154,7 +154,7 @@ def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
 
 
 def _together(body: Body, load: Body, frame: Frame) -> Body:
-    """A body and what it carries at a frame, as one."""
+    """Return a body and its load at a frame, as one body."""
     c = ca.SX(frame.p) + ca.SX(frame.R) @ load.c
     J = ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
     if equals(body.mass, 0.0):
@@ -172,7 +172,9 @@ def _six(J: ca.SX) -> Sequence[ca.SX]:
 
 
 def with_gravity(mechanism: Mechanism) -> tuple[Mechanism, Variables]:
-    """A copy whose gravity is the parameters g_1, g_2, g_3 [m/s^2] in the axes of the ground."""
+    """Return a copy whose gravity is the parameters g_1, g_2, g_3 [m/s^2] in the axes of the
+    ground.
+    """
     weights = [force for force in mechanism.forces if isinstance(force, Gravity)]
     start = stacked(vector(force.g) for force in weights[:1])
     values = [float(start[k]) if weights else 0.0 for k in range(3)]

@@ -1,4 +1,4 @@
-"""Texts of a data sheet: what the docstring of a law tells, and how its steps are made."""
+"""Texts of a data sheet, from the docstring of a law and the method of its steps."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -16,22 +16,22 @@ from symfric.integrator.methods.method import Method
 TELLING = (
     r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
 )
-"""What a sentence holds that a user of the numbers must know."""
+"""Patterns of sentences that users of the law must read."""
 
 LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
-"""What leans on the sentence before it, or speaks of another form."""
+"""Patterns of sentences that depend on the previous one, or describe another form."""
 
 
 @final
 @dataclass(frozen=True)
 class LawText:
-    """Texts about a law, without the words of Python.
+    """Texts about a law, without Python terms.
 
     Attributes:
         title: its name, one line.
         equations: formulas, line by line.
-        limits: what it cannot do, a sentence each.
-        source: where it is published.
+        limits: restrictions, a sentence each.
+        source: publication.
     """
 
     title: str
@@ -41,12 +41,14 @@ class LawText:
 
 
 def texts(law: Parametric) -> tuple[LawText, ...]:
-    """The texts of a law and of those that it holds, each once."""
+    """Return the texts of a law and of its parts, each once."""
     return tuple(dict.fromkeys(_all(law)))
 
 
 def equations(obj: Parametric) -> str:
-    """The formulas of a law or a machine and of what it holds, under their titles if several."""
+    """Return the formulas of a law or a machine and of its parts, with titles if there are
+    several.
+    """
     found = texts(obj)
     if len(found) == 1:
         return found[0].equations
@@ -81,7 +83,7 @@ def _text(law: Parametric) -> LawText:
 
 
 def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[str]:
-    """The formulas but for those of another form, whose name stands before them."""
+    """Yield the formulas except those of another form, whose name precedes them."""
     others = "|".join(rf'{o.name} = "(?!{o.value}")' for o in forms) or "(?!)"
     before = ""
     for paragraph in paragraphs:
@@ -93,7 +95,7 @@ def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[st
 
 
 def _limits(prose: str) -> Iterator[str]:
-    """The sentences that tell what a law cannot do, and over which widths it is smooth."""
+    """Yield the sentences about restrictions of a law and its smoothing widths."""
     for sentence in split(r"(?<=\.)(?<!al\.)\s+", " ".join(prose.split())):
         for clause in split(r";\s+", sentence.removeprefix("Limits: ").replace("`", "")):
             if search(TELLING, clause) and not search(LEANING, clause):
@@ -106,23 +108,23 @@ HELD = "Inputs are held over the step h."
 
 KINDS = {
     EXACT: """\
-Exact exponential step, whatever its length, for dz/dt = a - b z at held inputs:
+Exact exponential step, for any length, for dz/dt = a - b z at held inputs:
     x     = -b h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
     z+    = z + h phi1 dz/dt            at the end of the step
     zm    = z + h phi2 dz/dt            mean over the step
     r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end""",
     EVENT: """\
-Event step, exact whatever its length: every element sticks up to its limit, which it meets
-within the step, and slips from there on; it sticks again when v turns round.
+Event step, exact for any length: every element sticks up to its limit, which it reaches
+within the step, and slips from there on; it sticks again when v reverses.
     z+, zm  at the end of the step, and mean over it
     r       = (z+ - z) / h              mean rate,   r+ = dz/dt at z+""",
     SECOND: """\
-Exponential step of second order, bounded whatever its length, linearised in each state:
+Exponential step of second order, bounded for any length, linearised in each state:
     J     = d(dz/dt)/dz,   x = J h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
     z+    = z + s h phi1 dz/dt          at the end of the step
     zm    = z + s h [(1 - s) phi1 + s phi2] dz/dt       mean over the step
     r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end
-s is 1, or the share of the way on which z comes to rest, where it stays, with r+ = 0.""",
+s is 1, or the fraction of the step up to the equilibrium of z, where r+ = 0.""",
 }
 
 FORCES = """\
@@ -131,20 +133,20 @@ FORCES = """\
 
 
 def of_law(kinds: tuple[str, ...], ends: bool) -> str:
-    """Text about the step of the states of a law, by the `kinds` of its `Step`.
+    """Return the text about the step of the states of a law, by the `kinds` of its `Step`.
 
     Args:
-        ends: the block has the force at the end of the step, too.
+        ends: True if the block also has the force at the end of the step.
     """
     forces = FORCES if ends else FORCES.splitlines()[0]
     return "\n".join([HELD, *(KINDS[kind] for kind in kinds), forces])
 
 
 def of_method(method: Method, algebraic: bool) -> str:
-    """Text about a method's fixed step of x' = f(x, u), 0 = g(x, z, u).
+    """Return the text about a method's fixed step of x' = f(x, u), 0 = g(x, z, u).
 
     Args:
-        algebraic: there are unknowns z.
+        algebraic: True if there are unknowns z.
     """
     unknowns = "\n    x stands for states and algebraic unknowns" if algebraic else ""
     return (
@@ -155,7 +157,7 @@ def of_method(method: Method, algebraic: bool) -> str:
 
 
 def _formula(method: Method) -> str:
-    """The formula of one step."""
+    """Return the formula of one step."""
     match method:
         case BackwardEuler():
             return f"    x+ = x + h f(x+, u)    by {method.iterations} Newton iterations from x"

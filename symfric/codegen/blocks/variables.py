@@ -1,7 +1,7 @@
-"""The variables of a block: those that stay variable, numbers of joints, arrays of alike elements.
+"""Variables of a block: run-time parameters, numbered joints, arrays of identical elements.
 
-Names tell what may belong together, the graph of the step what does: only what a loop reads or
-writes becomes an array, and a block without loops stays as it is.
+Candidates for arrays are found by names, and confirmed by the graph of the step: only variables
+that a loop reads or writes become an array, and a block without loops is unchanged.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -22,26 +22,27 @@ from symfric.laws import Law
 from symfric.model import Variables
 
 Fold = bool | Sequence[str] | None
-"""What becomes a constant: True for all, names, or None for what selects a cheaper form only."""
+"""Parameters that become constants: True for all, names, or None for those that select a cheaper
+form."""
 
 
 def variable(
     obj: Parametric, free: Sequence[str] | None, fold: Fold
 ) -> tuple[tuple[str, ...], list[str]]:
-    """The parameters of a law or a machine that stay variable at run time, and what is wrong.
+    """Return the parameters of a law or a machine that stay variable at run time, and problems.
 
     Args:
         obj: a law, or a machine with one in its field `law`.
-        free: these stay variable and no others; None where `fold` says.
-        fold: True for constants only, names that become constants beside those that select a
-            cheaper form (`runtime_parameters`), None for the latter alone.
+        free: these stay variable and no others; None to use `fold`.
+        fold: True for constants only, names that become constants in addition to those that select
+            a cheaper form (`runtime_parameters`), None for the latter only.
 
     Returns:
         Names in the order of `parameters`, and a sentence for each problem.
     """
     problems: list[str] = []
     if free is not None and fold is not None:
-        problems.append(f"fold: expected none beside free, which folds all others, got {fold!r}")
+        problems.append(f"fold: expected none with free, which folds all others, got {fold!r}")
     if fold is False:
         problems.append("fold: expected True, names, or None for the default, got False")
     known, given = parameters(obj), {"free": free, "fold": None if fold in (True, False) else fold}
@@ -58,7 +59,9 @@ def variable(
 
 
 def _worth_it(obj: Parametric) -> tuple[str, ...]:
-    """`runtime_parameters` of a law; of a machine its own parameters and those of its law."""
+    """Return `runtime_parameters` of a law; of a machine its own parameters and those of its
+    law.
+    """
     if isinstance(obj, Law):
         return runtime_parameters(obj)
     names, law = tuple(parameters(obj)), getattr(obj, "law", None)
@@ -71,14 +74,14 @@ def _worth_it(obj: Parametric) -> tuple[str, ...]:
 
 
 def runtime_parameters(law: Law) -> tuple[str, ...]:
-    """The parameters that are worth a place in the parameter struct.
+    """Return the parameters of a law that belong into the parameter struct.
 
-    All of them, except those whose present value selects a cheaper form of the law. This is
-    measured: a parameter is left out if making it a constant spares a transcendental function of
-    inputs or states. So delta = 2 of a Stribeck curve spares a `pow`, mu_v = 0 of Brown-McPhee a
+    These are all except those whose present value selects a cheaper form of the law. This is
+    measured: a parameter is left out if making it a constant saves a transcendental function of
+    inputs or states. So delta = 2 of a Stribeck curve saves a `pow`, mu_v = 0 of Brown-McPhee a
     `tanh`, E = 0 of the self-tuning law an `atan`, n = 1 of Dahl's law a `pow` (and keeps the law
     affine in its state), v_eps = 0 the `tanh` of a smooth |v|. A factor of 1 or a summand of 0
-    spares none and stays.
+    saves none and stays.
 
     Parameters with the same meaning and value, such as those of the two sides of an asymmetric law,
     are measured as one.
@@ -95,7 +98,9 @@ def runtime_parameters(law: Law) -> tuple[str, ...]:
 
 
 def _alike(law: Law) -> list[list[str]]:
-    """Parameters by meaning (role, unit and the name in their own part) and value."""
+    """Return groups of parameters with equal meaning (role, unit, name in their own part) and
+    value.
+    """
     groups: dict[tuple[str, str, str, float], list[str]] = {}
     for name, p in parameters(law).items():
         groups.setdefault((p.role, p.unit, p.field, float(p.value)), []).append(name)
@@ -103,7 +108,7 @@ def _alike(law: Law) -> list[list[str]]:
 
 
 def _calls(law: Law, groups: Sequence[Sequence[str]]) -> int:
-    """Transcendental functions of v, N, z, w in the law with one symbol for every group."""
+    """Return the number of transcendental functions in the law with one symbol per group."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     p = ca.SX.sym("p", len(groups))
     symbols = [p[i] for i in range(len(groups))]
@@ -121,10 +126,10 @@ def _calls(law: Law, groups: Sequence[Sequence[str]]) -> int:
 
 
 def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
-    """The block without parameters that have no effect.
+    """Return the block without parameters that have no effect.
 
     Raises:
-        ValueError: one of them was asked for in `free`.
+        ValueError: one of them was requested in `free`.
     """
     everything = block.everything
     idle = [p.name for p in block.parameters if not ca.depends_on(everything, p.symbol)]
@@ -138,14 +143,14 @@ def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
 
 
 SMALLEST = 1e-6
-"""Times its default: the least that a parameter may become which must not be 0."""
+"""Lower limit of a parameter that must not be 0, relative to its default."""
 
 
 def above_zero(block: Block, names: Collection[str]) -> Block:
-    """The block whose parameters `names`, which are valid from 0 on, keep a distance from it.
+    """Return the block whose parameters `names`, valid from 0 on, keep a distance from 0.
 
-    A law takes a width of the number 0 for its original form; of a parameter that becomes 0 at run
-    time the C knows nothing, and divides by it.
+    A law treats a width of the number 0 as its original form; the C of a variable width has no such
+    case, and divides by it.
     """
     changed = tuple(
         replace(p, lower=SMALLEST * float(p.start))
@@ -171,16 +176,17 @@ class Family:
 
     @property
     def contiguous(self) -> bool:
-        """Return True if the rows follow each other."""
+        """True if the rows follow each other."""
         return self.rows == tuple(range(self.rows[0], self.rows[0] + len(self.rows)))
 
 
 def arranged(block: Block) -> Block:
-    """The block with its alike elements as arrays, and the parameters of an array side by side.
+    """Return the block with identical elements as arrays, and the parameters of an array in
+    sequence.
 
     Their names differ in one number (F_1, F_2, ... or k_1_pos, k_2_pos, ...); units and ranges are
-    the same. States keep their order, which an array must follow; inputs, which are guarded one by
-    one, have no arrays.
+    equal. States keep their order, which an array must match; inputs, which are guarded one by one,
+    have no arrays.
     """
     found = {
         "state": [f for f in families(block.states) if f.contiguous],
@@ -199,7 +205,7 @@ def arranged(block: Block) -> Block:
 
 
 def families(variables: Variables) -> list[Family]:
-    """All families of `LEAST` and more, each variable in one at most: that of nearest rows."""
+    """Return all families of at least `LEAST`, each variable in the one of nearest rows."""
     numbered: dict[tuple[int, tuple[str, ...]], dict[int, int]] = {}
     for row, variable in enumerate(variables):
         parts = variable.name.split("_")
@@ -227,7 +233,7 @@ def families(variables: Variables) -> list[Family]:
 
 
 def _with(block: Block, found: Mapping[str, Sequence[Family]]) -> Block:
-    """The block with these arrays."""
+    """Return the block with these arrays."""
     arrays = [Elements("state", f.name, f.rows[0], len(f.rows)) for f in found["state"]]
     first = {family.rows[0]: family for family in found["param"]}
     members = {row for family in found["param"] for row in family.rows}
@@ -244,7 +250,7 @@ def _with(block: Block, found: Mapping[str, Sequence[Family]]) -> Block:
 
 
 def _used(block: Block) -> set[tuple[str, str]]:
-    """(group, name) of the arrays that loops of the step read or write."""
+    """Return (group, name) of the arrays that loops of the step read or write."""
 
     def of(groups: Sequence[str]) -> tuple[Array, ...]:
         return tuple(
@@ -259,14 +265,14 @@ def _used(block: Block) -> set[tuple[str, str]]:
 
 
 def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variables, list[int]]:
-    """Variables of several joints, those of one name together: mu_s_1, mu_s_2, ..., mu_d_1, ...
+    """Return variables of several joints, grouped by name: mu_s_1, mu_s_2, ..., mu_d_1, ...
 
     Args:
         groups: the variables of each joint.
         labels: number of each joint, or another name.
 
     Returns:
-        The variables, and the place of each among all of `groups`, one group behind the other.
+        The variables, and the place of each among all of `groups`, one group after the other.
     """
     every = [(v, label) for group, label in zip(groups, labels, strict=True) for v in group]
     found: list[Variable] = []
@@ -281,12 +287,12 @@ def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variab
 
 
 def _rank(label: str) -> tuple[bool, int]:
-    """Numbers in their order, names behind them as they come."""
+    """Return the sort key of a label: numbers in their order, then names as given."""
     return (False, int(label)) if label.isdecimal() else (True, 0)
 
 
 def in_arrays(block: Block) -> Block:
-    """The block with neighbours as arrays that count from 1 and have one unit and one range."""
+    """Return the block with arrays of neighbours that count from 1 with equal unit and range."""
     outputs = [(name, output.unit) for name, output in block.outputs.items()]
     groups = {
         "state": [(v.name, (v.unit, v.lower, v.upper)) for v in block.states],
@@ -300,7 +306,7 @@ def in_arrays(block: Block) -> Block:
 
 
 def _runs(group: str, rows: Sequence[tuple[str, object]]) -> Iterator[Elements]:
-    """Two or more neighbours NAME_1, NAME_2, ... that are alike."""
+    """Yield runs of two or more identical neighbours NAME_1, NAME_2, ..."""
     first = 0
     while first < len(rows):
         (name, kind), size = rows[first], 1

@@ -305,17 +305,17 @@ def test_where_rest_cannot_be_told_the_joint_is_named() -> None:
     for m, message in (
         (
             driven(law),
-            "joint 'shaft' > friction > law: expected one that needs v and N alone where",
+            "joint 'shaft' > friction > law: expected one that needs only v and N, because",
         ),
         (moving_rod(law), "joint 's0', 's1' > friction > law: .* in a loop that moves with time"),
-        (FourBar(Karnopp(form="event")).mechanism(), "one that stops at v = 0 alone in a loop"),
+        (FourBar(Karnopp(form="event")).mechanism(), "one that stops only at v = 0 in a loop"),
     ):
         with pytest.raises(ValueError, match=message):
             m.build()
     with pytest.raises(ValueError, match="a loop of at most 8 coordinates"):
         SliderCrank(law).mechanism().build(formulation="absolute")
 
-    with pytest.raises(ValueError, match="laws that all rest by modes, or none, in one loop"):
+    with pytest.raises(ValueError, match="laws in one loop that all stick by modes, or none"):
         pair(ExactCoulomb(), Karnopp())
 
 

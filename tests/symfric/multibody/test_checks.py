@@ -103,7 +103,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "loose body": (
         lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-        "> body 'bob': expected joints with coordinates that lead to the ground, found none; "
+        "> body 'bob': expected joints with coordinates up to the ground, found none; "
         "a Floating joint lets it move freely",
     ),
     "friction of nothing": (
@@ -111,7 +111,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
             m.body("bob", 1.0, (1.0, 1.0, 1.0)),
             m.joint(Floating("pose", "rod", "bob", friction=JointFriction(LAW))),
         ),
-        "> joint 'pose' > friction: expected a joint in which something rubs",
+        "> joint 'pose' > friction: expected a joint with friction",
     ),
     "start of another size": (
         lambda m: (
@@ -137,7 +137,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "a mass nobody declared": (
         lambda m: m.body("bob", ca.SX.sym("load"), (1.0, 1.0, 1.0)),
-        "> body 'bob': expected only declared parameters, got load; hand the variable over, build",
+        "> body 'bob': expected only declared parameters, got load; pass the variable, build",
     ),
     "a spring whose places coincide": (
         lambda m: m.force(SpringDamper("spring", "ground.hinge", "rod.hinge", 1.0, 0.1)),
@@ -172,7 +172,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "a rod that can never fit": (
         lambda m: m.joint(Distance("stay", "ground.hinge", "rod.hinge", length=2.0)),
-        "> start: expected positions that satisfy stay_lambda, got -2; no position near it does",
+        "> start: expected positions that satisfy stay_lambda, got -2; no position near it satis",
     ),
     "a frame without direction": (
         lambda m: m.frame("rod.tip", z=(0.0, 0.0, 0.0)),

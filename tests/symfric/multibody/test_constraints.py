@@ -320,7 +320,7 @@ def test_inputs_cannot_drive() -> None:
     m.joint(Prismatic("x", "ground", "block"))
     u = m.input("wish", "m")
     m.constraint(PrescribedMotion("d", "x", lambda t: u, "slide"))
-    with pytest.raises(ValueError, match="got wish; of an input the two derivatives are not known"):
+    with pytest.raises(ValueError, match="got wish; the two derivatives of an input are unknown"):
         m.build()
 
 

@@ -105,7 +105,7 @@ def test_absent_reactions_leave_no_trace() -> None:
             SLIDE,
             "which needs x_rel, v_rel; a joint has no such input",
         ),
-        (JointFriction(LAW), (), "expected a joint in which something rubs"),
+        (JointFriction(LAW), (), "expected a joint with friction"),
         (JointFriction(LAW, radius=-1.0), TURN, "radius: expected a number > 0, got -1"),
         (JointFriction(LAW, length=0.0), SLIDE, "length: expected a number > 0"),
         (JointFriction(LAW, preload=-1.0), SLIDE, "preload: expected a number >= 0"),

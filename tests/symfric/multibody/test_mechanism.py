@@ -134,7 +134,7 @@ def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
 def test_loops_that_cannot_be_closed_are_refused() -> None:
     m = slider_on_a_rod()
     m.joint(Distance("long", "ground", "block_x", length=3.0))
-    with pytest.raises(ValueError, match="no position near it does"):
+    with pytest.raises(ValueError, match="no position near it satisfies them"):
         m.build()
     with pytest.raises(ValueError, match="from which the loops can be closed"):
         m.assembled()

@@ -56,7 +56,7 @@ def test_joints_that_turn_have_units_of_turning_and_sliders_those_of_sliding() -
 
 
 def test_friction_of_a_moment_has_a_level_and_no_radius() -> None:
-    level = "normal: expected the level [N m] of friction that turns, got none"
+    level = "normal: expected the level of the friction moment [N m], got none"
     assert list(JointFriction(Coulomb(), turning=True).problems(("turn",))) == [level]
     slides = JointFriction(Coulomb(), normal=1.0, turning=True).problems(("slide",))
     assert list(slides) == ["turning: expected a joint that turns about an axis only"]
