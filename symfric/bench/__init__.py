@@ -1,4 +1,4 @@
-"""Benchmarks: run time against error, ratios within one run. May import everything."""
+"""Benchmarks of run time and error, as ratios of one run. May import every other package."""
 
 from typing import TYPE_CHECKING
 

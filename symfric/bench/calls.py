@@ -1,7 +1,7 @@
-"""Speed besides one long run: many short calls, events, gradients, signals, import.
+"""Benchmarks of short calls, events, gradients, signals and import.
 
-Times are processor time of whole calls from Python, the shortest of rounds in which all contenders
-take turns; ratios are over the first of each task, which is ours.
+Times are processor times of whole calls from Python, the shortest of several rounds in which all
+contenders take turns. Ratios are relative to the first method of each task, which is symfric.
 """
 
 import subprocess
@@ -41,15 +41,15 @@ FREE = ("mu_s", "mu_d", "k", "v_belt")
 
 
 class CallRow(NamedTuple):
-    """One way to do a task.
+    """Cost of one method for a task.
 
     Attributes:
-        task: what is done, with the scene.
-        who: by which way.
-        time_us: shortest processor time [us] of what `per` names.
-        per: step, run, call, import.
-        error: relative error of the result, NaN where there is none.
-        ratio: over the time of the first way of the task.
+        task: task and scene.
+        who: method.
+        time_us: shortest processor time per unit [us].
+        per: unit: step, run, call or import.
+        error: relative error of the result, NaN if it has none.
+        ratio: time relative to the first method of the task.
     """
 
     task: str
@@ -63,17 +63,17 @@ class CallRow(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class CallBenchmark(table.Report):
-    """All rows of one run of the benchmark."""
+    """Results of the benchmark of short calls."""
 
     rows: tuple[CallRow, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Rows; errors that there are none of are left out."""
+        """Return the rows as plain data, without errors that are NaN."""
         rows = table.plain(self.rows)
         return {"rows": [{k: v for k, v in row.items() if v is not None} for row in rows]}
 
     def shown(self) -> Iterator[table.Table | str]:
-        """Each task by each way, and what that costs."""
+        """Yield the table of tasks and methods."""
         yield table.of(
             "Processor time of short tasks", self.rows,
             {"task": "task", "method": "who", "time [us]": table.shortened("time_us"),
@@ -87,7 +87,7 @@ def bench_calls(*, quick: bool = False, progress: table.Progress = None) -> Call
 
     Args:
         quick: fewer steps, elements, points and rounds; for tests.
-        progress: called with what is measured and the fraction done.
+        progress: called with the current item and the fraction done.
     """
     tasks = (_drive, _arm, _events, _gradient, _signals, _imports)
     rows: list[CallRow] = []
@@ -106,18 +106,18 @@ def _rows(
         yield CallRow(task, who, 1e6 * time / count, per, errors[who], time / first)
 
 
-# ---- many short steps, each with inputs of its own ----
+# ---- many short steps with different inputs ----
 
 
 def _drive(quick: bool) -> Iterator[CallRow]:
-    """A belt drive in steps of 5 ms."""
+    """Measure a belt drive in steps of 5 ms."""
     model, count = Drive(LuGre()).model(), 50 if quick else 1000
     forces = np.random.default_rng(SEED).uniform(-15.0, 15.0, (count, 1))
     yield from _stepped("drive, steps of 5 ms", model, 5e-3, forces, 2 if quick else 5)
 
 
 def _arm(quick: bool) -> Iterator[CallRow]:
-    """An arm of six joints under torques held for 1 ms each: a controller's, and mere noise."""
+    """Measure an arm of six joints under torques held for 1 ms: smooth ones, and noise."""
     model, count = Arm(BrownMcPhee()).model(), 20 if quick else 1000
     t = 1e-3 * np.arange(count)
     smooth = np.sin(2 * np.pi * np.outer(t, np.linspace(1.0, 4.0, 6))) * TORQUES
@@ -128,7 +128,7 @@ def _arm(quick: bool) -> Iterator[CallRow]:
 
 
 def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Iterator[CallRow]:
-    """`u` holds an input a column, a step a row."""
+    """Measure the steps of a model; `u` has one row per step and one column per input."""
     names = [v.name for v in model.u]
     hold = {n: Hold(dt * np.arange(len(u)), u[:, i]) for i, n in enumerate(names)}
 
@@ -144,17 +144,19 @@ def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Itera
             plant.step(row)
         return plant.x.copy()
 
-    ways: dict[str, Callable[[], Array]] = {"stepper": step_by_step, "one simulate, Hold": at_once}
-    ways["casadi rosenbrock"] = _stepping_peer(model, dt, u)
+    methods: dict[str, Callable[[], Array]] = {
+        "stepper": step_by_step, "one simulate, Hold": at_once,
+        "casadi rosenbrock": _stepping_peer(model, dt, u),
+    }  # fmt: skip
     exact = at_once(1e-10)
     scale = np.array([v.nominal for v in model.x])
     scale = np.maximum(scale, np.abs(exact))
-    errors = {who: float(np.max(np.abs(way() - exact) / scale)) for who, way in ways.items()}
-    yield from _rows(task, "step", dict(ways), errors, len(u), rounds)
+    errors = {who: float(np.max(np.abs(run() - exact) / scale)) for who, run in methods.items()}
+    yield from _rows(task, "step", dict(methods), errors, len(u), rounds)
 
 
 def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
-    """CasADi's `rosenbrock`, compiled where there is a compiler, called through its buffer."""
+    """Return the steps of CasADi's `rosenbrock`, compiled if possible and called by its buffer."""
     inputs = input_data(model, {v.name: Hold([0.0, dt], [0.0, 1.0]) for v in model.u}, 0.0, dt)
     whole = system(model, inputs)
     problem = peer(whole, inputs, np.zeros(0), tolerances(whole, RTOL), "rosenbrock")
@@ -186,7 +188,7 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
 
 
 def _events(quick: bool) -> Iterator[CallRow]:
-    """Exact memory, element by element, and its smooth form."""
+    """Measure exact Maxwell-slip elements with events, and their smooth form."""
     elements = 4 if quick else 30
     pairs: dict[str, Callable[[str], Law]] = {
         f"rabinowicz gms, {elements} elements": partial(_gms, elements),
@@ -203,7 +205,7 @@ def _events(quick: bool) -> Iterator[CallRow]:
 
 
 def _gms(count: int, form: str) -> Law:
-    """Elements of equal shares that begin to slip one after the other, together 1e5 N/m."""
+    """Return elements of equal shares and different stiffnesses, 1e5 N/m in total."""
     weights = np.linspace(5.0, 1.0, count)
     stiffness = 1e5 * weights / weights.sum()
     return GMS(elements=tuple(Element(float(k), 1.0 / count) for k in stiffness), form=form)
@@ -213,9 +215,9 @@ def _gms(count: int, form: str) -> Law:
 
 
 def _gradient(quick: bool) -> Iterator[CallRow]:
-    """Of the mean square of a block's position at 401 times by four parameters.
+    """Measure the gradient of the mean square position at 401 times by four parameters.
 
-    Errors are relative to the sum of the magnitudes of what is summed up.
+    Errors are relative to the sum of the magnitudes of the terms.
     """
     model, times = Rabinowicz(BrownMcPhee()).model(free=FREE), np.linspace(0.0, 20.0, 401)
 
@@ -236,26 +238,26 @@ def _gradient(quick: bool) -> Iterator[CallRow]:
 
     exact = slopes(1e-11)
     scale = np.abs(exact) @ np.abs(weights)
-    ways: dict[str, Callable[[], Array]] = {
+    methods: dict[str, Callable[[], Array]] = {
         "run": lambda: run(sensitivities=())["x"],
         "forward": lambda: slopes() @ weights,
         "adjoint": adjoint,
     }
     errors = {"run": nan} | {
-        who: float(np.max(np.abs(ways[who]() - exact @ weights) / scale))
+        who: float(np.max(np.abs(methods[who]() - exact @ weights) / scale))
         for who in ("forward", "adjoint")
     }
-    yield from _rows("gradient, 4 parameters", "run", dict(ways), errors, 1, 2 if quick else 20)
+    yield from _rows("gradient, 4 parameters", "run", dict(methods), errors, 1, 2 if quick else 20)
 
 
 # ---- signals ----
 
 OFTEN = 60
-"""Calls after which signals are compiled, in the background."""
+"""Number of calls after which signals are compiled in the background."""
 
 
 def _signals(quick: bool) -> Iterator[CallRow]:
-    """All signals of a mechanism at 2001 times."""
+    """Measure all signals of a mechanism at 2001 times."""
     for name, scene in {"four_bar": FourBar(BrownMcPhee()), "arm": Arm(BrownMcPhee())}.items():
         runs = {
             backend: simulate(scene.model(), 0.1, samples=51 if quick else 2001, backend=backend)
@@ -275,7 +277,7 @@ def _signals(quick: bool) -> Iterator[CallRow]:
 
 
 def _imports(quick: bool) -> Iterator[CallRow]:
-    """A fresh interpreter: the package, what a first simulation takes of it, and CasADi alone."""
+    """Measure imports of the package, of a first simulation and of CasADi in a new interpreter."""
     texts = {
         "import symfric": "import symfric",
         "from symfric import simulate, ...": "from symfric import LuGre, rabinowicz, simulate",
@@ -290,7 +292,7 @@ def _imports(quick: bool) -> Iterator[CallRow]:
 
 
 def _spent_by(text: str) -> float:
-    """Processor time [s] that an import takes in a fresh interpreter."""
+    """Return the processor time [s] of an import in a new interpreter."""
     code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     return float(done.stdout)

@@ -1,4 +1,4 @@
-"""Many runs at once: in the lanes of vectors, on threads, on a graphics processor."""
+"""Benchmarks of ensembles in SIMD lanes, on threads and on a graphics processor."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -35,21 +35,21 @@ MEMBERS = 400
 
 
 class LaneRow(NamedTuple):
-    """An ensemble over a start value, on one core.
+    """Ensemble over a start value, on one core.
 
     Attributes:
         case: scene and law.
-        members: how many.
-        lanes: of them at once.
-        member_us: time of a whole call of `simulate_many`, for each member [us].
+        members: number of members.
+        lanes: number of members per SIMD vector.
+        member_us: time per member of a whole call of `simulate_many` [us].
         alone_us: the same for the compiled loop of `simulate`, which writes no results here.
         ratio: alone_us over member_us.
-        again_ms: another call for one member over a millisecond [ms].
-        attempts: mean attempts of a member.
-        equal: fraction of members with the same attempts in both; the others differ since exp,
-            tanh, sin ... of vectors have another last digit than those of libm.
+        again_ms: repeated call for one member and one millisecond [ms].
+        attempts: mean number of attempts per member.
+        equal: fraction of members with equal attempts in both; the others differ because vector
+            versions of exp, tanh, sin ... differ from libm in the last digit.
         difference: median over members of the largest difference of a state at the end, relative to
-            the largest one of all members.
+            the largest state of all members.
     """
 
     case: str
@@ -67,22 +67,22 @@ class LaneRow(NamedTuple):
 @final
 @dataclass(frozen=True)
 class CudaRow:
-    """An ensemble over a start value on a graphics processor.
+    """Ensemble over a start value on a graphics processor.
 
     Attributes:
         case: scene and law.
         real: floating point type.
-        rtol: of both.
-        device: its name; "no GPU" where there is none, and nothing is measured then.
-        members: how many.
-        first_s: time of a first call for a few members [s]: NVRTC compiles.
-        per_second: members a second, whole call.
-        cores_per_second: the same of compiled code on all cores, for a sample of the members.
+        rtol: relative tolerance of both.
+        device: name of the device; "no GPU" if there is none, and nothing is measured.
+        members: number of members.
+        first_s: time of the first call for a few members, with compilation by NVRTC [s].
+        per_second: members per second of a whole call.
+        cores_per_second: the same for compiled code on all cores, on a sample of the members.
         ratio: per_second over cores_per_second.
-        equal: fraction of the sample with the same attempts on both.
+        equal: fraction of the sample with equal attempts on both.
         difference: median over the sample of the largest difference of a state at the end, relative
-            to the largest one of all members.
-        why: why nothing was measured.
+            to the largest state of all members.
+        why: reason why nothing was measured.
     """
 
     case: str
@@ -102,13 +102,13 @@ class CudaRow:
 @final
 @dataclass(frozen=True, eq=False)
 class LaneBenchmark(table.Report):
-    """All rows of one run of the benchmark, and those on a graphics processor."""
+    """Results on one core, and on a graphics processor."""
 
     rows: tuple[LaneRow, ...]
     cuda: tuple[CudaRow, ...]
 
     def shown(self) -> Iterator[table.Table | str]:
-        """Members side by side and one by one."""
+        """Yield tables of ensembles and single runs."""
         yield table.of(
             "Processor time of an ensemble and of the same runs one by one, on one core",
             self.rows,
@@ -153,8 +153,8 @@ CASES: tuple[Case, ...] = (
     ("slider_crank/brown_mcphee", lambda: SliderCrank(BrownMcPhee()).model(), 1.0, 4),
     ("four_bar/brown_mcphee", lambda: FourBar(BrownMcPhee()).model(), 0.5, 4),
 )
-"""Name, model, end [s], and by how much there are fewer members; the start of the first velocity
-varies."""
+"""Name, model, end time [s], and divisor of the number of members; the start value of the first
+velocity varies."""
 
 
 def bench_ensemble(*, quick: bool = False, progress: table.Progress = None) -> LaneBenchmark:
@@ -168,19 +168,19 @@ def bench_ensemble(*, quick: bool = False, progress: table.Progress = None) -> L
 
 
 def _starts(model: Model, members: int) -> tuple[str, Array]:
-    """The first velocity of a model, and start values of it around its own."""
+    """Return the first velocity of a model, and start values around its default."""
     start = dict(zip((v.name for v in model.x), model.initial_state(None, None), strict=True))
     name = next(v.name for v in model.x if v.unit in ("m/s", "rad/s"))
     return name, start[name] + np.linspace(-0.1, 0.1, members)
 
 
 def _ends(model: Model, many: Ensemble) -> Array:
-    """States at the end, a row for each member."""
+    """Return the final states, one row per member."""
     return np.column_stack([many[v.name][:, 0] for v in model.x])
 
 
 def _difference(y: Array, x: Array) -> float:
-    """Median over members of the largest difference of a state over its largest value."""
+    """Return the median over members of the largest relative difference of a state."""
     return float(np.median((np.abs(y - x) / (np.abs(x).max(axis=0) + 1e-300)).max(axis=1)))
 
 
@@ -221,7 +221,7 @@ def _lanes(model: Model, end: float) -> int:
 def _one_by_one(
     model: Model, x0: dict[str, Array], end: float
 ) -> Callable[[], tuple[Array, Array]]:
-    """Runs all members in the compiled loop of `simulate`; start columns advanced, attempts."""
+    """Return a function that runs all members in the compiled loop; it returns states, attempts."""
     inputs = input_data(model, None, 0.0, end)
     integrator, _ = built(model, inputs, ADAPTIVE["rodas5p"])
     engine, members = integrator.compiled(), next(iter(x0.values())).size
@@ -257,19 +257,19 @@ THREADED, SAMPLED, REPEATS = 10_000, 200, 3
 
 
 class EnsembleRow(NamedTuple):
-    """An ensemble over start velocities, on threads.
+    """Ensemble over start velocities, on threads.
 
     Attributes:
         case: scene and law.
-        rtol: tolerance of both integrators.
-        members: how many runs.
-        workers: threads.
-        time_s: shortest wall time of the call [s], of a few.
-        member_s: of that, time per member [s].
+        rtol: relative tolerance of both integrators.
+        members: number of runs.
+        workers: number of threads.
+        time_s: shortest wall time of the call [s].
+        member_s: time per member [s].
         efficiency: time on one thread over (workers * time).
         error: median relative position error at the end, on a sample of members.
         cvodes_member_s: time per member [s] of a Python loop over cvodes, on the sample.
-        cvodes_error: its error there.
+        cvodes_error: error of cvodes on the sample.
         ratio: cvodes_member_s over member_s.
     """
 
@@ -287,7 +287,7 @@ class EnsembleRow(NamedTuple):
 
 
 def measure_ensemble(case: str, law: Law, quick: bool) -> list[EnsembleRow]:
-    """Rows for one thread, two, four ... and all cores."""
+    """Measure ensembles on one thread, two, four ... and all cores."""
     members, sample = (40, 4) if quick else (THREADED, SAMPLED)
     model, velocities = rabinowicz(law), np.linspace(-0.1, 0.1, members)
     picked = np.linspace(0, members - 1, sample).astype(int)
@@ -357,7 +357,7 @@ TOLERANCES = {"double": 1e-6, "float": 1e-4}
 
 
 def measure_cuda(*, quick: bool = False) -> tuple[CudaRow, ...]:
-    """Rows of all cases in both types; `quick`: of one case, a hundredth of the members."""
+    """Measure all cases in both types; `quick`: one case, a hundredth of the members."""
     members, cases = ON_DEVICE // (100 if quick else 1), CUDA_CASES[:1] if quick else CUDA_CASES
     return tuple(_cuda_row(case, real, members) for case in cases for real in TOLERANCES)
 
@@ -374,7 +374,7 @@ def _cuda_row(case: Case, real: str, members: int) -> CudaRow:
     def run(x0: Array, backend: str) -> tuple[Ensemble, float]:
         began = perf_counter()
         with catch_warnings():
-            simplefilter("ignore", UserWarning)  # that the tolerance of single precision is loose
+            simplefilter("ignore", UserWarning)  # the tolerance of single precision is loose
             found = simulate_many(
                 model, end, x0={state: x0}, rtol=rtol, backend=backend,
                 real=real if backend == "cuda" else "double",

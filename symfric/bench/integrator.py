@@ -1,4 +1,4 @@
-"""Run time against error on Rabinowicz's stick-slip, ours and other integrators; derivatives."""
+"""Run time against error on Rabinowicz's stick-slip, for symfric and other integrators."""
 
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, suppress
@@ -30,19 +30,19 @@ Array = NDArray[np.float64]
 T_END = 20.0
 TIMES = np.linspace(0.0, T_END, 401)[1:]
 STARTS = (-0.05, -0.01, 0.03, 0.06, 0.09)
-"""Start velocities [m/s]; one run alone may be lucky."""
+"""Start velocities [m/s]; the result of a single run may be accidental."""
 CASES: dict[str, Law] = {"rabinowicz/brown_mcphee": BrownMcPhee(), "rabinowicz/lugre": LuGre()}
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 ERRORS = (1e-4, 1e-5, 1e-7)
 
 
 class Row(NamedTuple):
-    """One integrator at one tolerance.
+    """Result of one integrator at one tolerance.
 
     Attributes:
         error: median over the start velocities of the largest position error at 400 times,
             relative to the largest position.
-        time_s: median over them of the shortest processor time of a call [s].
+        time_s: median over the start velocities of the shortest processor time of a call [s].
         steps: median number of steps (evaluations for SciPy).
     """
 
@@ -55,16 +55,17 @@ class Row(NamedTuple):
 
 
 class SensitivityRow(NamedTuple):
-    """Derivatives of the end of a run by some parameters.
+    """Cost of the derivatives of the final state of a run with respect to parameters.
 
     Attributes:
         case: scene and law.
-        integrator: who computed them.
-        parameters: how many.
-        rtol: tolerance.
-        plain_s: time [s] of the run alone.
-        forward, adjoint: time of the run with derivatives over that of the run alone; forward
-            those of all states, adjoint the gradient of the position; None where it failed.
+        integrator: integrator.
+        parameters: number of parameters.
+        rtol: relative tolerance.
+        plain_s: time of the run alone [s].
+        forward: time with derivatives of all states, relative to the run alone.
+        adjoint: time with the gradient of the position, relative to the run alone; None if it
+            failed.
         error: largest relative error of a derivative of the position.
     """
 
@@ -81,14 +82,14 @@ class SensitivityRow(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Benchmark(table.Report):
-    """All rows of one run of the benchmark.
+    """Results of the integrator benchmark.
 
     Attributes:
         rows: every integrator at every tolerance.
-        skipped: integrator -> why it was not run.
-        first: build, compile and run time [s] of the first call, by case and cache state.
-        ensemble: many runs at once.
-        sensitivities: what derivatives cost.
+        skipped: integrator -> reason why it was not run.
+        first: build, compile and run time [s] of the first call, by case.
+        ensemble: ensembles of runs.
+        sensitivities: cost of derivatives.
     """
 
     rows: tuple[Row, ...]
@@ -98,14 +99,14 @@ class Benchmark(table.Report):
     sensitivities: tuple[SensitivityRow, ...] = ()
 
     def time_at(self, case: str, integrator: str, error: float) -> float:
-        """Time [s] to reach `error`, log-log interpolated on the best rows; NaN if not reached."""
+        """Return the time [s] to reach `error`, log-log interpolated; NaN if not reached."""
         points = sorted(
             (r.error, r.time_s)
             for r in self.rows
             if r.case == case and r.integrator == integrator and r.error > 0
         )
         best: list[tuple[float, float]] = []
-        for e, t in points:  # from the most accurate on; keep what is cheaper than all before
+        for e, t in points:  # from the most accurate; keep rows that are cheaper than all before
             if not best or t < best[-1][1]:
                 best.append((e, t))
         below = [p for p in best if p[0] <= error]
@@ -119,7 +120,7 @@ class Benchmark(table.Report):
         return exp(log(t0) + share * (log(t1) - log(t0)))
 
     def ratios(self, reference: str = "symfric compiled") -> list[dict[str, Any]]:
-        """Time of every integrator over that of `reference` at equal error, where both reach it."""
+        """Return times relative to `reference` at equal error, where both integrators reach it."""
         found: list[dict[str, Any]] = []
         for case in dict.fromkeys(r.case for r in self.rows):
             for error in ERRORS:
@@ -131,11 +132,11 @@ class Benchmark(table.Report):
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return all results as plain data."""
         return table.plain(self) | {"ratios": table.plain(self.ratios())}
 
     def shown(self) -> Iterator[table.Table | str]:
-        """Runs, ratios, ensembles and derivatives."""
+        """Yield tables of runs, ratios, ensembles and derivatives."""
         yield table.of(
             "Time of a run of 20 s against its error", self.rows,
             {"case": "case", "integrator": "integrator", "rtol": "rtol",
@@ -169,16 +170,16 @@ class Benchmark(table.Report):
         yield from table.not_run(self.skipped)
 
     def drawn(self) -> tuple[Any, ...]:
-        """Work-precision diagram: time against error, a panel per case."""
+        """Return the work-precision diagram: time against error, one panel per case."""
         return "work_precision", ((r.case, r.integrator, r.error, r.time_s) for r in self.rows)
 
 
 def bench_integrator(*, quick: bool = False, progress: table.Progress = None) -> Benchmark:
-    """Measure all integrators that this machine has, in one run.
+    """Measure all installed integrators in one run.
 
     Args:
         quick: fewer tolerances, start velocities and members, no SciPy; for tests.
-        progress: called with what is measured and the fraction done.
+        progress: called with the current item and the fraction done.
     """
     rtols = TOLERANCES[2:5] if quick else TOLERANCES
     starts = STARTS[:1] if quick else STARTS
@@ -211,7 +212,7 @@ Maker = Callable[..., Contender]
 
 
 def _integrators(quick: bool) -> tuple[dict[str, tuple[Maker, float]], dict[str, str]]:
-    """Integrator -> (how to make it, tightest tolerance worth its time); what is missing."""
+    """Return integrator -> (maker, smallest tolerance), and reasons for missing integrators."""
     found: dict[str, tuple[Maker, float]] = {}
     skipped: dict[str, str] = {}
     if find_compiler() is not None:
@@ -236,7 +237,7 @@ def _integrators(quick: bool) -> tuple[dict[str, tuple[Maker, float]], dict[str,
 
 
 def _reference(model: Model, v: float) -> Array:
-    """Position by the other of our methods at a tolerance far below all measured ones."""
+    """Return the position by another method at a tolerance far below all measured ones."""
     return simulate(
         model, T_END, x0={"v": v}, rtol=1e-12, t_eval=TIMES, method="rodas4p"
     )["x"]  # fmt: skip
@@ -261,14 +262,14 @@ def _measured(
 
 
 def _first(law: Law) -> dict[str, float]:
-    """Build, compile and run times [s] of a model that was never run, as this machine stands."""
+    """Return build, compile and run times [s] of a new model, with the current compiler cache."""
     backend = "compiled" if find_compiler() else "vm"
     result = simulate(rabinowicz(law), T_END, backend=backend).statistics
     times = (result.build_time, result.compile_time, result.run_time)
     return dict(zip(("build_s", "compile_or_load_s", "run_s"), times, strict=True))
 
 
-# ---- derivatives: forward and backward over the plain run ----
+# ---- derivatives, forward and adjoint, relative to the run alone ----
 
 RTOL, V = 1e-6, 0.02
 FREE = ("mu_s", "mu_d", "k", "m", "v_belt", "g")
@@ -276,7 +277,7 @@ Call = Callable[[], Array]
 
 
 def measure_sensitivities(case: str, law: Law, quick: bool) -> Iterator[SensitivityRow]:
-    """Rows for one parameter and for all, ours in both engines and CasADi's integrators."""
+    """Measure derivatives by one and by all parameters with symfric and CasADi's integrators."""
     for count in (1, len(FREE)):
         names = FREE[:count]
         model = rabinowicz(law, free=names)
@@ -294,7 +295,10 @@ def _costs(
     base, _ = _repeated(alone)
     forward_s, found = _repeated(forward)
     ratio = None
-    with redirect_stderr(StringIO()), suppress(RuntimeError):  # SUNDIALS says more than that
+    with (
+        redirect_stderr(StringIO()),
+        suppress(RuntimeError),
+    ):  # SUNDIALS prints more than the exception
         ratio = _repeated(adjoint)[0] / base
     error = float(np.max(np.abs(found / exact - 1)))
     return SensitivityRow(
@@ -303,7 +307,7 @@ def _costs(
 
 
 def _repeated(call: Call) -> tuple[float, Array]:
-    """Shortest time of a call that is not the first: that one builds and compiles."""
+    """Return the shortest time of later calls; the first call builds and compiles."""
     call()
     return best_time(call)
 
@@ -328,7 +332,7 @@ def _of_ours(model: Model, backend: str, names: tuple[str, ...]) -> tuple[Call, 
 
 
 def _of_peer(model: Model, plugin: str) -> tuple[Call, Call, Call]:
-    """CasADi's integrator; start values that follow parameters are differentiated along."""
+    """Return the calls of CasADi's integrator, with start values that depend on parameters."""
     whole, inputs = equations(model, T_END)
     name = "rosenbrock" if plugin == "rosenbrock" else "sundials"
     values = model.values("p")

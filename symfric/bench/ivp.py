@@ -1,4 +1,4 @@
-"""Correct digits and run time on problems of others with published solutions."""
+"""Correct digits and run time on published initial-value problems with known solutions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,17 +22,17 @@ TOLERANCES = (1e-6, 1e-8, 1e-10)
 
 
 class IvpRow(NamedTuple):
-    """One method on one problem at one tolerance.
+    """Result of one method on one problem at one tolerance.
 
     Attributes:
         scd: significant correct digits of the worst signal at the end, -log10 of its relative
-            error; -inf where the end was not reached.
-        worst: that signal.
-        wanted: digits aimed at.
-        steps, rejections: accepted and rejected.
-        time_s: shortest time of a call [s], equations built and compiled before.
-        drift: largest value that a constraint has at an accepted step; 0 without constraints.
-        message: why the end was not reached, else empty.
+            error; -inf if the end was not reached.
+        worst: signal with the largest error.
+        wanted: required digits.
+        steps, rejections: accepted and rejected steps.
+        time_s: shortest time of a call [s], without building and compiling.
+        drift: largest value of a constraint at an accepted step; 0 without constraints.
+        message: reason why the end was not reached, else empty.
     """
 
     problem: str
@@ -51,16 +51,16 @@ class IvpRow(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class IvpBenchmark(table.Report):
-    """All rows of one run of the benchmark."""
+    """Results of the benchmark on initial-value problems."""
 
     rows: tuple[IvpRow, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Rows; digits that are none are null."""
+        """Return the rows and the sources of the problems; infinite digits are None."""
         return table.plain(self) | {"sources": {p.name: p.source for p in PROBLEMS}}
 
     def shown(self) -> Iterator[table.Table | str]:
-        """Digits, steps and times, and the drift of constraints."""
+        """Yield tables of digits, steps and times, and of the drift of constraints."""
         run: dict[str, table.Column] = {"problem": "problem", "method": "method", "rtol": "rtol"}
         yield table.of(
             "Correct digits of the worst signal at the end", self.rows,
@@ -78,7 +78,7 @@ class IvpBenchmark(table.Report):
         )
 
     def drawn(self) -> tuple[Any, ...]:
-        """Work-precision diagram: time against relative error, a panel per problem."""
+        """Return the work-precision diagram: time against relative error, one panel per problem."""
         points = ((r.problem, r.method, 10**-r.scd, r.time_s) for r in self.rows if r.scd > -inf)
         return "work_precision", points, "relative error [1]"
 
@@ -93,8 +93,8 @@ def bench_ivp(
 
     Args:
         quick: rtol 1e-6 only.
-        problems: which ones.
-        progress: called with what is measured and the fraction done.
+        problems: problems to measure.
+        progress: called with the current item and the fraction done.
     """
     rows: list[IvpRow] = []
     for problem in table.each(problems, progress, lambda problem: problem.name):
@@ -111,9 +111,9 @@ def measure(
     """Integrate one problem and count its correct digits.
 
     Args:
-        problem, model: what, and its equations.
+        problem, model: problem and its equations.
         method, rtol: as in `simulate`.
-        backend: likewise; by default compiled where there is a compiler.
+        backend: as in `simulate`; default: compiled if there is a compiler.
     """
     engine = backend or ("compiled" if find_compiler() else "vm")
     solve = partial(
@@ -139,18 +139,18 @@ def measure(
 
 
 def correct_digits(problem: Problem, run: Trajectory) -> tuple[float, str]:
-    """Digits of the worst signal at the end, and which one that is."""
+    """Return the correct digits of the worst signal at the end, and its name."""
     end = run.final
     errors = {
         name: abs(end[name] - value) / abs(value) for name, value in problem.reference.items()
     }
     worst = max(errors, key=lambda name: errors[name])
-    # a double has no more digits than its rounding
+    # rounding limits the digits of a double
     return float(-np.log10(max(errors[worst], float(np.finfo(float).eps)))), worst
 
 
 def _drift(problem: Problem, run: Trajectory) -> float:
-    """Largest value of a constraint at accepted steps."""
+    """Return the largest value of a constraint at accepted steps."""
     if not problem.drift or run.step_times.size < 2:
         return 0.0
     at = run.at(run.step_times)

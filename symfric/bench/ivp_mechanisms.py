@@ -1,4 +1,4 @@
-"""Initial-value problems of mechanisms: Andrews' squeezer (by equations, by joints), car axis."""
+"""Initial-value problems of mechanisms: Andrews' squeezer (two formulations) and car axis."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,24 +23,13 @@ I1, I2, I3, I4 = 2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7
 I5, I6, I7 = 1.169e-5, 5.667e-7, 1.912e-5
 XA, YA, XB, YB, XC, YC = -0.06934, -0.00227, -0.03635, 0.03273, 0.014, 0.072
 C0, L0, TORQUE = 4530.0, 0.07785, 0.033
-D, DA, E, EA, RR, RA, SS, SA, SB = (
-    28e-3,
-    115e-4,
-    2e-2,
-    1421e-5,
-    7e-3,
-    92e-5,
-    35e-3,
-    1874e-5,
-    1043e-5,
-)
-SC, SD, TA, TB, U, UA, UB, ZF, ZT, FA = (
-    18e-3, 2e-2, 2308e-5, 916e-5, 4e-2, 1228e-5, 449e-5, 2e-2, 4e-2, 1421e-5,
-)  # fmt: skip
+D, DA, E, EA, RR, RA = 28e-3, 115e-4, 2e-2, 1421e-5, 7e-3, 92e-5
+SS, SA, SB, SC, SD = 35e-3, 1874e-5, 1043e-5, 18e-3, 2e-2
+TA, TB, U, UA, UB, ZF, ZT, FA = 2308e-5, 916e-5, 4e-2, 1228e-5, 449e-5, 2e-2, 4e-2, 1421e-5
 
 
 def mass(q: ca.SX) -> ca.SX:
-    """Mass matrix M(q)."""
+    """Return the mass matrix M(q)."""
     theta, phi, omega = q[1], q[3], q[5]
     M = ca.SX(7, 7)
     M[0, 0] = M1 * RA**2 + M2 * (RR**2 - 2 * DA * RR * ca.cos(theta) + DA**2) + I1 + I2
@@ -63,7 +52,7 @@ def mass(q: ca.SX) -> ca.SX:
 
 
 def forces(q: ca.SX, v: ca.SX) -> ca.SX:
-    """Motor, spring, and what the motion itself exerts, f(q, q')."""
+    """Return the generalised forces f(q, q') of motor, spring and velocity terms."""
     _, theta, gamma, phi, _, omega, _ = ca.vertsplit(q)
     beta_p, theta_p, _, phi_p, delta_p, omega_p, epsilon_p = ca.vertsplit(v)
     xd = SD * ca.cos(gamma) + SC * ca.sin(gamma) + XB
@@ -84,7 +73,7 @@ def forces(q: ca.SX, v: ca.SX) -> ca.SX:
 
 
 def constraints(q: ca.SX) -> ca.SX:
-    """Three loops that close, g(q) = 0 [m]."""
+    """Return the residuals g(q) [m] of the three closed loops."""
     beta, theta, gamma, phi, delta, omega, epsilon = ca.vertsplit(q)
     x = RR * ca.cos(beta) - D * ca.cos(beta + theta)
     y = RR * ca.sin(beta) - D * ca.sin(beta + theta)
@@ -101,8 +90,8 @@ def constraints(q: ca.SX) -> ca.SX:
 def andrews() -> Model:
     """Andrews' squeezing mechanism: seven bodies in a plane, driven by a motor.
 
-    The test set gives it with index 3. Here accelerations a and multipliers lam are unknowns and
-    the constraints stand as accelerations (index 1):
+    The test set uses index 3. Here accelerations a and multipliers lam are unknowns, and the
+    constraints are imposed on accelerations (index 1):
 
         M(q) a + G(q)' lam = f(q, q'),   G(q) a + g_qq(q) (q', q') = 0
 
@@ -151,14 +140,14 @@ TURNED = {
     "K1": ("beta",), "K2": ("beta", "theta"), "K3": ("gamma",), "K4": ("phi", "delta"),
     "K5": ("delta",), "K6": ("omega", "epsilon"), "K7": ("epsilon",),
 }  # fmt: skip
-"""Body -> the angles that add up to its own."""
+"""Body -> angles whose sum is the angle of the body."""
 
 
 def mechanism() -> Mechanism:
-    """Andrews' squeezer once more, of joints: nobody derives its equations.
+    """Andrews' squeezer as a mechanism of bodies and joints.
 
-    Seven bodies hang on three pins of the ground; three pins close their loops in one point, E. A
-    motor drives the first hinge, a spring goes from C to D.
+    Seven bodies are attached to three pins of the ground; three pins close their loops at one
+    point, E. A motor drives the first hinge; a spring connects C and D.
     """
     m = Mechanism("squeezer", gravity=(0.0, 0.0, 0.0))
     numbers = zip(MASSES, INERTIAS, CENTRES, strict=True)
@@ -176,7 +165,7 @@ def mechanism() -> Mechanism:
 
 
 def squeezer(formulation: str) -> Model:
-    """Its equations, with the sine of every body's angle among the results."""
+    """Return its equations; in absolute coordinates, outputs include the sines of all angles."""
     made = mechanism().build(formulation=formulation)
     if formulation == "joint":
         return made
@@ -197,19 +186,19 @@ MASS = EPSILON**2 * M / 2
 
 
 def _road(t: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Place of the right wheel's contact; the left one stands at the origin."""
+    """Return the position of the right wheel contact; the left one is at the origin."""
     y = BUMP * ca.sin(OMEGA * t)
     return ca.sqrt(L**2 - y**2), y
 
 
 def _axle(p: ca.SX, t: ca.SX) -> ca.SX:
-    """The left spring stays normal to the chassis' base, the axle keeps its length."""
+    """Return constraints: left spring normal to the base of the chassis, constant axle length."""
     (xl, yl, xr, yr), (xb, yb) = ca.vertsplit(p), _road(t)
     return ca.vertcat(xl * xb + yl * yb, (xl - xr) ** 2 + (yl - yr) ** 2 - L**2)
 
 
 def _springs(p: ca.SX, t: ca.SX) -> ca.SX:
-    """Springs and weight."""
+    """Return the forces of springs and weight."""
     (xl, yl, xr, yr), (xb, yb) = ca.vertsplit(p), _road(t)
     left, right = ca.sqrt(xl**2 + yl**2), ca.sqrt((xr - xb) ** 2 + (yr - yb) ** 2)
     return ca.vertcat(
@@ -223,10 +212,10 @@ def _springs(p: ca.SX, t: ca.SX) -> ca.SX:
 def car_axis() -> Model:
     """Car axis: an axle on two springs over a bumpy road.
 
-    The test set gives it with index 3. Here accelerations and multipliers are unknowns and the
-    constraints stand as accelerations (index 1): K p'' = f(p, t) + c_p' lam, d^2 c / dt^2 = 0.
-    Positions of both ends of the axle, their rates, accelerations and two multipliers. One end
-    moves by 3 mm only: that is what is small.
+    The test set uses index 3. Here accelerations and multipliers are unknowns, and the constraints
+    are imposed on accelerations (index 1): K p'' = f(p, t) + c_p' lam, d^2 c / dt^2 = 0. Positions
+    of both ends of the axle, their rates, accelerations and two multipliers. Nominal values are
+    small because one end moves by 3 mm only.
     """
     starts = {"xl": 0.0, "yl": 0.5, "xr": 1.0, "yr": 0.5}
     rates = {"xl": -0.5, "yl": 0.0, "xr": -0.5, "yr": 0.0}
@@ -242,7 +231,7 @@ def car_axis() -> Model:
     c = _axle(p, t)
 
     def rate(of: ca.SX) -> ca.SX:
-        """Total derivative by time, accelerations included."""
+        """Return the total time derivative, including accelerations."""
         return ca.jacobian(of, p) @ v + ca.jacobian(of, v) @ a + ca.jacobian(of, t)
 
     return Model(
@@ -275,4 +264,4 @@ PROBLEMS = (
     JOINT,
     published("car axis", car_axis, drift=("c_1", "c_2")),
 )
-"""All problems that are measured."""
+"""All problems of the benchmark."""

@@ -1,4 +1,4 @@
-"""Initial-value problems with published solutions; those of mechanisms are in `ivp_mechanisms`."""
+"""Initial-value problems with published solutions; see also `ivp_mechanisms`."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -21,17 +21,17 @@ TEST_SET = (
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """An initial-value problem and its published end.
+    """Initial-value problem and its published solution at the end.
 
     Attributes:
-        name: as in the literature.
-        model: makes the equations.
-        t_end: end of the span from 0.
-        reference: signal -> its published value at the end.
-        source: of equations and reference.
-        digits: correct ones wanted at rtol 1e-6 and at 1e-10.
-        drift: outputs of the model that are zero on the exact solution: constraints of a problem
-            of higher index in its index-reduced form.
+        name: name in the literature.
+        model: function that builds the equations.
+        t_end: end time; the problem starts at 0.
+        reference: signal -> published value at the end.
+        source: source of equations and reference.
+        digits: rtol -> required correct digits.
+        drift: outputs that are zero on the exact solution: constraints of a problem of higher
+            index in its index-reduced form.
         laborious: methods that need millions of steps below rtol 1e-6.
     """
 
@@ -49,7 +49,7 @@ PUBLISHED = tomllib.loads(Path(__file__).with_name("ivp_problems.toml").read_tex
 
 
 def published(name: str, model: Callable[[], Model], **more: Any) -> Problem:
-    """A problem of the test set with its stored solution."""
+    """Return a problem of the test set with its stored solution."""
     found = dict(PUBLISHED[name])
     return Problem(name, model, found.pop("t_end"), found, **more)
 
@@ -57,7 +57,7 @@ def published(name: str, model: Callable[[], Model], **more: Any) -> Problem:
 def unknowns(
     starts: Sequence[float], nominal: Sequence[float], unit: str = "1"
 ) -> tuple[Variable, ...]:
-    """Variables y1, y2, ..., as the test set calls them."""
+    """Return variables y1, y2, ..., named as in the test set."""
     every = zip(starts, nominal, strict=True)
     return tuple(
         Variable(f"y{i}", unit, start=float(start), nominal=size)
@@ -88,7 +88,7 @@ def hires() -> Model:
 def robertson() -> Model:
     """Robertson's autocatalytic reactions, over eleven decades of time.
 
-    Two of the three concentrations end at 2e-8 and 8e-14: that is what is small for them.
+    Two of the three concentrations end at 2e-8 and 8e-14, which determine their nominal values.
     """
     x = unknowns([1, 0, 0], [1e-8, 1e-13, 1])
     y1, y2, y3 = (v.symbol for v in x)
@@ -97,7 +97,7 @@ def robertson() -> Model:
 
 
 def van_der_pol() -> Model:
-    """Van der Pol's oscillator, with relaxations a million times faster than its period.
+    """Van der Pol oscillator, with relaxations a million times faster than its period.
 
     Scaled to a period of order 1.
     """
@@ -147,9 +147,9 @@ def akzo_nobel() -> Model:
 
 
 def transistor_amplifier() -> Model:
-    """A transistor amplifier: M y' = f(y, t) with a singular M, capacitors between nodes; index 1.
+    """Transistor amplifier: M y' = f(y, t) with a singular M, capacitors between nodes; index 1.
 
-    Node voltages; currents at each node sum to zero. Given as it stands, no M is inverted.
+    Node voltages; currents at each node sum to zero. The equations stay implicit in y'.
     """
     SUPPLY, THERMAL, ALPHA, BETA, R0, R = 6.0, 0.026, 0.99, 1e-6, 1e3, 9e3
     capacities = tuple(k * 1e-6 for k in range(1, 6))
@@ -178,7 +178,7 @@ def transistor_amplifier() -> Model:
 
 
 def _capacities(capacities: Sequence[float]) -> ca.DM:
-    """Capacitors C1, C3, C5 between two nodes each, C2 and C4 to ground."""
+    """Return M for capacitors C1, C3, C5 between two nodes each, C2 and C4 to ground."""
     C1, C2, C3, C4, C5 = capacities
     M = np.diag([-C1, -C1, -C2, -C3, -C3, -C4, -C5, -C5])
     for i, C in ((0, C1), (3, C3), (6, C5)):
@@ -200,7 +200,7 @@ def pleiades() -> Model:
     x, y, velocities = every[:7], every[7:14], every[14:]
 
     def pull(along: list[ca.SX], i: int) -> ca.SX:
-        """Acceleration of star i."""
+        """Return the acceleration of star i."""
         others = (j for j in range(7) if j != i)
         return sum(
             (
@@ -215,9 +215,9 @@ def pleiades() -> Model:
 
 
 def ring_modulator() -> Model:
-    """The ring modulator: mixes a low and a high frequency; parasitic capacities of 2 pF.
+    """Ring modulator: mixes a low and a high frequency; parasitic capacitances of 2 pF.
 
-    Seven voltages and eight currents; highly oscillatory, and stiff by the small CS.
+    Seven voltages and eight currents; highly oscillatory, and stiff because CS is small.
     """
     C, CS, CP, R, RP = 1.6e-8, 2e-12, 1e-8, 25e3, 50.0
     LH, LS1, LS2, LS3 = 4.45, 2e-3, 5e-4, 5e-4
@@ -263,4 +263,4 @@ PROBLEMS = (
     published("Pleiades", pleiades, digits={1e-6: 3, 1e-10: 7}),
     published("ring modulator", ring_modulator, laborious=("radau5",)),
 )
-"""Those without constraints."""
+"""Problems without constraints."""

@@ -21,7 +21,7 @@ def test_one_of_the_phenomena_is_enough() -> None:
 def test_arguments_of_a_figure_that_changed_places_are_named() -> None:
     cases: tuple[tuple[Any, Any, str], ...] = (
         ("hysteresis", LuGre(), r"write figure\(law, 'hysteresis'\)"),
-        ("lugre", "hysteresis", r"figure: expected a law .*law_from_text\('lugre'\) makes one"),
+        ("lugre", "hysteresis", r"figure: expected a law .*use law_from_text\('lugre'\)"),
         (LuGre, "hysteresis", r"write LuGre\(\) with parentheses"),
         (LuGre(), 3, "figure: name: expected a text, got 3"),
         (LuGre(), "hysterese", "did you mean hysteresis"),
