@@ -82,7 +82,7 @@ def test_a_block_is_generated_as_it_is(tmp_path):
         (LuGre(), {"real": "half"}, "expected one of double, float, got half"),
         (LuGre(), {"real": ()}, "expected double, float or both, got none"),
         (LuGre(), {"free": ("mu",)}, "got mu"),
-        (GMS(), {}, "act on each other in a circle"),
+        (GMS(), {}, "have circular dependencies"),
         (LuGre(mu_s=0.3), {"free": (), "h": 1e-60}, "would become 0"),
         (Block("b", outputs={"y": Output(1.0, "m")}), {"h": 1e-3}, "with a law only, got a block"),
     ],

@@ -313,8 +313,8 @@ def test_parameters_without_effect_do_not_appear():
 @pytest.mark.parametrize(
     ("law", "options", "message"),
     [
-        (GMS(), {}, "gms.*states that act on each other in a circle; gms with form = 'event'"),
-        (Leuven(), {}, "act on each other in a circle"),
+        (GMS(), {}, "gms.*states that have circular dependencies; gms with form = 'event'"),
+        (Leuven(), {}, "have circular dependencies"),
         (ExactCoulomb(), {}, "modes follow zero crossings within the step; karnopp and leine"),
         (Karnopp(form="event"), {}, "got one whose modes follow zero crossings"),
         (Dahl(), {"free": ("rho_eps",)}, "free: expected parameters that have an effect"),
@@ -325,7 +325,7 @@ def test_parameters_without_effect_do_not_appear():
         (LuGre(), {"h": 0.0}, r"h: expected a number > 0 \[s\]"),
         (LuGre(), {"h": float("nan")}, r"h: expected a number > 0 \[s\]"),
         (LuGre(), {"name": "my law"}, "C identifier, got 'my law'"),
-        (LuGre(), {"free": ("mu_s",), "fold": True}, "fold: expected none beside free"),
+        (LuGre(), {"free": ("mu_s",), "fold": True}, "fold: expected none with free"),
         (LuGre(), {"fold": ("mu_z",)}, "fold: expected one of"),
         (LuGre(), {"fold": False}, "expected True, names, or None for the default, got False"),
         (Stribeck(), {"h": 1e-3}, "h: expected none for a law without states, which has no step"),
@@ -368,5 +368,5 @@ def test_sum_takes_the_step_of_each_term():
 def test_sum_with_a_term_that_has_no_step_is_refused_by_reason():
     with pytest.raises(ValueError, match="modes follow zero crossings"):
         law_block(Sum((LuGre(), ExactCoulomb())))
-    with pytest.raises(ValueError, match="act on each other in a circle"):
+    with pytest.raises(ValueError, match="have circular dependencies"):
         law_block(Sum((LuGre(), Leuven())))

@@ -77,7 +77,7 @@ def test_a_state_follows_the_mean_of_the_one_it_needs() -> None:
 @pytest.mark.parametrize(
     ("rate", "message"),
     [
-        (ca.vertcat(z[1], -z[0]), "here: .* act on each other in a circle"),
+        (ca.vertcat(z[1], -z[0]), "here: .* have circular dependencies"),
         (ca.vertcat(z[1] - z[0] ** 3, -z[1]), "here: .* states that depend on others"),
     ],
 )

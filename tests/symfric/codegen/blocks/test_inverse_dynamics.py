@@ -203,10 +203,10 @@ def driven() -> Mechanism:
     [
         (lambda: FourBar(BrownMcPhee()).mechanism(), "open chain or tree, got loops that close in"),
         (ball, "Euler parameters in socket"),
-        (lambda: rotor(ExactCoulomb()), "v and N alone, got ExactCoulomb"),
-        (lambda: rotor(Leuven()), "circle"),
-        (driven, "without time"),
-        (cross, "that of cardan, which other friction presses"),
+        (lambda: rotor(ExactCoulomb()), "only v and N, got ExactCoulomb"),
+        (lambda: rotor(Leuven()), "circular dependencies"),
+        (driven, "time-independent"),
+        (cross, "that of cardan, which depends on other friction"),
     ],
 )
 def test_what_it_cannot_do_is_refused_by_name(make, text):
