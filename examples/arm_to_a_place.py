@@ -1,12 +1,12 @@
 """Bring the last link of a six-joint arm to a place: three coordinates are given, six angles not.
 
-Every joint rubs under the reaction of all links beyond it. The goal is a point in the room and all
+Every joint rubs under the reaction of all links beyond it. The goal is a point in space and all
 joints at rest; which angles the arm has there is the optimiser's choice. On the way the link stays
 above a table.
 
 The cost adds the speeds of the joints to the torques: torques alone leave so much open that the
 minimum is flat. Friction stays smooth here, 0.05 m/s wide: six contacts, whose normal forces depend
-on each other, have too many modes to be told apart. The loads of the bearings of the wrist pass
+on each other, have too many modes to be distinguished. The loads of the bearings of the wrist pass
 zero, where their size has a kink; it is rounded over 0.5 N.
 
     python examples/arm_to_a_place.py [OUT]

@@ -60,7 +60,7 @@ def problem() -> Problem:
 
 
 def main(out: Path) -> None:
-    """With the best spring, and with some others."""
+    """Compare the best spring with some others."""
     chosen = problem()
     best = solve(chosen)
     table = Table("spring [N/m]", "J [N^2 s]", "verified")

@@ -4,7 +4,7 @@
 
 LuGre's law is fitted to forces at constant speeds, which show its levels; the stiffness of the
 bristles, which they do not show, is guessed at half of what it is. The law becomes a compensator,
-and the C of it runs at 1 kHz beside a cascaded position controller whose encoder counts micrometres
+and the C of it runs at 1 kHz with a cascaded position controller whose encoder counts micrometres
 and whose force comes one sample late: on a sine, and at rest after a step, where the integrator of
 the controller hunts. The plants have bristles, elasto-plastic bristles, or Coulomb friction with an
 exact break-away.

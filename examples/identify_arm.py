@@ -67,7 +67,7 @@ def recorded(seed: int, duration: float = 6.0, rate: float = 400.0) -> Dataset:
     waves = {name: 2 * np.pi * rng.uniform(0.15, 0.6, 3) for name in JOINTS}
 
     def pull(t: Any, name: str) -> Any:
-        """What the servo adds to -STIFFNESS q - DAMPING q' [N m]."""
+        """Return the torque [N m] that the servo adds to -STIFFNESS q - DAMPING q'."""
         return sum(
             size * (STIFFNESS * (1 - cos(w * t)) + DAMPING * w * sin(w * t))
             for w, size in zip(waves[name], (0.5, 0.3, 0.2), strict=True)
@@ -86,7 +86,7 @@ def recorded(seed: int, duration: float = 6.0, rate: float = 400.0) -> Dataset:
 
 
 def main(out: Path) -> None:
-    """Fit two records together, from twice the values, and print beside what was put in."""
+    """Fit two records together, from twice the values, and print them with the true values."""
     start = {n: 2.0 * x for n, x in TRUE.items()}
     data = recorded(1) + recorded(2)
     found = Fit(InverseDynamics(), arm(servo=False), data, free=start).solve()

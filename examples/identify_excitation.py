@@ -38,7 +38,7 @@ def machine() -> Model:
 
 
 def best_sine(model: Model) -> Trajectory:
-    """Of sines within the limits the one that tells most."""
+    """Return the most informative sine within the limits."""
     found: list[Trajectory] = []
     for w in 2 * np.pi * np.arange(0.5, 4.1, 0.5):
         for size in np.linspace(0.25, 1.0, 7) * FORCE:

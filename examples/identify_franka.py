@@ -49,7 +49,7 @@ def made_up(path: Path) -> Path:
 
 
 def laws() -> dict[str, tuple[LuGre | GMS, list[str]]]:
-    """Laws, and what is fitted beside levels, viscous coefficient and Stribeck velocity."""
+    """Laws, and what is fitted besides levels, viscous coefficient and Stribeck velocity."""
     gms = GMS(elements=tuple(Element(1e3, 1 / 3) for _ in range(3)), form="event")
     return {
         "LuGre": (LuGre(), ["delta"]),

@@ -25,7 +25,7 @@ T = np.linspace(0.0, 10.0, 2001)
 
 
 def measured() -> Dataset:
-    """What two displacement sensors would have seen."""
+    """Return the record of two displacement sensors."""
     run = simulate(QuarterCar(TRUTH).model(), 10.0, t_eval=T, rtol=1e-9)
     body, wheel = NOISE * np.random.default_rng(0).standard_normal((2, T.size))
     return Dataset.of(

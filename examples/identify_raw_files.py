@@ -58,7 +58,7 @@ def write(folder: Path) -> None:
 
 
 def read(at: Path) -> dict[str, Callable[[], Dataset]]:
-    """How each is read."""
+    """Read each file."""
     names, units = ["t", "x", "force"], "rad, N m"
     german = {"t": "Zeit", "x": "Winkel", "force": "Moment"}
     return {
@@ -81,7 +81,7 @@ def read(at: Path) -> dict[str, Callable[[], Dataset]]:
 
 
 def main(out: Path) -> None:
-    """Write, read, check and fit; print every file beside the truth."""
+    """Write, read, check and fit; print every file with the true values."""
     out.mkdir(parents=True, exist_ok=True)
     write(out)
     result = Table("file", "records", "found in the data", "mu_s", "mu_d", "v_s", "sigma_2")

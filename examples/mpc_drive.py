@@ -39,7 +39,7 @@ def controller() -> Controller:
 
 
 def plants() -> dict[str, Model]:
-    """What is really there."""
+    """Return the real plants."""
     bristles = LuGre(mu_s=6.0, mu_d=4.0, v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0)
     return {
         "sharp": rubbing(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-4)),

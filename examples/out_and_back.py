@@ -3,7 +3,7 @@
     m v' = force - F(v),   m = 1 kg,   |force| <= 20 N,   J = integral of force^2
 
 F is dry friction, 6 N to break away, 4 N while sliding, and 0.5 N s/m. Two phases of 1 s each; when
-the mass sticks, and for how long, nobody says: the solver finds out, and re-simulates the result.
+the mass sticks, and for how long, is not prescribed: the solver finds it and re-simulates it.
 With exact Coulomb friction the mass turns without a rest, and the optimum is known on paper:
 
     J = 40 + 0.5 / (1 - 4 tanh(1/4)) N^2 s
@@ -34,7 +34,7 @@ def problem() -> Problem:
 
 
 def modes(best: Solution) -> Table:
-    """What the friction does, when."""
+    """Return the contact modes over time."""
     table = Table("contact", "mode", "from [s]", "to [s]")
     for contact, parts in best.modes.items():
         for mode in parts:

@@ -1,4 +1,4 @@
-"""What a test rig must do under a wheel so that the body of the car rises most gently.
+"""Motion of a test rig under a wheel that lifts the body of the car most gently.
 
 A quarter car stands on a plate; body 240 kg, wheel 40 kg, suspension 28.9 kN/m and 260 N s/m, tyre
 920 kN/m and 3886 N s/m. The strut leans by 45 degrees and presses the body against its guide,

@@ -4,7 +4,7 @@ LuGre's bristles give way before they slip, so that a control that is exact for 
 with stiction misses with them. Collocation does not follow them: their time constants run from
 microseconds in sliding to milliseconds at rest. Shooting by exponential steps does.
 
-1. The control nearest to the given one with which the law itself does what is asked for
+1. The control nearest to the given one with which the law itself does what is required
    (`project_control`).
 2. The problem itself from there, for a few iterations: the kink of the law at reversals makes
    Newton's method go round, and the best motion on the way that keeps all conditions is taken.
@@ -56,7 +56,7 @@ KEPT = 1e-6
 @final
 @dataclass(frozen=True, eq=False)
 class OriginalLaw:
-    """What the solves share.
+    """Data shared by the solves.
 
     Attributes:
         problem: the user's, whose laws have states.

@@ -50,7 +50,7 @@ def solve(
     ends, on the way and between the nodes, says the verification, which decides: a solution that
     misses is none.
 
-    Where a contact holds at rest, one solve of the problem as it stands ends in the next of many
+    Where a contact holds at rest, one direct solve of the problem ends in the next of many
     local optima and misses. `friction` says what is done:
 
         "auto"     "modes" where the layer of the law is narrower than a hundredth of the speeds;

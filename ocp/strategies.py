@@ -54,7 +54,7 @@ FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeErro
 @final
 @dataclass(frozen=True, eq=False)
 class Direct:
-    """Solves of a problem as it stands, on meshes that follow from its errors.
+    """Direct solves of a problem, on meshes that follow from its errors.
 
     Attributes:
         problem, scheme, solver, intervals, progress: as in `ocp.solve`.
@@ -184,7 +184,7 @@ class ModeSearch:
     margin: float
 
     def near(self, sharp: Sharp) -> Judged:
-        """The exact motion next to a sharpened one, verified with the user's own laws."""
+        """The exact motion next to a sharpened one, verified with the user's laws."""
         direct, problem = self.direct, self.direct.problem
         speeds = speeds_at(problem, sharp.scales, sharp.level)
         solver = direct.solver if isinstance(direct.solver, Ipopt) else Ipopt()
@@ -298,7 +298,7 @@ def _by_shooting(search: ModeSearch, guess: Start, starts: int) -> Solution:
 def _by_homotopy(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
     """Layers from wide to narrow, and modes where these are found; directly where layers fail."""
     problem = search.direct.problem
-    reason = _refused(problem) if friction != "sharpen" else "not asked for"
+    reason = _refused(problem) if friction != "sharpen" else "not requested"
     if reason and friction == "modes":
         raise ValueError(f"solve: friction 'modes': {reason}")
     path = search.direct.sharpened(guess, starts, 0.0 if reason else LAST)
@@ -371,12 +371,12 @@ def _without_states_of_laws(solution: Solution, found: Verification) -> Verifica
 
 
 def _events(problem: Problem) -> list[str]:
-    """Names of events of the models, which no solve of the problem as it stands follows."""
+    """Names of events of the models, which no direct solve of the problem follows."""
     return [*dict.fromkeys(e.name for span in problem.spans for e in span.model.events)]
 
 
 def _refused(problem: Problem) -> str:
-    """Why modes cannot be sought; mostly empty."""
+    """Return the reason why modes cannot be sought, usually ""."""
     try:
         return refusal(problem)
     except FAILURES as error:

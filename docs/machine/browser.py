@@ -139,7 +139,7 @@ class Browser:
 
 LOOK = Path(__file__).with_name("look.js").read_text("utf-8")
 QUIET = ("search.html", "genindex.html", "py-modindex.html")
-"""Pages that are nearly empty before somebody asks."""
+"""Pages that are nearly empty until the user interacts."""
 SOUGHT = "stribeck"
 """Word that the search must find."""
 

@@ -245,7 +245,7 @@ class _Row:
     inside_bars = False
 
     def factor(self) -> tuple[str, str]:
-        """One factor with its power: as it stands, and without its brackets where it has any."""
+        """One factor with its power: unchanged, and without its brackets where it has any."""
         drawn, inner = self.primary()
         if self.seen() != "^":
             return drawn, inner

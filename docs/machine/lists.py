@@ -70,7 +70,7 @@ def _link(public: Public, elsewhere: dict[int, str]) -> str:
 
 
 def entry(public: Public) -> str:
-    """One name in full, from its docstring."""
+    """Return the page of one public name, from its docstring."""
     item: Any = public.object
     if inspect.isclass(item):
         kind = "autoexception" if issubclass(item, BaseException) else "autoclass"

@@ -42,7 +42,7 @@ def _is_text(statement: object) -> bool:
 
 @cache
 def code_hash() -> str:
-    """Of all code that pictures come from, less the packages that are left out."""
+    """Return the hash of all code that pictures depend on, without the excluded packages."""
     files = [p for name in PACKAGES for p in sorted((ROOT / name).rglob("*.py"))]
     kept = [p for p in files if p.relative_to(ROOT).parts[1] not in ASIDE]
     return digest(f"{p.relative_to(ROOT)} {code_of(p)}" for p in kept)

@@ -116,7 +116,7 @@ if __name__ == "__main__":
 
 
 KEYS = ("title", "about", "command", "date", "commit", "machine", "load", "seconds", "tables")
-"""What `docs.machine.measure` writes; "short", what people condensed, may stand beside."""
+"""What `docs.machine.measure` writes; "short", a hand-written summary, may be added."""
 SHORT = ("command", "date", "commit", "machine", "tables")
 """What stands under "short": tables that people made of a longer measurement."""
 
@@ -131,7 +131,7 @@ def page() -> str:
     """All measurements, each with command, machine, load, date and commit."""
     text = rst.title("Benchmarks")
     text += (
-        "Measured numbers, kept as files beside this page with command, machine, load, date and "
+        "Measured numbers, kept as files next to this page with command, machine, load, date and "
         "commit. Times are processor times of whole calls from Python unless a table says "
         "otherwise. ``symfric bench SUBJECT`` measures on your machine; ``python -m "
         "docs.machine.measure SUBJECT`` stores what it finds for this page.\n\n"

@@ -70,7 +70,7 @@ def blocks(text: str) -> list[Block]:
 
 
 def written_pages() -> Iterator[Path]:
-    """Every page that somebody wrote, and the README."""
+    """Every hand-written page, and the README."""
     yield ROOT / "README.md"
     for folder in (DOCS, *(DOCS / name for name in ("start", "tutorials", "howto", "theory"))):
         yield from sorted(p for p in folder.glob("*.md") if p != DOCS / "README.md")

@@ -176,7 +176,7 @@ def _paragraph(lines: list[str], linked: Linked) -> str:
 
 
 def shown(block: str, formulas: bool = True) -> str:
-    """An indented block: formulas where every line is an equation, else as it stands."""
+    """An indented block: formulas where every line is an equation, else unchanged."""
     first, *rest = block.rstrip().splitlines()
     margin = len(first) - len(first.lstrip())
     lines = [line[margin:] if line[:margin].isspace() else line.lstrip() for line in [first, *rest]]

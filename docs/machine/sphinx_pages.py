@@ -37,7 +37,7 @@ BARS = re.compile(r"\\[lr]vert(?![A-Za-z])\s?")
 
 
 def mathml(node: nodes.Element, as_block: bool) -> str:
-    """A formula as MathML; a subscript stands beside its letter, also below a dot."""
+    """A formula as MathML; a subscript follows its letter, also below a dot."""
     formula = SIZED.sub("", ACCENTED.sub(r"\1{}_", node.astext())).replace(r"\dots", r"\ldots")
     try:
         found = str(tex2mathml(BARS.sub("|", formula), as_block=as_block))
@@ -122,7 +122,7 @@ def short(
 
 
 def find_type(app: Any, env: Any, node: Any, content: Any) -> Any:
-    """A type in a signature: linked where it is public, as it stands where it is not."""
+    """A type in a signature: linked where it is public, unchanged where it is not."""
     if node.get("refdomain") != "py" or node.get("reftype") not in ("class", "exc", "data"):
         return None
     target = str(node.get("reftarget", ""))
@@ -159,7 +159,7 @@ def setup(app: Any) -> dict[str, bool]:
 
 
 def link(app: Any, tree: nodes.document) -> None:
-    """Make links of the names in a page that somebody wrote."""
+    """Make links of the names in a hand-written page."""
     name = app.env.docname
     if not str(app.env.doc2path(name)).endswith(".md") or name == "changelog":
         return

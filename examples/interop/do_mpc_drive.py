@@ -23,7 +23,7 @@ H, GOAL = 0.02, 0.1
 
 
 def controller() -> Any:
-    """What a user of do-mpc writes; the right-hand side is one call of `flow`."""
+    """Build the controller as users of do-mpc do; the right-hand side is one call of `flow`."""
     believed = drive(BrownMcPhee(v_t=5e-3), m=1.0, N=10.0)
     model = do_mpc.model.Model("discrete", "MX")
     x = model.set_variable("_x", "x", (len(believed.x), 1))

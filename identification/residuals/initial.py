@@ -179,7 +179,7 @@ class Sensed:
         t: times [s], shape (n,).
         measured: state -> its samples, shape (n,).
         noise: state -> standard deviation of the noise on them.
-        told: observed state -> the measured state it follows from, and whether it is its rate.
+        observed_from: observed state -> (measured state it follows from, whether it is its rate).
         slips: contact with bristles -> its sliding velocity as a Function of the observed states,
             and the names of the bristles.
     """
@@ -187,31 +187,31 @@ class Sensed:
     t: Array
     measured: Mapping[str, Array]
     noise: Mapping[str, float]
-    told: Mapping[str, tuple[str, bool]]
+    observed_from: Mapping[str, tuple[str, bool]]
     slips: Mapping[str, tuple[ca.Function, tuple[str, ...]]]
 
     @classmethod
     def of(cls, model: Model, t: Array, measured: Mapping[str, Array]) -> "Sensed":
         """Return the information on `model`, with its contacts."""
-        told = {r: (s, True) for r, s in rates(model).items() if s in measured}
-        told |= {name: (name, False) for name in measured}
-        slips = dict(_slips(model, list(told)))
+        observed_from = {r: (s, True) for r, s in rates(model).items() if s in measured}
+        observed_from |= {name: (name, False) for name in measured}
+        slips = dict(_slips(model, list(observed_from)))
         noise = {name: noise_of(y) for name, y in measured.items()}
-        return cls(t, measured, noise, told, slips)
+        return cls(t, measured, noise, observed_from, slips)
 
     def at(self, k: int) -> dict[str, Begin]:
         """Return the start values at sample k; for bristles if they are unknown or unstrained."""
         here = {
             name: local(self.t, self.measured[source], k, self.noise[source])
-            for name, (source, _) in self.told.items()
+            for name, (source, _) in self.observed_from.items()
         }
         values, errors, scales = list[float](), list[float](), list[float]()
-        for name, (source, is_rate) in self.told.items():
+        for name, (source, is_rate) in self.observed_from.items():
             y, one = self.measured[source], here[name]
             values.append(one.rate if is_rate else one.value)
             errors.append(one.rate_error if is_rate else one.value_error)
             scales.append(self._pace(y) if is_rate else float(np.std(y)))
-        rows = zip(self.told, values, scales, strict=True)
+        rows = zip(self.observed_from, values, scales, strict=True)
         found = {name: Begin(value, scale) for name, value, scale in rows}
         for slip, names in self.slips.values():
             value, slope = (np.ravel(np.array(a)) for a in slip(np.array(values)))
@@ -241,16 +241,16 @@ class Sensed:
 
 
 def _slips(
-    model: Model, told: list[str]
+    model: Model, observed_from: list[str]
 ) -> Iterator[tuple[str, tuple[ca.Function, tuple[str, ...]]]]:
     """Yield sliding velocities in the observed states, for contacts whose laws have bristles.
 
     Bristles are the states that change sign with the velocity; others, such as the age of a
     contact, start as in the model.
     """
-    others = [v for v in model.x if v.name not in told]
+    others = [v for v in model.x if v.name not in observed_from]
     symbols = {v.name: v.symbol for v in model.x}
-    x = ca.vertcat(*(symbols[name] for name in told))
+    x = ca.vertcat(*(symbols[name] for name in observed_from))
     rest = ca.vertcat(*(v.symbol for v in others), model.vector("z"), model.vector("u"))
     for contact in model.contacts:
         pairs = zip(contact.law.states, contact.states, strict=True)

@@ -124,7 +124,7 @@ class Machine:
         model = mode_model(self.model, modes)
         symbols = [model.t, *(model.vector(letter) for letter in "xzup")]
         x, z, rate = symbols[1], symbols[2], _rates(model)
-        rows, events, rooms = list[list[Any]](), list[Event](), dict[str, ca.SX]()
+        rows, events, margins = list[list[Any]](), list[Event](), dict[str, ca.SX]()
         for c, still in zip(self.contacts, self.still, strict=True):
             change = ca.jtimes(c.slip, x, rate) + ca.jacobian(c.slip, model.t)
             mode = modes[c.name]
@@ -137,13 +137,13 @@ class Machine:
             F, size = model.expression(f"{c.name}_reaction"), self.sizes[c.name]
             up, down = (model.expression(f"{c.name}_grip_{side}") for side in ("up", "down"))
             rows.append([up, down, change, F, c.N])
-            for side, room in (("up", up), ("down", down)):
-                share = room / size
+            for side, margin in (("up", up), ("down", down)):
+                share = margin / size
                 events.append(Event(f"{c.name}_slips_{side}", share + OVERLOAD, -1, terminal=True))
-                rooms[f"{c.name}_room_{side}"] = share
+                margins[f"{c.name}_margin_{side}"] = share
         seen = ca.vertcat(ca.SX(0, 5), *(ca.horzcat(*map(ca.SX, row)) for row in rows))
         return InModes(
-            _ending(model, tuple(events), rooms),
+            _ending(model, tuple(events), margins),
             dict(modes),
             ca.Function("unknowns", symbols,
                         [ca.densify(model.alg), ca.densify(ca.jacobian(model.alg, z))]),
@@ -194,7 +194,7 @@ class Machine:
             scale = np.maximum(scale, np.abs(z))
         raise self.undecided(at.t, f"Newton's method found no reactions with {shown(modes)}")
 
-    def room(self, modes: Modes, at: Instant) -> float:
+    def margin(self, modes: Modes, at: Instant) -> float:
         """Return the least friction margin of sticking contacts, over nominal loads; < 0: slip."""
         _, look = self.solved(modes, at)
         found = [
@@ -212,14 +212,14 @@ class Machine:
         )
 
 
-def _ending(model: Model, events: tuple[Event, ...], rooms: Mapping[str, ca.SX]) -> Model:
-    """Return `model` with events, and the integrals of the margins `rooms` as states.
+def _ending(model: Model, events: tuple[Event, ...], margins: Mapping[str, ca.SX]) -> Model:
+    """Return `model` with events, and the integrals of the `margins` as states.
 
     Nothing depends on them. They make error control resolve a short overload of sticking contacts,
     during which nothing moves.
     """
-    states = tuple(Variable(name, "s") for name in rooms)
-    rates = ca.vertcat(ca.SX(0, 1), *rooms.values())
+    states = tuple(Variable(name, "s") for name in margins)
+    rates = ca.vertcat(ca.SX(0, 1), *margins.values())
     return replace(model, events=events, **further_states(model, states, rates))
 
 

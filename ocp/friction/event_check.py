@@ -231,7 +231,7 @@ class _Run:
 
         def room(time: float) -> float:
             x = self._states(run, time)
-            return self.machine.room(
+            return self.machine.margin(
                 modes,
                 Instant(time, x, self.inputs.within_piece(run.span[0], time), self.values, guess),
             )

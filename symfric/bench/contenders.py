@@ -251,7 +251,7 @@ def equations(model: Model, end: float) -> tuple[System, InputData]:
 
 
 def tolerances(whole: System, rtol: float) -> Tolerances:
-    """Those of peers: absolute ones a tenth of the relative one times nominal values."""
+    """Return absolute tolerances of the others: a tenth of the relative one times nominal."""
     return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
 
 

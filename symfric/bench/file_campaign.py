@@ -6,7 +6,7 @@ Every file is written from the same record, so that what a fit says can be held 
 What a file cannot show, marked `hidden`: a force times a constant (a wrong gain, kN for N), times
 or positions times a constant within what machines do, a velocity that is consistent with them, a
 gain of the force that differs by its sign by up to 15 % (1.1 for one sign is answered with a mass
-of 99.9 kg and an offset of -1.7 N, without a word; 1.2 is told). Such files are answered with
+of 99.9 kg and an offset of -1.7 N, unreported; 1.2 is reported). Such files are answered with
 numbers that are right for what they say.
 """
 
@@ -170,7 +170,7 @@ def _unsaid(a: Array) -> Iterator[File]:
     yield File("volts", "bad", table(a, "t [s],x [m],force [V]"))
     yield File("angle and newtons", "bad", table(a, "t [s],x [rad],force [N]"))
     yield File("column twice", "bad", table(a[:, [0, 1, 2, 2]], HEADER + ",force [N]"))
-    yield File("unit nobody knows", "bad", table(a, "t [s],x [furlong],force [N]"))
+    yield File("unknown unit", "bad", table(a, "t [s],x [furlong],force [N]"))
 
 
 def _put(a: Array, rows: Any, column: Any, values: Any) -> Array:
@@ -278,7 +278,7 @@ def _physics(rng: np.random.Generator) -> dict[str, Spoil]:
         "force sensor squares": lambda a: _put(
             a, every, force, np.sign(a[:, 2]) * a[:, 2] ** 2 / 50
         ),
-        "spring beside the drive": lambda a: _put(a, every, force, a[:, 2] + 2e3 * a[:, 1]),
+        "spring parallel to the drive": lambda a: _put(a, every, force, a[:, 2] + 2e3 * a[:, 1]),
         "friction grows on the way": lambda a: _put(
             a, every, force, a[:, 2] * (1 + 10 * np.abs(a[:, 1]))
         ),

@@ -234,7 +234,7 @@ def _solved(o: ca.Opti, end: ca.MX, u: ca.MX) -> tuple[Array, str, int]:
 
 
 def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, int]:
-    """With rockit: `set_next` takes `flow`, `set_der` the right-hand side."""
+    """Solve with rockit: `set_next` takes `flow`, `set_der` the right-hand side."""
     rockit: Any = import_module("rockit")
     o = rockit.Ocp(T=T)
     x, u = o.state(len(model.x)), o.control()
@@ -260,7 +260,7 @@ def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, 
 
 
 def do_mpc_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, int]:
-    """With do-mpc: the first plan of a controller whose horizon is the whole move."""
+    """Solve with do-mpc: the first plan of a controller whose horizon is the whole move."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it tells at once of all extras that are not installed
         do_mpc: Any = import_module("do_mpc")

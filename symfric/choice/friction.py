@@ -47,7 +47,7 @@ class Friction:
     Attributes:
         mu_s, mu_d: static and dynamic coefficient.
         v_s: Stribeck velocity [m/s], over which friction falls after break-away. None: it falls at
-            once, or nobody has measured how; then the velocities of that fall are as free as other
+            once, or it has not been measured; then the velocities of that fall are as free as other
             widths, and only their limit is compared.
     """
 
@@ -63,7 +63,7 @@ class Friction:
 
     @property
     def exact(self) -> ExactCoulomb:
-        """It without regularisation."""
+        """Return the friction without regularisation."""
         if self.v_s is None:
             return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d)
         return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")

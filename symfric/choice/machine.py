@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.choice.friction import Friction, alike, friction_of
-from symfric.choice.softness import OF_BRISTLES, Softness, softness
+from symfric.choice.smoothing import OF_BRISTLES, Smoothing, smoothing
 from symfric.figures.regularisation import Machine, Sample, apart, positions, sample
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
@@ -49,7 +49,7 @@ def quiet_run(machine: Machine, model: Model, law: Law, rtol: float, most: int) 
 @final
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Law in a machine, with numbers that describe the wanted friction, and its softness.
+    """Law in a machine, with numbers that describe the wanted friction, and its smoothing.
 
     Attributes:
         machine: where it is.
@@ -60,20 +60,20 @@ class Candidate:
 
     machine: Machine
     law: Law
-    knobs: Mapping[str, Softness]
+    knobs: Mapping[str, Smoothing]
     scene: Scene | None
 
     @property
     def power(self) -> float:
-        """Least power of the softness that its velocities have; 0 where nothing is smooth."""
+        """Least power of the smoothing that its velocities have; 0 where nothing is smooth."""
         return min((k.velocities for k in self.knobs.values() if k.powers), default=0.0)
 
     def law_at(self, s: float) -> Law:
-        """Return the law at the softness `s`; of several places the first."""
+        """Return the law at the smoothing `s`; of several places the first."""
         return next(iter(self.knobs.values())).at(s)
 
     def model(self, s: float) -> Model:
-        """Return the machine at the softness `s`.
+        """Return the machine at the smoothing `s`.
 
         Raises:
             ValueError: beyond a bound of the law, or the machine refuses it.
@@ -84,7 +84,7 @@ class Candidate:
         return replace(self.scene, **laws).model()
 
     def run(self, model: Model, rtol: float, most: int) -> Sample:
-        """One run of the law in `model`, the machine at some softness; see `quiet_run`."""
+        """One run of the law in `model`, the machine at some smoothing; see `quiet_run`."""
         return quiet_run(self.machine, model, self.law, rtol, most)
 
     @cached_property
@@ -103,7 +103,7 @@ def candidate(
         frictions: that it is to describe, by the place in the machine; "" for any other place.
         load: normal force [N] where it is one number.
         own: it has its numbers already: they were fitted, nothing is to be scaled.
-        bristles: the power of the velocities of a law with states, see `softness`.
+        bristles: the power of the velocities of a law with states, see `smoothing`.
 
     Raises:
         ValueError: the machine refuses the law, or no numbers of the law describe the friction.
@@ -114,13 +114,13 @@ def candidate(
     held = {"": same} if scene is None else holders(machine, scene, type(same))
     if not held:
         raise ValueError(f"{machine.name} does not hold it")
-    knobs: dict[str, Softness] = {}
+    knobs: dict[str, Smoothing] = {}
     for place, there in held.items():
         friction = frictions.get(place, frictions[""])
         if own:
-            knobs[place] = Softness(there, {}, friction.mu_s, load)
+            knobs[place] = Smoothing(there, {}, friction.mu_s, load)
         else:
-            knobs[place] = softness(alike(there, friction, load), friction, load, bristles)
+            knobs[place] = smoothing(alike(there, friction, load), friction, load, bristles)
     return Candidate(machine, same, knobs, scene)
 
 

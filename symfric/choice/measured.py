@@ -1,4 +1,4 @@
-"""One law in the user's machine: as soft as the accuracy allows, timed at equal error."""
+"""One law in the user's machine: smoothed as far as the accuracy allows, timed at equal error."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.choice import nature
-from symfric.choice.climb import (
+from symfric.choice.continuation import (
     EFFORT,
     FINEST,
     LEAST,
@@ -21,7 +21,7 @@ from symfric.choice.climb import (
     AtEqualError,
     Budget,
     at_equal_error,
-    climbed,
+    continued,
     counted,
     nearest,
     short,
@@ -30,7 +30,7 @@ from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, OWN, Candidate, Reference, candidate, quiet_run
 from symfric.choice.nature import lacking
 from symfric.choice.ranking import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
-from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
+from symfric.choice.smoothing import MARGIN, OF_BRISTLES, SmoothingStudy
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_model import plant_block
 from symfric.figures.data import phenomena
@@ -214,17 +214,17 @@ def measured(task: Task, name: str, law: Law) -> Row:
     )  # fmt: skip
     operations, why = nature.c_operations(law)
     row = replace(row, c_operations=operations, c_why=why)
-    tried = list[tuple[Row, Candidate, Ladder]]()
+    tried = list[tuple[Row, Candidate, SmoothingStudy]]()
     for bristles in OF_BRISTLES if law.states else OF_BRISTLES[:1]:
         try:
             held = candidate(task.machine, law, task.frictions, task.load, task.own, bristles)
             instructions, _ = counted(task.machine, held.first, task.asked.coarse)
         except FAILURES as problem:
             return replace(row, reason=_refusal(task.machine, problem))
-        runs, found = Budget(held, instructions, task.work), Ladder((), "")
+        runs, found = Budget(held, instructions, task.work), SmoothingStudy((), "")
         try:
             task = _from_own(task, held, runs)
-            found = climbed(runs, task.reference, task.asked)
+            found = continued(runs, task.reference, task.asked)
             placed = _placed(task, held, found, runs, row)
             tried.append((replace(placed, spent=not runs.left()), held, found))
         except FAILURES as problem:
@@ -243,7 +243,7 @@ def measured(task: Task, name: str, law: Law) -> Row:
 
 
 def _refusal(machine: Machine, problem: Exception) -> str:
-    """Why a machine does not take a law; of one that gives it too little, what that is."""
+    """Return the reason why a machine cannot use a law, with the inputs that it lacks."""
     text = short(problem)
     _, lacks, what = text.partition("got one that needs ")
     return f"needs {what}, which {machine.name} does not give" if lacks else text
@@ -273,18 +273,20 @@ def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
     return row
 
 
-def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) -> Row:
+def _placed(task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, row: Row) -> Row:
     """Return the row with what was measured, and where it stands.
 
     Raises:
         SolveError: no run ends.
     """
-    at = _judged(task, rungs, runs)
-    curve = tuple((rung.error, float(rung.attempts * runs.instructions)) for rung in rungs.rungs)
+    at = _judged(task, levels, runs)
+    curve = tuple(
+        (level.error, float(level.attempts * runs.instructions)) for level in levels.levels
+    )
     counts, method = counted(task.machine, at.model, at.rtol)
     law = held.law_at(at.s)
     row = replace(
-        row, curve=curve, error=at.error, own_error=at.own, softness=at.s, rtol=at.rtol,
+        row, curve=curve, error=at.error, own_error=at.own, smoothing=at.s, rtol=at.rtol,
         method=method, attempts=at.run.attempts, instructions=counts,
         time_s=_timed(task, law, at, runs), values=_own_numbers(law),
         steepness=nature.steepness(law, 1.0),
@@ -293,31 +295,34 @@ def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) 
         return replace(row, standing=LACKING, reason=f"shows no {', no '.join(missing)}")
     if row.error <= task.accuracy:
         return replace(row, standing=RANKED)
-    driest = held.law_at(rungs.rungs[-1].s)
+    driest = held.law_at(levels.levels[-1].s)
     known = "" if task.own else nature.otherwise(driest, task.frictions[""], task.load)
-    mark = "" if rungs.decided or not rungs.stopped else "not decided: "
-    said = [mark + (short(rungs.stopped) or "no run keeps it, or not at tighter tolerances"), known]
+    mark = "" if levels.decided or not levels.stopped else "not decided: "
+    said = [
+        mark + (short(levels.stopped) or "no run keeps it, or not at tighter tolerances"),
+        known,
+    ]
     why = "; ".join(text for text in said if text)
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")
 
 
-def _judged(task: Task, rungs: Ladder, runs: Budget) -> AtEqualError:
+def _judged(task: Task, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
     """Return the run at equal error: from the reference where the law keeps it, else its own.
 
     Raises:
         SolveError: no run ends.
     """
-    s = rungs.softest(MARGIN * task.accuracy)
-    last = rungs.rungs[-1]
+    s = levels.softest(MARGIN * task.accuracy)
+    last = levels.levels[-1]
     if s is not None:
-        for softness in (s, last.s):  # between two rungs the error is an estimate
+        for smoothing in (s, last.s):  # between two levels the error is an estimate
             with suppress(SolveError):
-                at = at_equal_error(runs, softness, task.reference, task.asked, last, whole=True)
+                at = at_equal_error(runs, smoothing, task.reference, task.asked, last, whole=True)
                 if at.error <= task.accuracy and _holds(task, at, runs):
                     return at
-        off = tuple(rung for rung in rungs.rungs if rung.error > task.accuracy)
-        rungs = replace(rungs, rungs=off or rungs.rungs[:1])
-    near = nearest(rungs)
+        off = tuple(level for level in levels.levels if level.error > task.accuracy)
+        levels = replace(levels, levels=off or levels.levels[:1])
+    near = nearest(levels)
     return at_equal_error(runs, near.s, task.reference, task.asked, near, whole=False)
 
 
@@ -354,14 +359,14 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
     return best
 
 
-def _stepped(task: Task, held: Candidate, rungs: Ladder, row: Row) -> Row:
+def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: Row) -> Row:
     """Return the row with the largest fixed steps, of the law as soft as these may be off.
 
     A law that never comes so near to the reference is followed as it was judged.
     """
-    s = rungs.softest(task.control)
+    s = levels.softest(task.control)
     try:
-        model, law = held.model(s or row.softness), held.law_at(s or row.softness)
+        model, law = held.model(s or row.smoothing), held.law_at(s or row.smoothing)
         machine = replace(task.machine, of=None, times=None)
         most = max(LEAST, task.work // row.instructions)
         run = quiet_run(machine, model, law, row.rtol if s is None else task.asked.fine, most)

@@ -184,7 +184,7 @@ def _is_step(name: str) -> bool:
 
 
 def otherwise(law: Law, friction: Friction, load: float | None) -> str:
-    """Why `law` may move otherwise than dry friction, however dry it is made; "" if nobody knows.
+    """Return why `law` may differ from dry friction at any smoothing; "" if no reason is known.
 
     A static law whose steady friction is another one, a bristle that nothing damps, one that ages.
     """

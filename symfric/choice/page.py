@@ -85,7 +85,7 @@ def _milliseconds(rows: Sequence[Row]) -> float:
 
 
 def _plane(axis: Axes, choice: Ranking) -> list[Row]:
-    """All laws where they are at equal error; those that stand in the picture."""
+    """Plot all laws at equal error, and return those in the picture."""
     rows = [row for row in choice.placed if 0.0 < row.error < 1e3]
     for row in rows:
         k = KINDS.index(shown(row.phenomena))
@@ -106,7 +106,7 @@ def _plane(axis: Axes, choice: Ranking) -> list[Row]:
 
 
 def _told(choice: Ranking, rows: Sequence[Row]) -> list[Row]:
-    """Which are named there: the first, those that stand apart, and all that are not ranked."""
+    """Return the laws to be named there: the first, those apart, and all that are not ranked."""
     apart = (row for row in choice.ranked[1:] if row.error < APART * choice.accuracy)
     others = sorted((row for row in rows if not row.ranked), key=lambda row: row.work)
     return [*choice.ranked[:1], *apart, *others]

@@ -10,8 +10,8 @@ from symfric.foundation.checks import check_names
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
 )  # fmt: skip
-"""Standings: does all that is asked; does not keep the accuracy, as it moves otherwise or nobody
-knows yet; does not show what is needed; the machine does not take it; its run fails."""
+"""Standings: meets all requirements; is less accurate, because it moves otherwise or for reasons
+that are not decided; lacks a needed phenomenon; cannot run on the machine; its run fails."""
 ORDER = (RANKED, INACCURATE, LACKING, FAILED, REFUSED)
 ALIKE = 1.1
 """Work within this ratio is the same: attempts differ by so much with a digit of a tolerance."""
@@ -31,18 +31,18 @@ class Row:
         phenomena: codes of `symfric.laws.PHENOMENA`.
         error: largest difference from the reference relative to the motion; NaN without a run.
         own_error: that from the finest run of the law itself: the integrator's part.
-        softness: factor of widths and bristles of the law that was timed.
+        smoothing: factor of widths and bristles of the law that was timed.
         values: what to give the law: all parameters that it does not come with, of several places
             that rub those of the first.
         rtol, method, attempts, instructions: of the run at equal error: relative tolerance, method,
-            attempts of a step, CasADi instructions that one counts (`climb.counted`). Equal are
+            attempts of a step, CasADi instructions of one (`continuation.counted`). Equal are
             errors from the reference where the law is ranked, and its own where it is not.
         time_s: processor time of that run [s] in CasADi's virtual machine, the shortest of several.
         fixed_step: largest step [s] at which the plant in fixed steps of backward Euler stays
             within `control` of the motion; `fixed_why` says what is known where there is none.
         explicit_step: likewise of an explicit Runge-Kutta method of order 5.
         steepness: largest slope of the force over velocity of the law at equal error, relative to
-            its level [s/m]: what an optimiser has to climb; NaN where the force jumps.
+            its level [s/m]: the slope that an optimiser meets; NaN where the force jumps.
         smoothness: class in the velocity, with the widths that it has.
         parameters, hard: how many parameters have a physical meaning, and which of these need more
             than a pull and steady sliding.
@@ -81,14 +81,14 @@ class Row:
     form: str = ""
     rank: int = 0
     own_error: float = float("nan")
-    softness: float = float("nan")
+    smoothing: float = float("nan")
     core: float = float("nan")
     core_why: str = ""
     spent: bool = False
 
     @property
     def ranked(self) -> bool:
-        """It shows what is needed and keeps the accuracy."""
+        """True if the law shows what is needed and keeps the accuracy."""
         return self.standing == RANKED
 
     @property
@@ -157,7 +157,7 @@ class Ranking:
         t_end: length of the motion [s].
         rows: one for each candidate.
         wall_s: how long it took [s].
-        unmeasured: laws without a row, since somebody interrupted it.
+        unmeasured: laws without a row, because it was interrupted.
     """
 
     machine: str

@@ -14,7 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, final
 
-from symfric.choice.climb import RUN
+from symfric.choice.continuation import RUN
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, OWN, frictions_of, load_of, reference_of
 from symfric.choice.measured import Task, best_form
@@ -161,7 +161,7 @@ def select(
     says what was not decided: runs fail, cost too much, or creep by less than velocities are
     rounded.
     A law that the machine does not take has its row, too, and the reason in it. What a law may cost
-    is counted as well (`symfric.choice.climb`): it does not depend on how busy the computer is.
+    is counted as well (`symfric.choice.continuation`): whatever the load of the computer.
 
     Args:
         scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,
@@ -263,7 +263,7 @@ def laws_of(where: str, laws: Candidates | None) -> dict[str, tuple[Law, ...]]:
 
 
 def _rows(task: Task, laws: Forms, workers: int, progress: Progress | None) -> list[Row]:
-    """Return the rows; those that are there when somebody interrupts."""
+    """Return the rows; those that are there at an interrupt."""
     rows: list[Row] = []
     results = _many(task, laws, workers) if workers > 1 else _one_by_one(task, laws)
     with suppress(KeyboardInterrupt):

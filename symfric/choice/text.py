@@ -52,7 +52,7 @@ def _fastest(ranked: Sequence[Row], asked: str) -> str:
 
 
 def _smooth(ranked: Sequence[Row]) -> str:
-    """Return the one with second derivatives that climbs least; bristles where there is no
+    """Return the one with second derivatives that is least steep; bristles where there is no
     other.
     """
     smooth = [row for row in ranked if is_smooth(row.smoothness)]
@@ -166,7 +166,7 @@ def lines(choice: Ranking, most: int | None = None) -> Iterator[str]:
 
 
 def interrupted(choice: Ranking) -> str:
-    """Which laws have no row since somebody stopped it."""
+    """Return a sentence on the laws without a row because the ranking was interrupted."""
     count = len(choice.unmeasured)
     return f"Interrupted: {count} of {count + len(choice.rows)} laws were not measured: " + (
         f"{', '.join(choice.unmeasured)}."
@@ -174,7 +174,7 @@ def interrupted(choice: Ranking) -> str:
 
 
 def _left_out(rows: Iterable[Row]) -> dict[str, list[str]]:
-    """Why laws are not among the first -> those of which this is said, in the order of the rows."""
+    """Return reason for not being ranked -> laws that it applies to, in the order of the rows."""
     found: dict[str, list[str]] = {}
     for row in rows:
         if not row.ranked:

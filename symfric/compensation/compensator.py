@@ -86,7 +86,7 @@ def compensator(
         settings: what it does, or the fields of `Compensation` by name.
 
     Raises:
-        ValueError: bad input; a law with inputs beside v and N, or without a block; a build-up of a
+        ValueError: bad input; a law with inputs besides v and N, or without a block; build-up of a
             law that has states of its own; unknown terms.
     """
     where = "compensator"

@@ -27,7 +27,7 @@ TERMS = {
     "stribeck": "by how much dry friction is larger in slow sliding than in fast",
     "viscous": "what the viscous coefficients make",
     "bristle": "what the states make beyond steady sliding: 0 is the steady curve",
-    "force": "the whole force, of a law whose terms cannot be told apart",
+    "force": "the whole force, of a law whose terms cannot be separated",
 }
 """Terms of friction that have a scale of their own."""
 
@@ -48,8 +48,8 @@ class Terms:
         v, N: symbols of its inputs.
         force: all of it [N].
         dry: force [N] without viscous coefficients.
-        viscous: the rest; None where there is none, or it cannot be told apart.
-        levels: dry levels among the parameters; empty where they cannot be told apart.
+        viscous: the rest; None where there is none, or it cannot be separated.
+        levels: dry levels among the parameters; empty where they cannot be separated.
         peaks: level of break-away -> the level in fast sliding.
     """
 

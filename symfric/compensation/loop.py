@@ -193,7 +193,7 @@ def close_loop(
     Raises:
         ValueError: bad input; another sample time in the controller or a block; a block with an
             input that the loop does not have, or without F.
-        CompileError: C was asked for, and there is no compiler or it failed.
+        CompileError: C was requested, and there is no compiler or it failed.
     """
     check_model(WHERE, plant)
     given = (

@@ -243,12 +243,12 @@ def disturbance_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """All that opposes the force of a drive beside its mass, by what its velocity should be.
+    """Estimate all that opposes the force of a drive besides inertia, from its expected velocity.
 
         d = Q(s) [u - m s v],   Q = (w / (s + w))^order,   F = d
 
     u is the force that acted up to this sample (delayed as the drive delays it), less that of a
-    compensator beside it, of which it then finds what is left; v is the velocity measured now. In
+    compensator in parallel, of which it then finds what is left; v is the velocity measured now. In
     steps
 
         f  = u - m (v - v before) / h          mean of what opposes over the last interval
@@ -282,7 +282,7 @@ def disturbance_observer(
     duration = size.symbol if h is None else float(size.start)
     parts = Parts()
     u = parts.given(
-        "u", "N", "force that acted since the last call, less that of a compensator beside"
+        "u", "N", "force that acted since the last call, less that of a compensator in parallel"
     )
     v = parts.given("v", "m/s", "measured velocity", 0.1)
     m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
@@ -297,7 +297,7 @@ def disturbance_observer(
     force = _finished(parts, force, ramp, limit, duration, where)
     block = Block(
         where if name is None else name,
-        doc="Disturbance observer: what opposes the force of a drive beside its mass.",
+        doc="Disturbance observer: what opposes the force of a drive besides inertia.",
         equations=(
             "f  = u - m (v - v_before) / h\n"
             f"d+ = d + (1 - exp(-w h)) (f - d){', twice' if order == 2 else ''}\nF  = d+"

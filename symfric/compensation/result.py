@@ -45,7 +45,7 @@ class Reference:
         object.__setattr__(self, "h", h)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return one line."""
         return f"<Reference: {self.x.size} samples of {self.h:g} s>"
 
     @property
@@ -122,7 +122,7 @@ class Loop:
         reference: what it was to follow.
         x, v: true position [m] and velocity [m/s] at the samples and at the end.
         force: that acted after each sample [N].
-        added: what the compensation asked for at each sample [N].
+        added: force demanded by the compensation at each sample [N].
         limit: largest force [N].
         status: bits that the guards of the blocks have set, 0 where nothing was repaired.
         ended: why it ended early; empty if it did not.
@@ -139,7 +139,7 @@ class Loop:
     status: int = 0
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return one line."""
         ended = f", {self.ended}" if self.ended else ""
         return (
             f"<Loop '{self.name}': {self.force.size} samples, RMS error {self.rms:.3g}, "
@@ -309,7 +309,7 @@ class Comparison:
         write_table(path, columns, rows)
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
-        """Position, error, force and what is added over time, and beside it the first reversal.
+        """Position, error, force and what is added over time, and next to it the first reversal.
 
         Args:
             names: cases to show, by default all.

@@ -45,7 +45,7 @@ class Compensation:
         delay: time [s] by which the reference is looked ahead with its acceleration: the lag of the
             drive, and half a step of the law.
         stick: (force [N], time [s], velocity [m/s]): added while the reference moves, faster than
-            twice this, and the axis, slower than this, does not; it comes and goes over the time.
+            twice this, and the axis, slower than this, does not; rises and decays over this time.
         dither: (amplitude [N], frequency [Hz]) of a sine.
         ramp: time [s] of fading in and out at the input `enable`; None: no such input.
         limit: largest force [N].

@@ -44,7 +44,7 @@ class Arrays:
     written: tuple[Array, ...] = ()
 
     def used(self, source: Graph) -> "Arrays":
-        """Those that a loop would read or write."""
+        """Return the nodes that a loop would read or write."""
         loops = planned(_better(source), self.read, self.written).loops
         reads = {entry for loop in loops for entry in loop.body.reads}
         stores = {(s.group, s.first) for loop in loops for s in loop.stores}
@@ -82,7 +82,7 @@ def emit_rolled(
 
 
 def _better(source: Graph) -> Graph:
-    """As `emit` would have it: what differs by a guard that is known is alike."""
+    """Return the graph as `emit` writes it: parts that differ by a known guard only are equal."""
     return settled(simplified(source))
 
 

@@ -1,4 +1,4 @@
-"""Which selects become `if`, and what stands inside: every operation where it is needed.
+"""Choice of selects that become `if`, with every operation in the branch that needs it.
 
 A select whose side costs something becomes a branch, with the operations that only this side takes
 inside, nested as deep as it goes; selects of one place with the same condition share a branch.

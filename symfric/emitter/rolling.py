@@ -115,7 +115,7 @@ def strands(source: Graph, read: Sequence[Array], written: Sequence[Array]) -> l
 def _runs(
     source: Graph, nodes: Sequence[int], read: Sequence[Array], same: bool = False
 ) -> Iterator[tuple[int, int]]:
-    """Ranges of alike neighbours: different nodes, or, if asked for, the same node."""
+    """Ranges of alike neighbours: different nodes, or, if requested, the same node."""
 
     def alike(lanes: Lanes) -> bool:
         several = len(set(lanes))

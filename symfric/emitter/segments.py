@@ -62,7 +62,7 @@ class Plan:
         loops: in the order of their execution.
         part: node -> the straight part that computes it; leaves, sums and what only loops need
             have none.
-        idle: loops' sums that nobody needs.
+        idle: loops' sums that are not used.
     """
 
     source: Graph
@@ -94,8 +94,8 @@ class Plan:
 def planned(source: Graph, read: Sequence[Array], written: Sequence[Array]) -> Plan:
     """Return the graph with all loops that spare statements and cost next to nothing.
 
-    What is left out: loops that would write what another one has yet to read; sums that nobody
-    needs; short loops; and, where too much would be computed twice, those that do so.
+    What is left out: loops that would write what another one has yet to read; unused sums;
+    short loops; and, where too much would be computed twice, those that do so.
     """
     chosen = {s: woven(source, [s], read) for s in strands(source, read, written)}
     while chosen:

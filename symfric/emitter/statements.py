@@ -20,7 +20,7 @@ def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> l
     """Return an order of statements 0, 1, ... in which what is taken has been made before.
 
     Of those that are ready the one comes next that adds least to the values that are live: it makes
-    some, and ends those that nobody else takes. Of several it is the first that takes a single
+    some, and ends those without another use. Of several it is the first that takes a single
     value, which is often a call, else the first. The time is that of sorting all that is taken.
 
     Args:

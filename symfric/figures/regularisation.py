@@ -229,7 +229,7 @@ def machine_of(
 ) -> Machine:
     """Return a scene, a class of scenes, or a function law -> scene or model, as a machine.
 
-    A scene is driven as it is when nobody says how, unless `u` says so. A function is called with
+    A scene is driven as it is by default, unless `u` is given. A function is called with
     `probe` once.
 
     Raises:
@@ -292,7 +292,7 @@ def sample(
 
     Raises:
         SolveError: the run failed.
-        KeyboardInterrupt: somebody stopped it.
+        KeyboardInterrupt: the user stopped it.
     """
     made = machine.model(law) if model is None else model
 

@@ -361,7 +361,7 @@ def _wrapped(head: str, texts: list[str]) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Text as it stands in a C string."""
+    """Return the text as in a C string."""
     return text.replace("\\", "\\\\").replace('"', '\\"')
 
 

@@ -112,7 +112,7 @@ def export_fmu(
 
     Directional derivatives are exact; units of mechanisms with loops have none.
 
-    Limits: absolute tolerances stay 0.1 rtol times nominal, also for motions that are tiny beside
+    Limits: absolute tolerances stay 0.1 rtol times nominal, also for motions that are tiny against
     their nominal values (`simulate` runs these again); pivots are those that are sound at the
     start; events in time alone set the longest step by the default experiment.
 

@@ -77,7 +77,7 @@ def described(what: Described, entries: Iterable[Entry], fmi: int) -> str:
 
 
 def build_description(what: Described) -> str:
-    """buildDescription.xml beside the sources, of 3.0."""
+    """buildDescription.xml with the sources, of 3.0."""
     root = Xml.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     build = _child(root, "BuildConfiguration", modelIdentifier=what.identifier)
     sources = _child(build, "SourceFileSet", language="C99")

@@ -200,7 +200,7 @@ def direct(model: Model) -> dict[str, tuple[str, ...]]:
 
 
 def _pattern(expression: ca.SX, symbols: ca.SX) -> NDArray[np.bool_]:
-    """Which rows depend on which symbols."""
+    """Return the sparsity of rows over symbols."""
     shape = (expression.numel(), symbols.numel())
     if not all(shape):
         return np.zeros(shape, dtype=bool)

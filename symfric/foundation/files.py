@@ -53,7 +53,7 @@ def written(path: str | Path) -> Generator[Path, None, None]:
         if error.errno not in FULL:
             raise
         got = str(error.strerror).lower()
-        raise ValueError(f"output '{path}': expected room on the disk, got {got}") from error
+        raise ValueError(f"output '{path}': expected space on the disk, got {got}") from error
     finally:
         with suppress(FileNotFoundError):
             temporary.unlink()

@@ -41,7 +41,7 @@ ROLES = {
     "mass": "mass, also per length",
     "inertia": "moment of inertia",
     "gravity": "acceleration of gravity",
-    "offset": "a constant force beside friction",
+    "offset": "a constant force besides friction",
     "motion": "what moves the machine: a start value, a given velocity or path",
     "sampling": "of random contacts: how many, and which random numbers",
 }

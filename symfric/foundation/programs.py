@@ -139,7 +139,7 @@ usual, for machines under load.
 
 
 class CompileError(ProgramError):
-    """No compiler, rejected code, or an unusable result."""
+    """Missing compiler, rejected code, or an unusable result."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The index page of a gallery, beside its pictures."""
+"""The index page of a gallery, next to its pictures."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -8,13 +8,13 @@ from typing import Any
 from symfric.page import html
 
 REDUCED = (
-    "Some figures are computed at reduced size: beside them stands what was checked there, without "
+    "Some figures are computed at reduced size: they state what was checked there, without "
     "the verdicts, which rest on the full size."
 )
 
 
 def index_page(records: Sequence[Mapping[str, Any]]) -> str:
-    """One page of HTML with the plates `records`, grouped by paper; its pictures lie beside it."""
+    """One page of HTML with the figures `records` by paper; its pictures are in the same folder."""
     papers: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
         papers.setdefault(record["paper"], []).append(record)

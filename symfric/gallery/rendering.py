@@ -1,4 +1,4 @@
-"""Plates on disk: pictures and numbers, computed in parallel, one that fails beside the others."""
+"""Plates on disk: pictures and numbers, computed in parallel, also where one fails."""
 
 import json
 import os

@@ -80,7 +80,7 @@ def look(law: str) -> Line:
 class Belt:
     """A block of mass m on a belt of velocity v_belt, held by a spring k, with F_S and F_C.
 
-    Exact dry friction, phase by phase in closed form: sticking lines and arcs. It stands beside the
+    Exact dry friction, phase by phase in closed form: sticking lines and arcs. Plotted with the
     laws as what they approximate, and uses nothing of the library.
 
     Attributes:

@@ -36,7 +36,7 @@ class Ensemble(Showing):
     Attributes:
         scene: name of the model.
         t: times [s], shape (k,); (members, 1) where each member has its own end and nothing else
-            was asked for.
+            was requested.
         signals: name -> values, shape (members, k); NaN after a member ended, failed or met a
             terminal event, and for members that were not reached. Memory-mapped where the results
             went to a folder.
@@ -112,7 +112,7 @@ class Ensemble(Showing):
 
     @property
     def finished(self) -> NDArray[np.bool_]:
-        """Which members ran to their end or to a terminal event, shape (members,)."""
+        """True for members that ran to their end or to a terminal event, shape (members,)."""
         found = np.isfinite(self.reached)
         found[list(self.failed)] = False
         return found

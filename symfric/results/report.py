@@ -1,6 +1,6 @@
 """Runs as one HTML page that needs nothing from elsewhere: what was asked, and what came out.
 
-The page is for the drawer: whoever opens it in a year sees the numbers, the laws with their
+The page is an archive: it holds the numbers, the laws with their
 equations, parameters and limits, and how to run it again.
 """
 
@@ -234,5 +234,5 @@ def _made(runs: Mapping[str, Trajectory], command: str) -> Iterator[str]:
 
 
 def _number(value: Any) -> str:
-    """Six digits; an expression as it stands."""
+    """Six digits; an expression unchanged."""
     return f"{value:.6g}" if isinstance(value, int | float | np.floating) else str(value)

@@ -139,7 +139,7 @@ class Trajectory(Signals):
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
     all signals anywhere in the span by the dense output of the method. Signals are evaluated when
-    they are first asked for. Further results, named in `details`, are not even written before:
+    they are first used. Further results, named in `details`, are not even written before:
     `trajectory["hinge_Fx"]` gives a reaction, and plots and CSV files take such names, too.
 
     Attributes:
@@ -240,7 +240,7 @@ class Trajectory(Signals):
 
         It holds the model, the signals at `t` and all accepted steps, those of a long run found by
         another one. A loaded run does all that this one does: times in between, extremes, further
-        results, pictures, films, energy, derivatives that were asked for, another simulation of its
+        results, pictures, films, energy, derivatives that were requested, another simulation of its
         `model`. Functions are no data: inputs by functions are kept as expressions.
 
         Raises:
@@ -255,7 +255,7 @@ class Trajectory(Signals):
         return self.keep(self)
 
     def __copy__(self) -> "Trajectory":
-        """One with the same symbols."""
+        """Return a copy with the same symbols."""
         return packed.shallow(self)
 
     def __reduce__(self) -> tuple[Any, ...]:

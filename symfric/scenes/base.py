@@ -225,7 +225,7 @@ class Scene(Parametric, ABC):
 
     @abstractmethod
     def equations(self, p: Variables) -> Model:
-        """Return the model of this machine as it stands, with `p` as its parameters."""
+        """Return the model of this machine, with `p` as its parameters."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
         """Return the model, with the parameters named in `free` as symbols in `Model.p`.
@@ -246,7 +246,7 @@ class Scene(Parametric, ABC):
 def other_law(doc: str) -> Any:
     """Declare a field of a scene that holds the law of another place, or None.
 
-    Its parameters stand beside those of `law`, with the endings _1 and _2 where names are shared.
+    Its parameters are added to those of `law`, with the endings _1 and _2 where names are shared.
 
     Args:
         doc: the place, and what it has without a law of its own.

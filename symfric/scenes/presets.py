@@ -32,7 +32,7 @@ class Numbers:
 
         A law that the source does not use gets the common ones that it has. Elements that a law
         comes with and that carry a level together (mu_1, mu_2, ...) carry the new one in the shares
-        that they had; elements that somebody gave it stay as they are.
+        that they had; elements given by the user are not changed.
 
         Raises:
             ValueError: numbers that contradict each other, such as given elements that do not carry

@@ -253,7 +253,7 @@ def _values(rng: Draws, machine: Scene) -> dict[str, float]:
 
 
 def _numbers(rng: Draws, known: Mapping[str, Parameter]) -> dict[str, float]:
-    """One in three parameters off its default by decades; now and then zero or of other sign."""
+    """Draw parameters: one in three is decades off its default, sometimes zero or of other sign."""
     spread = rng.pick(SPREADS)
     found: dict[str, float] = {}
     for name, parameter in known.items():

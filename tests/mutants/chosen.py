@@ -7,7 +7,7 @@ TESTS = ("tests/symfric/choice/test_select.py",)
 
 CHOSEN = (
     Mutant(
-        "the peak of a smooth law is lower than the static level", f"{FOLDER}/softness.py",
+        "the peak of a smooth law is lower than the static level", f"{FOLDER}/smoothing.py",
         "return peaked(law, self.mu_s, self.load)", "return law", TESTS,
     ),
     Mutant(

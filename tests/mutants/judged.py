@@ -25,12 +25,12 @@ def figure(name: str) -> tuple[str, ...]:
 
 JUDGED = (
     Mutant(
-        "the finest tolerance is timed", CHOICE + "climb.py",
+        "the finest tolerance is timed", CHOICE + "continuation.py",
         "rtol, last = LOOSEST, nan", "rtol, last = 1.2 * finest, nan",
         (T_SELECT + "the_tolerance_is_the_loosest_that_keeps_the_accuracy",),
     ),
     Mutant(
-        "any tolerance is loose enough", CHOICE + "climb.py",
+        "any tolerance is loose enough", CHOICE + "continuation.py",
         "good = run is not None and last <= asked.accuracy", "good = run is not None",
         (T_SELECT + "the_tolerance_is_the_loosest_that_keeps_the_accuracy",),
     ),
@@ -51,15 +51,15 @@ JUDGED = (
         "row.work <= ALIKE * head.work", "row.work <= head.work", T_JUDGED,
     ),
     Mutant(
-        "widths go below their bounds", CHOICE + "softness.py",
+        "widths go below their bounds", CHOICE + "smoothing.py",
         'if p.role == "width" else value', 'if p.role == "none" else value', T_JUDGED,
     ),
     Mutant(
-        "no step is left out where errors stay the same", CHOICE + "softness.py",
+        "no step is left out where errors stay the same", CHOICE + "smoothing.py",
         "LEAP = 4", "LEAP = 1", T_JUDGED,
     ),
     Mutant(
-        "a law that moves otherwise is judged by its distance alone", CHOICE + "climb.py",
+        "a law that moves otherwise is judged by its distance alone", CHOICE + "continuation.py",
         "reference.off(run.motion) if whole else own(run)", "reference.off(run.motion)",
         (T_SELECT + "a_law_that_moves_otherwise_is_counted_at_its_own_error",),
     ),
@@ -82,24 +82,24 @@ JUDGED = (
         "ALIASES.get(plain, plain)", "plain", T_JUDGED,
     ),
     Mutant(
-        "one run that keeps the error is enough", CHOICE + "softness.py",
-        "for rung in rungs[-2:])", "for rung in rungs[-1:])", T_JUDGED,
+        "one run that keeps the error is enough", CHOICE + "smoothing.py",
+        "for level in levels[-2:])", "for level in levels[-1:])", T_JUDGED,
     ),
     Mutant(
-        "errors between two rungs follow another power", CHOICE + "softness.py",
+        "errors between two levels follow another power", CHOICE + "smoothing.py",
         "(wanted / good.error) ** (1 / order)", "(wanted / good.error) ** order", T_JUDGED,
     ),
     Mutant(
         "another motion is said of widths far from the speeds of a machine",
-        CHOICE + "softness.py",
-        "if rungs[-1].s ** powers <= NARROW else None", "if True else None", T_JUDGED,
+        CHOICE + "smoothing.py",
+        "if levels[-1].s ** powers <= NARROW else None", "if True else None", T_JUDGED,
     ),
     Mutant(
-        "another motion is said of neighbours at an extremum", CHOICE + "softness.py",
+        "another motion is said of neighbours at an extremum", CHOICE + "smoothing.py",
         " or min(a, b) < RATIO**LEAP:", ":", T_JUDGED,
     ),
     Mutant(
-        "v_eps stays as bristles grow stiff", CHOICE + "softness.py",
+        "v_eps stays as bristles grow stiff", CHOICE + "smoothing.py",
         "if law.states or (value > NEGLIGIBLE", "if (value > NEGLIGIBLE", T_JUDGED,
     ),
     Mutant(
@@ -108,7 +108,7 @@ JUDGED = (
         ("tests/symfric/choice/test_budget.py",),
     ),
     Mutant(
-        "bristles are damped another way as they grow stiff", CHOICE + "softness.py",
+        "bristles are damped another way as they grow stiff", CHOICE + "smoothing.py",
         '"damping": -0.5', '"damping": -1.0', T_JUDGED,
     ),
     Mutant(

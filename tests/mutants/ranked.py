@@ -2,12 +2,12 @@
 
 from mutants.mutant import Mutant
 
-BUDGET = "symfric/choice/climb.py"
+BUDGET = "symfric/choice/continuation.py"
 T_BUDGET = ("tests/symfric/choice/test_budget.py",)
-CLIMB = "symfric/choice/climb.py"
+CONTINUATION = "symfric/choice/continuation.py"
 ROW = "symfric/choice/ranking.py"
 T_JUDGED_BY_HAND = ("tests/symfric/choice/test_judged_by_hand.py",)
-SOFTNESS = "symfric/choice/softness.py"
+SOFTNESS = "symfric/choice/smoothing.py"
 VERDICT = "symfric/choice/text.py"
 FRICTION = "symfric/choice/friction.py"
 NATURE = "symfric/choice/nature.py"
@@ -44,32 +44,32 @@ RANKED = (
         "self.work // self.instructions", T_BUDGET,
     ),
     Mutant(
-        "a jam is tried again at a looser tolerance", CLIMB,
+        "a jam is tried again at a looser tolerance", CONTINUATION,
         "            if problem.status is not Status.MAX_STEPS:\n                raise\n",
         "", T_BUDGET,
     ),
     Mutant(
-        "one tolerance that keeps the accuracy by chance is enough", CLIMB,
+        "one tolerance that keeps the accuracy by chance is enough", CONTINUATION,
         "        if good and before is not None:\n            return *before, last",
         "        if good:\n            return rtol, run, last", T_BUDGET,
     ),
     Mutant(
-        "the finest run has no error of its own", CLIMB,
+        "the finest run has no error of its own", CONTINUATION,
         "said = own(found) if rtol > finest else gap",
         "said = own(found)", T_BUDGET,
     ),
     Mutant(
-        "a fine run that takes too much is begun", CLIMB,
+        "a fine run that takes too much is begun", CONTINUATION,
         "able = near.rtol <= asked.fine or FINER * near.attempts <= runs.most",
         "able = True", T_BUDGET,
     ),
     Mutant(
-        "a law is judged at its driest, not its nearest", CLIMB,
-        "return next(rung for rung in rungs.rungs if not rung.error > AS_NEAR * least)",
-        "return rungs.rungs[-1]", T_BUDGET,
+        "a law is judged at its driest, not its nearest", CONTINUATION,
+        "return next(level for level in levels.levels if not level.error > AS_NEAR * least)",
+        "return levels.levels[-1]", T_BUDGET,
     ),
     Mutant(
-        "all of the budget goes into drier runs", CLIMB,
+        "all of the budget goes into drier runs", CONTINUATION,
         "        if not runs.left(ON_THE_WAY):\n",
         "        if False:\n", T_BUDGET,
     ),
@@ -81,7 +81,7 @@ RANKED = (
     ),
     Mutant(
         "a slow error is followed for ever", SOFTNESS,
-        "elif len(rungs) > MOST:",
+        "elif len(levels) > MOST:",
         "elif False:", T_JUDGED_BY_HAND,
     ),
     Mutant(

@@ -230,7 +230,7 @@ LAWS: dict[str, tuple[Begin, Step]] = {
 
 
 def opening(path: Sequence[float], t_end: float, step: Step, steps: int = 4000) -> float:
-    """By how much elements with this step miss their inner loop on `path`, over the force at 7."""
+    """Return by how much elements with this step miss their inner loop, over the force at 7."""
     t, legs = np.linspace(0.0, t_end, steps + 1), np.diff(path)
     phase = (t[1:] + t[:-1]) / 2 / t_end * legs.size
     v = legs[phase.astype(int)] * np.sin(np.pi * (phase % 1)) * np.pi / 2 * legs.size / t_end

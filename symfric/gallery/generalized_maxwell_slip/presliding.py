@@ -213,7 +213,7 @@ def force(t: ca.SX) -> ca.SX:
 
 
 def stop_of(level: float) -> float:
-    """When a block that a constant force `level` [N] brakes comes to rest [s].
+    """Return the time [s] at which a block braked by a constant force `level` [N] stops.
 
     It moves from where the push reaches the level; its momentum is the area between push and level.
     """

@@ -157,7 +157,7 @@ def scatter(study: str) -> dict[str, float]:
 
 
 def percentiles(what: str, unit: str, values: Sequence[float]) -> dict[str, float]:
-    """Of all noises: the median, and between what the middle 68 % lie."""
+    """Return the median over all noises, and the limits of the middle 68 %."""
     low, middle, high = np.percentile(values, [16, 50, 84]).tolist()
     return {
         f"{what}, median of {NOISES} noises [{unit}]": middle,
@@ -186,7 +186,7 @@ def fig_5_3_pilot_study(quick: bool) -> Drawn:
     median of 60 noises like it.
 
     Refuted: that its five digits mean anything. Over these noises the parameters scatter by the
-    shares given beside, 7 to 110 % at once. The six steps, which read two levels off single points,
+    given shares, 7 to 110 % at once. The six steps, which read two levels off single points,
     leave 1.3 to 2.4 times the error, 1.7 in the median. F_s and v_s rest on speeds that the thesis
     itself calls unstable: without them F_s is anything from half its value to any size. And 50
     speeds of nine tests are 450 tests, not 150.

@@ -84,7 +84,7 @@ def heights(millimetres: int) -> Array:
 
 
 def matrix() -> Array:
-    """Of the linear equations of body, wheel, their velocities, the road and its slope."""
+    """Return the matrix of the linear equations of body, wheel, velocities, road and slope."""
     rows = [
         [0, 0, 1, 0, 0, 0],
         [0, 0, 0, 1, 0, 0],

@@ -31,7 +31,7 @@ def exact(t_end: float = T_END) -> tuple[Belt, dict[str, Array]]:
 
 
 def acceleration(one: Trajectory) -> Array:
-    """Of the block [m/s^2]."""
+    """Return the acceleration of the block [m/s^2]."""
     return -(K * one["x"] + one["friction"]) / M
 
 
@@ -46,7 +46,7 @@ def leaving(one: Trajectory) -> Array:
 def fig_02_belt_displacement(quick: bool) -> Drawn:
     """Displacement of the block on the belt, by the law.
 
-    `symfric select rabinowicz --paper` puts tables 4 and 5 beside ours, law by law and rank by
+    `symfric select rabinowicz --paper` compares tables 4 and 5 with ours, law by law and rank by
     rank. Four laws are drawn in a smooth form and, dotted, as they were published.
 
     Compared: S, the standard deviation of the positions every ms, with the paper's table 4; the
@@ -244,7 +244,7 @@ def fig_05_belt_friction(quick: bool) -> Drawn:
     and 0.95 mu_d N for Threlfall as published, which never reaches its level.
 
     Refuted: that these data let one choose a law by its Stribeck effect, as table 5 does: it falls
-    over 1 mm/s beside a belt of 100 mm/s, and in slip all laws and forms but that one are at mu_d N
+    over 1 mm/s on a belt of 100 mm/s, and in slip all laws and forms but that one are at mu_d N
     to 0.1 %. That laws with states are the smooth ones: the undamped bristles of Dahl and
     Stick-slip ring.
     """

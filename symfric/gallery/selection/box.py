@@ -179,7 +179,7 @@ def _said_of_the_end(found: dict[str, list[float]]) -> dict[str, bool]:
 
 
 def _fixed_hinge(what: str, numbers: dict[str, float]) -> dict[str, bool]:
-    """With the box held, the pendulum of the machine drawn is one on a fixed hinge."""
+    """Check that with the box held the pendulum of the machine drawn is one on a fixed hinge."""
     stiffness = M * G * L
     w = float(np.sqrt(stiffness / (J + M * L**2)))
     swings = {one: last_swing(EXACT, one, T_END) for one in (what, "phi")}

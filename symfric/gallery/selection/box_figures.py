@@ -104,7 +104,7 @@ WEAKER: dict[str, Law] = {
 def fig_07_box_displacement(quick: bool) -> Drawn:
     """Displacement of the box, by the law.
 
-    `symfric select pendulum_box --paper` puts tables 8 and 9 beside ours, law by law and rank by
+    `symfric select pendulum_box --paper` compares tables 8 and 9 with ours, law by law and rank by
     rank. Four laws are drawn in a smooth form and, dotted, as they were published.
 
     Compared: S, the standard deviation of the positions every ms, with the paper's table 8; the

@@ -104,7 +104,7 @@ TABLES: dict[str, tuple[type[Scene], str, str, str]] = {
 @final
 @dataclass(frozen=True)
 class PaperRow:
-    """One law beside what is printed.
+    """One law with the printed values.
 
     Attributes:
         T, S: printed time [s] and standard deviation of x [m].
@@ -134,7 +134,7 @@ class PaperRow:
 @final
 @dataclass(frozen=True)
 class PaperComparison:
-    """The paper's tables beside our numbers.
+    """The paper's tables with our numbers.
 
     Attributes:
         scene, times, ranks: which machine, and which tables.
@@ -319,7 +319,7 @@ def _orders(found: PaperComparison) -> Iterator[str]:
 
 
 def reasons(found: PaperComparison) -> list[str]:
-    """Why printed numbers cannot be had again: sentences with what was measured."""
+    """Return the reasons why printed numbers cannot be reproduced, with measured values."""
     return [text for text in (_of_times(found), _of_spread(found), _of_ranks(found), OPEN) if text]
 
 

@@ -220,7 +220,7 @@ def nearest(t_end: float) -> float:
 
 
 def acceleration(run: Trajectory) -> Array:
-    """Of the block [m/s^2]."""
+    """Return the acceleration of the block [m/s^2]."""
     return -(BLOCK["k"] * run["x"] + run["friction"]) / BLOCK["m"]
 
 

@@ -1,7 +1,7 @@
 """Haug's machines again, in one or two angles, with equations written by hand.
 
 Nothing but CasADi is used here, so that a mistake of the library cannot stand on both sides. The
-normal forces are unknowns beside the accelerations, since friction acts back on them.
+normal forces are unknowns like the accelerations, since friction acts back on them.
 
 `solve` integrates with error control by SUNDIALS (IDAS), `fixed_steps` by explicit steps.
 """

@@ -24,7 +24,7 @@ Numbers = NDArray[Any]
 
 
 class DeviceError(RuntimeError):
-    """No usable graphics processor, or an error of the device."""
+    """Missing or unusable graphics processor, or an error of the device."""
 
 
 class Held(Protocol):

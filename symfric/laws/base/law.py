@@ -344,7 +344,7 @@ class StaticLaw(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """No internal states: the force is a function of v and N."""
+        """Return no internal states: the force is a function of v and N."""
         return ()
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:

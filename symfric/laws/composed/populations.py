@@ -72,7 +72,7 @@ class Population(Parametric, ABC):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """No inputs besides v and N."""
+        """Return no inputs besides v and N."""
         return ()
 
     @property

@@ -12,7 +12,15 @@ from symfric.choice.friction import alike
 from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsage]
 from symfric.choice.nature import needed, otherwise
 from symfric.choice.ranking import INACCURATE, RANKED, REFUSED, Row, ordered
-from symfric.choice.softness import MOST, NARROW, Ladder, Rung, ladder, limit_order, softness
+from symfric.choice.smoothing import (
+    MOST,
+    NARROW,
+    Smoothed,
+    SmoothingStudy,
+    ladder,
+    limit_order,
+    smoothing,
+)
 from symfric.choice.text import number, short, verdict
 from symfric.foundation.parameters import parameters
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, Gonthier, LeineSwitch, LuGre, steady_force
@@ -26,34 +34,34 @@ ROW = Row(
 def test_two_runs_in_a_row_must_keep_the_error() -> None:
     """One that keeps it by chance, as where errors change their sign, is not enough."""
     errors = {1.0: 0.1, 0.25: 1e-4, 0.0625: 0.05, 0.0625 / 4: 1e-3, 0.0625 / 16: 1e-4}
-    found = ladder(lambda s: Rung(s, errors[s], 1), 2e-3, 2e-3, 1.0, (ValueError,))
-    assert [rung.s for rung in found.rungs] == [*errors]
+    found = ladder(lambda s: Smoothed(s, errors[s], 1), 2e-3, 2e-3, 1.0, (ValueError,))
+    assert [level.s for level in found.levels] == [*errors]
     assert found.softest(2e-3) is not None
-    assert found.rungs[-2].s <= (found.softest(2e-3) or 0.0) < 0.0625
+    assert found.levels[-2].s <= (found.softest(2e-3) or 0.0) < 0.0625
 
 
-def test_between_two_rungs_the_error_is_a_power_of_the_softness() -> None:
-    rungs = Ladder(tuple(Rung(s, 3 * s**0.5, 1) for s in (1.0, 0.25, 0.0625)), "")
-    assert rungs.softest(1.0) == pytest.approx(1 / 9, rel=1e-12)
-    assert rungs.softest(0.5) is None
-    assert rungs.softest(9.0) == 1.0
+def test_between_two_rungs_the_error_is_a_power_of_the_smoothing() -> None:
+    levels = SmoothingStudy(tuple(Smoothed(s, 3 * s**0.5, 1) for s in (1.0, 0.25, 0.0625)), "")
+    assert levels.softest(1.0) == pytest.approx(1 / 9, rel=1e-12)
+    assert levels.softest(0.5) is None
+    assert levels.softest(9.0) == 1.0
 
 
 def test_errors_that_stay_the_same_are_followed_by_leaps() -> None:
     """A law whose widths are far above the speeds of a machine looks settled, and is not."""
-    found = ladder(lambda s: Rung(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    found = ladder(lambda s: Smoothed(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert found.stopped == ""
-    assert found.rungs[4].s == found.rungs[3].s / 4**4
-    later = ladder(lambda s: Rung(s, min(0.4, 1e9 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert found.levels[4].s == found.levels[3].s / 4**4
+    later = ladder(lambda s: Smoothed(s, min(0.4, 1e9 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert later.stopped == ""
 
 
-def near(limit: float, order: float, wide: float = 0.0) -> Callable[[float], Rung]:
+def near(limit: float, order: float, wide: float = 0.0) -> Callable[[float], Smoothed]:
     """Runs of a law that is |limit + s^order| off, and keeps to `limit` + 1 while s > wide."""
 
-    def run(s: float) -> Rung:
+    def run(s: float) -> Smoothed:
         off = limit + 0.1 * s**order + (0.3 if s > wide > 0 else 0.0)
-        return Rung(s, off, 1, motion=np.array([[1 + off]]))
+        return Smoothed(s, off, 1, motion=np.array([[1 + off]]))
 
     return run
 
@@ -64,9 +72,9 @@ def test_another_motion_is_said_of_a_limit_with_its_order_alone() -> None:
         found = ladder(near(0.2, order), 1e-3, 1e-3, 1.0, (ValueError,))
         assert found.stopped == f"it tends to another motion, with order {order:g}"
     bristles = ladder(near(0.2, 0.5), 1e-3, 1e-3, 0.5, (ValueError,))
-    assert found.rungs[-1].s < NARROW
-    assert bristles.rungs[-1].s < NARROW**2
-    still = ladder(lambda s: Rung(s, 0.4, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert found.levels[-1].s < NARROW
+    assert bristles.levels[-1].s < NARROW**2
+    still = ladder(lambda s: Smoothed(s, 0.4, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert still.stopped.startswith("its error still changes")
     assert (still.decided, found.decided) == (False, True)
     later = ladder(near(0.0, 1.0, wide=1e-8), 1e-3, 1e-3, 0.5, (ValueError,))
@@ -80,71 +88,73 @@ def test_no_limit_is_shown_by_neighbours_nor_by_runs_that_do_not_converge() -> N
     law = near(0.2, 1.0)
     assert limit_order([law(s) for s in (1.0, 4.0**-4, 4.0**-8)]) == pytest.approx(1.0, abs=1e-3)
     assert limit_order([law(s) for s in (1.0, 0.25, 0.0625)]) is None
-    apart = [Rung(4.0 ** (-4 * k), 0.2, 1, motion=np.array([[x]])) for k, x in enumerate((0, 1, 3))]
+    apart = [
+        Smoothed(4.0 ** (-4 * k), 0.2, 1, motion=np.array([[x]])) for k, x in enumerate((0, 1, 3))
+    ]
     assert limit_order(apart) is None
     slow = [
-        Rung(4.0 ** (-4 * k), 0.2, 1, motion=np.array([[x]])) for k, x in enumerate((0, 1, 1.5))
+        Smoothed(4.0 ** (-4 * k), 0.2, 1, motion=np.array([[x]])) for k, x in enumerate((0, 1, 1.5))
     ]
     assert limit_order(slow) is None  # order 1/8: half of it is left to go
 
 
 def test_a_law_of_which_nothing_is_scaled_is_run_once() -> None:
     found = ladder(near(0.2, 1.0), 1e-3, 1e-3, 0.0, (ValueError,))
-    assert (len(found.rungs), found.stopped) == (1, "nothing of it is scaled")
+    assert (len(found.levels), found.stopped) == (1, "nothing of it is scaled")
 
 
 def test_every_width_of_a_bristle_is_scaled() -> None:
     """Else it creeps below v_eps as sigma_0 grows, and relaxes no more."""
-    law = softness(LuGre(v_eps=1e-15), Friction(0.2, 0.1), 10.0).at(1e-6)
+    law = smoothing(LuGre(v_eps=1e-15), Friction(0.2, 0.1), 10.0).at(1e-6)
     assert parameters(law)["v_eps"].value == pytest.approx(1e-21)
 
 
 def test_errors_that_follow_a_power_are_followed_in_strides() -> None:
     """0.5 s^(1/2) is 1e-3 at s = 4e-6: seven runs, where four times each would take eleven."""
-    found = ladder(lambda s: Rung(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, 1.0, (ValueError,))
-    assert len(found.rungs) == 7
-    assert [rung.s for rung in found.rungs[:4]] == pytest.approx([1, 1 / 4, 1 / 16, 1 / 1024])
+    found = ladder(lambda s: Smoothed(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert len(found.levels) == 7
+    assert [level.s for level in found.levels[:4]] == pytest.approx([1, 1 / 4, 1 / 16, 1 / 1024])
     assert found.softest(1e-3) == pytest.approx(4e-6)
 
 
 def test_where_a_drier_run_fails_shorter_steps_are_tried() -> None:
-    def run(s: float) -> Rung:
+    def run(s: float) -> Smoothed:
         if s < 0.1:
             raise ValueError("too dry")
-        return Rung(s, s, 1)
+        return Smoothed(s, s, 1)
 
     found = ladder(run, 1e-3, 1e-3, 1.0, (ValueError,))
-    assert [rung.s for rung in found.rungs] == [1.0, 0.25, 0.125]
+    assert [level.s for level in found.levels] == [1.0, 0.25, 0.125]
     assert found.stopped == "too dry"
 
 
 def test_an_error_that_falls_too_slowly_is_not_followed_for_ever() -> None:
-    found = ladder(lambda s: Rung(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, 1.0, (ValueError,))
-    assert len(found.rungs) == MOST + 1
+    found = ladder(lambda s: Smoothed(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert len(found.levels) == MOST + 1
     assert found.stopped.startswith("its error still changes")
 
 
 def test_bristles_of_all_stiffnesses_are_damped_alike() -> None:
     """sigma_1^2 / sigma_0 stays, and with it the share of the damping that is critical."""
     law = LuGre(sigma_0=1e5, sigma_1=200.0)
-    found = parameters(softness(law, Friction(0.2, 0.1), 10.0).at(0.01))
+    found = parameters(smoothing(law, Friction(0.2, 0.1), 10.0).at(0.01))
     assert found["sigma_0"].value == pytest.approx(1e7)
     assert found["sigma_1"].value == pytest.approx(2000.0)
 
 
 def test_a_width_at_its_bound_stays_there() -> None:
     law = Gonthier()
-    found = parameters(softness(law, Friction(0.2, 0.1), 10.0).at(1e-12))
+    found = parameters(smoothing(law, Friction(0.2, 0.1), 10.0).at(1e-12))
     assert found["s_eps"].value == parameters(law)["s_eps"].lower
     with pytest.raises(ValueError, match="v_t"):  # which shapes the law: another one is refused
-        softness(BrownMcPhee(), Friction(0.2, 0.1), 10.0).at(1e-10)
+        smoothing(BrownMcPhee(), Friction(0.2, 0.1), 10.0).at(1e-10)
 
 
 def test_the_peaks_of_sums_and_products_are_the_static_level() -> None:
     """Of laws whose peak is no parameter: a hyperbola, two hyperbolic tangents, a sum of falls."""
     for name in ("popp_stelter", "makkar_dixon", "bittencourt"):
         friction = Friction(0.3, 0.2)
-        law = softness(alike(ALL_LAWS[name](), friction, 5.0), friction, 5.0).at(1e-4)
+        law = smoothing(alike(ALL_LAWS[name](), friction, 5.0), friction, 5.0).at(1e-4)
         v = np.geomspace(1e-9, 10.0, 100_001)
         F = steady_force(law, v, 5.0) / 5.0
         near = np.linspace(*(v[F.argmax() + k] for k in (-1, 1)), 2001)

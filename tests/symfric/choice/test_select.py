@@ -14,7 +14,7 @@ import pytest
 
 from symfric import Model, Variable, simulate, with_values
 from symfric.choice import Choice, Friction, select
-from symfric.choice.climb import RUN
+from symfric.choice.continuation import RUN
 from symfric.choice.nature import forms
 from symfric.choice.text import lines
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force

@@ -1,4 +1,4 @@
-"""Softness of a law: widths and bristles scaled together until it keeps a wanted error.
+"""Smoothing of a law: widths and bristles scaled together until it keeps a wanted error.
 
     static laws      widths and velocities s
     bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities s^p
@@ -41,7 +41,7 @@ OF_BRISTLES = 0.45, 0.5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Softness(Regularisation):
+class Smoothing(Regularisation):
     """Parameters that make `law` smooth, scaled together by a factor s.
 
     Attributes:
@@ -71,9 +71,9 @@ def _within(p: Parameter, value: float) -> float:
     return min(max(value, p.lower), p.upper) if p.role == "width" else value
 
 
-def softness(
+def smoothing(
     law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
-) -> Softness:
+) -> Smoothing:
     """Return the scalable parameters of `law`; none of one that rests exactly or has no widths.
 
     Args:
@@ -86,7 +86,7 @@ def softness(
     of_speed = bristles if law.states else 1.0
     powers = {} if exact else {n: _power(law, p, of_speed) for n, p in known.items() if n != fixed}
     found = {name: power for name, power in powers.items() if power}
-    return Softness(law, found, friction.mu_s, load, of_speed if found else 0.0)
+    return Smoothing(law, found, friction.mu_s, load, of_speed if found else 0.0)
 
 
 def _power(law: Law, p: Parameter, of_speed: float) -> float:
@@ -106,12 +106,12 @@ def _power(law: Law, p: Parameter, of_speed: float) -> float:
 
 
 RATIO, SHORTER = 4.0, 2.0
-"""From one softness of the ladder to the next; towards dry friction after a run that failed."""
+"""From one smoothing of the ladder to the next; towards dry friction after a run that failed."""
 LEAP = 4
 """Rungs that are left out where errors stay the same."""
 LEAST_ORDER, SAME_ORDER, LONGEST, WITHIN = 0.2, 0.2, 3, 0.8
-"""Errors follow a power of the softness if it is so large, and changes by no more than this share;
-then so many rungs at most are made in one, to this share of the wanted error."""
+"""Errors follow a power of the smoothing if it is so large, and changes by no more than this share;
+then so many levels at most are made in one, to this share of the wanted error."""
 NARROW = 3e-5
 """Share of its own velocities at which a law is dry for machines that are not far slower."""
 ORDERS = 0.05, 4.0
@@ -123,12 +123,12 @@ MOST, SOFTEST = 24, 5
 MARGIN = 0.7
 """Part of the wanted error that is left to the law; the rest is the integrator's."""
 ROUNDING = 5e-3
-"""Error that falls by less than this share of it over three rungs is the law's own."""
+"""Error that falls by less than this share of it over three levels is the law's own."""
 
 
 @final
 @dataclass(frozen=True)
-class Rung:
+class Smoothed:
     """Run of the ladder: factor of the widths, error, attempts, tolerance, motion over size."""
 
     s: float
@@ -140,30 +140,30 @@ class Rung:
 
 @final
 @dataclass(frozen=True)
-class Ladder:
-    """Error against softness.
+class SmoothingStudy:
+    """Error against smoothing.
 
     Attributes:
-        rungs: softest first.
+        levels: softest first.
         stopped: why it went no further towards dry friction; "" where the wanted error is kept.
         decided: there is nothing to find out on another way there.
     """
 
-    rungs: tuple[Rung, ...]
+    levels: tuple[Smoothed, ...]
     stopped: str
     decided: bool = False
 
     def softest(self, wanted: float) -> float | None:
         """Return the softest factor below which every run keeps the error; None where none does."""
-        kept = len(self.rungs)
-        while kept and self.rungs[kept - 1].error <= wanted:
+        kept = len(self.levels)
+        while kept and self.levels[kept - 1].error <= wanted:
             kept -= 1
-        if kept == len(self.rungs):
+        if kept == len(self.levels):
             return None
-        good = self.rungs[kept]
+        good = self.levels[kept]
         if kept == 0 or not good.error > 0.0:
             return good.s
-        bad = self.rungs[kept - 1]
+        bad = self.levels[kept - 1]
         if not bad.error < inf:
             return good.s
         order = log(bad.error / good.error) / log(bad.s / good.s)
@@ -171,7 +171,7 @@ class Ladder:
 
 
 FIXED = "nothing of it is scaled"
-Run = Callable[[float], Rung]
+Run = Callable[[float], Smoothed]
 """s -> the run; raises what a run raises, see `ladder`."""
 
 
@@ -182,7 +182,7 @@ def ladder(
     powers: float,
     failures: tuple[type[Exception], ...],
     said: Callable[[Exception], str] = str,
-) -> Ladder:
+) -> SmoothingStudy:
     """Runs towards dry friction until two keep the error `wanted`, and away from it to `softest`.
 
     A law tends to another motion where its own runs converge, and their limit is off. That is said
@@ -199,28 +199,28 @@ def ladder(
     Raises:
         one of `failures`: the law as it comes, s = 1, does not run.
     """
-    rungs, stopped, decided = [run(1.0)], "" if powers else FIXED, not powers
+    levels, stopped, decided = [run(1.0)], "" if powers else FIXED, not powers
     ratio, leap = RATIO, RATIO**LEAP
-    while not stopped and not _kept(rungs, wanted):
-        settled = _settled(rungs)
-        step = ratio if ratio < RATIO else leap if settled else _stride(rungs, wanted)
-        order = limit_order(rungs) if rungs[-1].s ** powers <= NARROW else None
+    while not stopped and not _kept(levels, wanted):
+        settled = _settled(levels)
+        step = ratio if ratio < RATIO else leap if settled else _stride(levels, wanted)
+        order = limit_order(levels) if levels[-1].s ** powers <= NARROW else None
         if settled and order is not None:
             stopped, decided = f"it tends to another motion, with order {order:.2g}", True
-        elif len(rungs) > MOST:
-            stopped = f"its error still changes at softness {rungs[-1].s:.0e}"
+        elif len(levels) > MOST:
+            stopped = f"its error still changes at smoothing {levels[-1].s:.0e}"
         try:
-            rungs += [] if stopped else [run(rungs[-1].s / step)]
+            levels += [] if stopped else [run(levels[-1].s / step)]
         except failures as problem:
             stopped = said(problem) if ratio < RATIO else ""
             ratio, leap = (SHORTER, SHORTER) if leap == RATIO else (RATIO, RATIO)
     with suppress(*failures):  # softer than the law allows
-        while powers and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
-            rungs.insert(0, run(rungs[0].s * RATIO))
-    return Ladder(tuple(rungs), "" if rungs[-1].error <= wanted else stopped, decided)
+        while powers and levels[0].error <= softest and levels[0].s < RATIO**SOFTEST:
+            levels.insert(0, run(levels[0].s * RATIO))
+    return SmoothingStudy(tuple(levels), "" if levels[-1].error <= wanted else stopped, decided)
 
 
-def limit_order(rungs: Sequence[Rung]) -> float | None:
+def limit_order(levels: Sequence[Smoothed]) -> float | None:
     """Return the order in s with which motions tend to one that is off; None where that is not
     shown.
 
@@ -229,9 +229,9 @@ def limit_order(rungs: Sequence[Rung]) -> float | None:
 
         |x_0 - x_1| / |x_1 - x_2| = (s_0^q - s_1^q) / (s_1^q - s_2^q)
     """
-    if len(rungs) < 3:
+    if len(levels) < 3:
         return None
-    one, two, three = rungs[-3:]
+    one, two, three = levels[-3:]
     before, after = _apart(one, two), _apart(two, three)
     a, b = one.s / two.s, two.s / three.s
     if not 0.0 < after < before < inf or min(a, b) < RATIO**LEAP:
@@ -247,30 +247,30 @@ def limit_order(rungs: Sequence[Rung]) -> float | None:
     return order if after / (b**order - 1) <= CERTAIN * three.error else None
 
 
-def _apart(one: Rung, other: Rung) -> float:
+def _apart(one: Smoothed, other: Smoothed) -> float:
     """Largest difference of two motions relative to their size; infinite where unknown."""
     a, b = one.motion, other.motion
     return inf if a is None or b is None or a.shape != b.shape else float(np.abs(a - b).max())
 
 
-def _kept(rungs: list[Rung], wanted: float) -> bool:
+def _kept(levels: list[Smoothed], wanted: float) -> bool:
     """Test for two runs in a row that keep the error."""
-    return len(rungs) > 1 and max(rung.error for rung in rungs[-2:]) <= wanted
+    return len(levels) > 1 and max(level.error for level in levels[-2:]) <= wanted
 
 
-def _stride(rungs: list[Rung], wanted: float) -> float:
+def _stride(levels: list[Smoothed], wanted: float) -> float:
     """Ratio to the next run: to where errors that follow a power are at `wanted`."""
-    if len(rungs) < 3 or not all(0.0 < rung.error < inf for rung in rungs[-3:]):
+    if len(levels) < 3 or not all(0.0 < level.error < inf for level in levels[-3:]):
         return RATIO
-    e = [log(rung.error) for rung in rungs[-3:]]
-    s = [log(rung.s) for rung in rungs[-3:]]
+    e = [log(level.error) for level in levels[-3:]]
+    s = [log(level.s) for level in levels[-3:]]
     before, order = ((e[k] - e[k + 1]) / (s[k] - s[k + 1]) for k in (0, 1))
     if order < LEAST_ORDER or abs(order - before) > SAME_ORDER * order:
         return RATIO
-    return min(max((rungs[-1].error / (WITHIN * wanted)) ** (1 / order), RATIO), RATIO**LONGEST)
+    return min(max((levels[-1].error / (WITHIN * wanted)) ** (1 / order), RATIO), RATIO**LONGEST)
 
 
-def _settled(rungs: list[Rung]) -> bool:
+def _settled(levels: list[Smoothed]) -> bool:
     """Test for four last errors that are the same, or grow."""
-    last = [rung.error for rung in rungs[-4:]]
+    last = [level.error for level in levels[-4:]]
     return len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]

@@ -18,7 +18,7 @@ from math import inf, nan
 from typing import Any, final
 
 from symfric.choice.machine import FAILURES, Candidate, Reference
-from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
+from symfric.choice.smoothing import MARGIN, Smoothed, SmoothingStudy, ladder
 from symfric.figures.regularisation import Machine, Sample, apart
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import chosen
@@ -39,7 +39,7 @@ GROWTH = 8
 
 @final
 class SpentError(RuntimeError):
-    """All that the runs of a law may cost is used up."""
+    """The budget of the runs of a law is used up."""
 
 
 @final
@@ -48,7 +48,7 @@ class Budget:
     """Runs of one law in one machine, counted; none is made twice.
 
     Attributes:
-        held: the law in the machine, at any softness.
+        held: the law in the machine, at any smoothing.
         instructions: that an attempt counts.
         work: that a run may take.
         attempts: of every run.
@@ -76,7 +76,7 @@ class Budget:
         return sum(self.attempts) < share * self.whole
 
     def model(self, s: float) -> Model:
-        """Return the machine with the law at the softness `s`.
+        """Return the machine with the law at the smoothing `s`.
 
         Raises:
             ValueError: beyond a bound of the law, or the machine refuses it.
@@ -86,7 +86,7 @@ class Budget:
         return self._models[s]
 
     def run(self, s: float, rtol: float, most: int | None = None) -> Sample:
-        """Return a run at the softness `s`; `most` attempts at most.
+        """Return a run at the smoothing `s`; `most` attempts at most.
 
         Raises:
             SolveError: it failed, or would take more.
@@ -152,7 +152,7 @@ class Asked:
 
     @property
     def coarse(self) -> float:
-        """That of a first look."""
+        """Return the tolerance of the first run."""
         return min(COARSE, max(self.fine, 1e-2 * self.accuracy))
 
 
@@ -162,7 +162,7 @@ class AtEqualError:
     """Run that a law is judged by.
 
     Attributes:
-        s: its softness.
+        s: its smoothing.
         model, run, rtol: what ran.
         error, own: from the reference, and from the finest run of the law itself.
     """
@@ -175,14 +175,14 @@ class AtEqualError:
     own: float
 
 
-def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
-    """Error against softness, to where two runs in a row keep the accuracy, or no more helps.
+def continued(runs: Budget, reference: Reference, asked: Asked) -> SmoothingStudy:
+    """Error against smoothing, to where two runs in a row keep the accuracy, or no more helps.
 
     Raises:
         one of `FAILURES`: the law as it comes does not run at any tolerance.
     """
 
-    def run(s: float) -> Rung:
+    def run(s: float) -> Smoothed:
         if not runs.left(ON_THE_WAY):
             raise SpentError(f"drier runs take more than {sum(runs.attempts)} tries, {EFFORT}")
         before = runs.attempts[-1] if runs.attempts else runs.most
@@ -194,7 +194,7 @@ def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
                 error, rtol = reference.off(found.motion), asked.fine
             except SolveError:
                 pass  # the coarse run is what there is
-        return Rung(s, error, found.attempts, rtol, found.motion / reference.size[:, None])
+        return Smoothed(s, error, found.attempts, rtol, found.motion / reference.size[:, None])
 
     wanted = MARGIN * asked.accuracy
     softest = max(asked.accuracy, asked.softest)
@@ -221,15 +221,15 @@ def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sa
     return runs.run(s, rtol, most), rtol
 
 
-def nearest(rungs: Ladder) -> Rung:
-    """Return the softest rung whose error is about the smallest that the law reaches."""
-    least = min(rung.error for rung in rungs.rungs)
-    return next(rung for rung in rungs.rungs if not rung.error > AS_NEAR * least)
+def nearest(levels: SmoothingStudy) -> Smoothed:
+    """Return the softest level whose error is about the smallest that the law reaches."""
+    least = min(level.error for level in levels.levels)
+    return next(level for level in levels.levels if not level.error > AS_NEAR * least)
 
 
 def at_equal_error(
     runs: Budget, s: float, reference: Reference, asked: Asked,
-    near: Rung, whole: bool,
+    near: Smoothed, whole: bool,
 ) -> AtEqualError:  # fmt: skip
     """Return the loosest tolerance at which an error is at most the accuracy.
 
@@ -237,7 +237,7 @@ def at_equal_error(
     that ends within the budget.
 
     Args:
-        near: a run of about this softness, which says what a fine one costs.
+        near: a run of about this smoothing, which says what a fine one costs.
         whole: whether that is the error from the reference, or the law's own.
 
     Raises:
