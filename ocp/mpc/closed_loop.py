@@ -6,6 +6,8 @@ a whole, differentiated as one expression, and the multipliers of the equations 
 the gradient in the states zero (a linear system).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -229,7 +231,7 @@ class ClosedLoop:
         columns |= {"status": self.status.astype(float), "time [s]": self.seconds}
         write_table(path, columns, np.column_stack(list(columns.values())).tolist())
 
-    def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
+    def plot(self, *names: str, path: str | Path | None = None) -> Figure:
         """Plot signals, controls and cycle times over time, a panel each; shaded: not converged.
 
         Args:
@@ -241,7 +243,7 @@ class ClosedLoop:
 
 def plot_loops(
     loops: Mapping[str, ClosedLoop], names: Sequence[str] = (), path: str | Path | None = None
-) -> "Figure":
+) -> Figure:
     """Plot signals and controls of closed loops over time, a panel each, and their cycle times.
 
     Shaded cycles did not converge, by their own status.

@@ -1,5 +1,7 @@
 """Definition of a controller: its horizon, settings, measurements and controls."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property

@@ -1,5 +1,7 @@
 """A running controller: cycles of its compiled C."""
 
+from __future__ import annotations
+
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -239,7 +239,7 @@ def show_verification(verification: Verification) -> None:
     output.show(f"{verification.name}: {verification.status}{compiler}")
     if verification.checks:
         output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign symbols"],
+            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign"],
             [
                 (
                     check.real,

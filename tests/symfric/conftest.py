@@ -9,7 +9,7 @@ from symfric.codegen import verification
 from symfric.foundation.programs import Compiler, find_compiler
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def fewer_steps_verified() -> Iterator[None]:
     """Verify generated C over 50 stretches of inputs; CasADi's share of 200 costs seconds."""
     with pytest.MonkeyPatch.context() as patch:

@@ -112,7 +112,7 @@ def test_a_circle_of_links_is_refused(tmp_path: Path) -> None:
 def test_a_full_disk_is_said_and_leaves_nothing(tmp_path: Path) -> None:
     with (
         pytest.raises(
-            ValueError, match=r"output '.*a.txt': expected room on the disk, got no space"
+            ValueError, match=r"output '.*a.txt': expected space on the disk, got no space"
         ),
         written(tmp_path / "a.txt"),
     ):

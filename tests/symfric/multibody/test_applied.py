@@ -68,7 +68,9 @@ def test_pendulum_box_is_the_motion_of_the_valid_modes(mu_s: float, mu_d: float)
 
 
 def test_functions_of_a_mechanism_refuse_what_they_cannot_know() -> None:
-    with pytest.raises(ValueError, match="joint 'x' > friction > law: expected one that needs v"):
+    with pytest.raises(
+        ValueError, match="joint 'x' > friction > law: expected one that needs only v"
+    ):
         functions(PendulumBox(ExactCoulomb()).mechanism())
 
 

@@ -98,12 +98,12 @@ def test_absent_reactions_leave_no_trace() -> None:
         (
             JointFriction(Karnopp(), radius=0.1),
             ("ball",),
-            "got Karnopp, which needs F_e; a ball has",
+            "got Karnopp, which also needs F_e; a ball has",
         ),
         (
             JointFriction(QuarterCarGeneral()),
             SLIDE,
-            "which needs x_rel, v_rel; a joint has no such input",
+            "which also needs x_rel, v_rel; a joint has no such input",
         ),
         (JointFriction(LAW), (), "expected a joint with friction"),
         (JointFriction(LAW, radius=-1.0), TURN, "radius: expected a number > 0, got -1"),

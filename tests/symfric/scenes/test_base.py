@@ -50,7 +50,7 @@ def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: st
     for law in CASES.values():
         if not {i.name for i in law.inputs} <= OFFERED[scene]:
             refused += 1
-            said = r"law (that needs only v, N, .*F_e|of motion and load, got .* the force)"
+            said = r"law (that needs no more than v, N, .*F_e|of motion and load, got .* the force)"
             with pytest.raises(ValueError, match=said):
                 SINGLE[scene](law).model()
             continue

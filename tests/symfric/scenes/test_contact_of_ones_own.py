@@ -73,7 +73,7 @@ def test_mistakes_are_told_with_what_to_write() -> None:
     v = Variable("v", "m/s")
     with pytest.raises(ValueError, match=r"the class LuGre; write LuGre\(\) with parentheses"):
         contact("a", LuGre, v.symbol, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"got 'lugre'; law_from_text\('lugre'\) makes one"):
+    with pytest.raises(ValueError, match=r"got 'lugre'; use law_from_text\('lugre'\)"):
         contact("a", "lugre", v.symbol, 1.0)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"contact 'a': v: expected an SX .* got 'v'"):
         contact("a", LuGre(), "v", 1.0)

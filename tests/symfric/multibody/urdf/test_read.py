@@ -215,7 +215,7 @@ def test_inertia_that_no_body_has_is_used_with_a_warning_or_refused() -> None:
         read_urdf(text, strict=True)
     with (
         pytest.warns(UserWarning, match="link 'arm'"),
-        pytest.raises(ValueError, match="positive definite, got one that is not in hinge: what"),
+        pytest.raises(ValueError, match="positive definite, got one that is not in hinge: the"),
     ):
         read_urdf(text.replace('iyy="0.1"', 'iyy="-0.5"')).build()
 
