@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from ocp import ClosedLoop, Controller, Phase, Problem, at_end, effort, plot_loops, track
+from ocp import ClosedLoopRun, Controller, Phase, Problem, at_end, effort, plot_loops, track
 from symfric import BrownMcPhee, ExactCoulomb, Law, LuGre, drive
 from symfric.model import Model
 
@@ -53,7 +53,7 @@ def goal(t: Array) -> Array:
     return np.where(np.mod(t, 2.0) < 1.0, 0.1, 0.0)
 
 
-def table(loops: dict[str, ClosedLoop]) -> Table:
+def table(loops: dict[str, ClosedLoopRun]) -> Table:
     """A row a plant; the controller knows the goal ahead, so the error is looked at in between."""
     result = Table("plant", "error", "median [ms]", "worst [ms]", "not converged", "unreported")
     for name, loop in loops.items():

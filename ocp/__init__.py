@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ocp.formulation.problem import rest_to_rest as rest_to_rest
     from ocp.friction.event_check import set_valued as set_valued
     from ocp.friction.event_check import verify_exactly as verify_exactly
-    from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
+    from ocp.mpc.closed_loop import ClosedLoopRun as ClosedLoopRun
     from ocp.mpc.closed_loop import plot_loops as plot_loops
     from ocp.mpc.controller import Controller as Controller
     from ocp.mpc.controller import controller_of as controller_of

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
-    from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
+    from ocp.mpc.closed_loop import ClosedLoopRun as ClosedLoopRun
     from ocp.mpc.controller import Controller as Controller
     from ocp.mpc.controller import ControllerCheck as ControllerCheck
     from ocp.mpc.controller import GeneratedController as GeneratedController

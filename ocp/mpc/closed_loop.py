@@ -110,7 +110,7 @@ SLACK = 1e-3
 
 @final
 @dataclass(frozen=True, eq=False)
-class ClosedLoop:
+class ClosedLoopRun:
     """A plant under a controller; arrays have an entry for each of the n cycles.
 
     Attributes:
@@ -242,7 +242,7 @@ class ClosedLoop:
 
 
 def plot_loops(
-    loops: Mapping[str, ClosedLoop], names: Sequence[str] = (), path: str | Path | None = None
+    loops: Mapping[str, ClosedLoopRun], names: Sequence[str] = (), path: str | Path | None = None
 ) -> Figure:
     """Plot signals and controls of closed loops over time, a panel each, and their cycle times.
 
@@ -297,7 +297,7 @@ def run_closed_loop(
     noise: Mapping[str, float] | None,
     seed: int,
     check: bool,
-) -> ClosedLoop:
+) -> ClosedLoopRun:
     """Simulate a closed loop; see `Controller.simulate`."""
     where = "simulate"
     check_model(where, plant)
@@ -353,7 +353,7 @@ class _Log:
     opinions: list[float] = field(default_factory=list[float])
     wanted: list[dict[str, float]] = field(default_factory=list[dict[str, float]])
 
-    def loop(self, design: Design, plant: Model) -> ClosedLoop:
+    def loop(self, design: Design, plant: Model) -> ClosedLoopRun:
         """Return everything as arrays."""
         step, cycles = design.horizon.step, len(self.actions)
         names, references = [c.name for c in design.controls], self.wanted[0]
@@ -361,7 +361,7 @@ class _Log:
         def column(name: str) -> NDArray[Any]:
             return np.array([getattr(action, name) for action in self.actions])
 
-        return ClosedLoop(
+        return ClosedLoopRun(
             plant=plant.name,
             controller=design.name,
             t=step * np.arange(float(cycles)),

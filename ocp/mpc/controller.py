@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.problem import Problem
-from ocp.mpc.closed_loop import SLACK, ClosedLoop, Optimality, Reference, run_closed_loop
+from ocp.mpc.closed_loop import SLACK, ClosedLoopRun, Optimality, Reference, run_closed_loop
 from ocp.mpc.design import Control, CycleData, CycleStatus, Design, Settings
 from ocp.mpc.horizon import Horizon, horizon_of
 from ocp.mpc.session import BACKENDS, Session
@@ -215,7 +215,7 @@ class Controller:
         seed: int = 0,
         check: bool = True,
         backend: str = "auto",
-    ) -> ClosedLoop:
+    ) -> ClosedLoopRun:
         """Simulate the controller on a plant, whose equations may differ from its model.
 
         The plant has the controlled inputs and the measured signals by the same names; its other

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from receding import controller, rubbing
 
-from ocp.mpc.closed_loop import ClosedLoop
+from ocp.mpc.closed_loop import ClosedLoopRun
 from ocp.mpc.design import CycleStatus
 from symfric import ExactCoulomb, LuGre, drive, rabinowicz
 from symfric.model import Model
@@ -21,7 +21,7 @@ PLANTS = {
 }
 
 
-def loop(plant: Model, t_end: float = 0.6) -> ClosedLoop:
+def loop(plant: Model, t_end: float = 0.6) -> ClosedLoopRun:
     return controller().simulate(plant, t_end, {"goal": 0.1})
 
 
