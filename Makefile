@@ -54,7 +54,7 @@ stress: $(VENV)/.test
 	$(BIN)/symfric stress --cases 10000 --json out/stress.json --out out/stress_cases
 
 mutants: $(VENV)/.test
-	$(BIN)/python tests/mutants/run.py
+	$(BIN)/python tests/mutants.py
 
 # Needs arm-none-eabi-gcc, its newlib and qemu-system-arm; says which of them are absent, and ends well.
 embedded: $(VENV)/.runtime
