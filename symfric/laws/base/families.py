@@ -31,7 +31,7 @@ class TwoLevels(Levels, StaticLaw):
         """Return the sliding force [N] at a speed >= 0 in the limit of zero widths."""
         return self.mu_d * N
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the break-away force [N], mu_s N."""
         return self.mu_s * N
 
@@ -112,7 +112,7 @@ class Sticking(Law):
         share = beyond / (smooth.magnitude(F_e, 0.0) + APPLIED_FORCE.nominal)
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the break-away force [N], mu_s N, the largest force in stick."""
         return self.mu_s * N
 

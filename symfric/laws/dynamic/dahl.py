@@ -119,7 +119,7 @@ class BlimanSorine(Law):
         """Return the steady sliding force [N] at a speed >= 0."""
         return (self.mu_1 if self.order == "1" else self.mu_1 - self.mu_2) * N
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the height [N] of the peak at the path s_p, which the order 1 does not have."""
         if self.order == "1":
             return self.mu_1 * N

@@ -182,7 +182,7 @@ class Armstrong(Law):
         """Return the sliding force [N] at a speed >= 0 above v_e, without memory of a rest."""
         return self.level(N, speed, 0.0) + self.sigma_2 * speed
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the force [N] of break-away after a long rest."""
         return self.level(N, 0.0, 1.0)
 

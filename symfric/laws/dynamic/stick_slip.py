@@ -203,7 +203,7 @@ class HaessigFriedland(Levels):
         """Return the steady sliding force [N] at a speed >= 0."""
         return self.mu_d * N
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the force [N] of break-away, mu_s N."""
         return self.mu_s * N
 

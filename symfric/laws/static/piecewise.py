@@ -68,7 +68,7 @@ class Threlfall(Rise):
         """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N * (1.0 if self.form == "smooth" else 0.95)
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the largest force [N]; the original drops by 2e-4 mu_d N behind it."""
         return self.mu_d * N * (1.0 if self.form == "smooth" else RISE)
 

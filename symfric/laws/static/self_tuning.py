@@ -36,7 +36,7 @@ class RuiWang(StaticLaw):
         """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.D * sin(self.C * pi / 2)
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the peak [N], or the limit of a curve without one."""
         return self.D * sin(smooth.clip(self.C, 0.0, 1.0) * pi / 2)
 
