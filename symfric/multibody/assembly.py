@@ -77,58 +77,43 @@ def _model(
     """Return the model of a machine with the contact forces of `contacts`."""
     made, eq, p = machine.made, machine.made.eq, machine.p
     pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
+    states = [v for s in contacts for v in s.states]
     before = ca.vertcat(eq.lam, eq.F)
     after = ca.vertcat(symbols_of(machine.multipliers), stacked(s.force for s in contacts))
     needed = stacked(rest.needed([contacts[i].force for i in rest.members]) for rest in groups)
     balance, normals, phi_ddot = ca.substitute(
         [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot], [before], [after]
     )
+    rates = (*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))
     mechanics = Holonomic(
-        eq.n,
-        eq.phi,
-        eq.a,
-        ca.vertcat(balance, phi_ddot, needed, normals),
-        stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))),
-        partial(solve_mass, eq),
-        eq.norms,
-        machine.index,
-        inner,
-        *_pressing(contacts, ca.vertcat(eq.a, before)),
-        applied=len(groups),
-    )
+        eq.n, eq.phi, eq.a, ca.vertcat(balance, phi_ddot, needed, normals), stacked(rates),
+        partial(solve_mass, eq), eq.norms, machine.index, inner,
+        *_pressing(contacts, ca.vertcat(eq.a, before)), applied=len(groups),
+    )  # fmt: skip
 
     def put(expressions: Sequence[ca.SX]) -> list[ca.SX]:
         known = ca.substitute(list(expressions), [before], [after])
         return ca.substitute(known, [eq.a], [mechanics.explicit[0]])
 
-    scales = {
-        s.contact.name: float(at_start(s.contact.friction.law.velocity_scale, p)) for s in contacts
-    }
-    finite = [s for s in contacts if np.isfinite(scales[s.contact.name])]
+    scales = {s.contact.name: at_start(s.contact.friction.law.velocity_scale, p) for s in contacts}
     limits = {s.contact.name: AT_REST for s in contacts if s.contact.friction.law.inputs}
-    limits |= {s.contact.name: scales[s.contact.name] for s in finite}
+    limits |= {name: float(x) for name, x in scales.items() if x.is_regular()}
     closed = [s for s in contacts if s.force is not s.contact.F]
+    watched = [s for s in closed if scales[s.contact.name].is_regular()]
     return Model(
         name=machine.name,
-        x=(
-            *made.q,
-            *made.qd,
-            *(t.angle for t in eq.turns),
-            *(v for s in contacts for v in s.states),
-            *loops,
-        ),
+        x=(*made.q, *made.qd, *(t.angle for t in eq.turns), *states, *loops),
         z=(
             *machine.multipliers,
             *(r.force for r in groups),
-            *(v for s in contacts for v in s.unknown),
+            *(v for s in pressed for v in s.unknown),
         ),
         u=machine.u,
         p=p,
         outputs=_outputs(eq, contacts, put, [v.unit for v in machine.multipliers]),
         monitors=tuple(
             Monitor(v, s.contact.friction.law.velocity_scale)
-            for s in finite
-            if s in closed
+            for s in watched
             for v in ca.vertsplit(s.contact.slip)
         ),
         events=events(closed, groups, made.qd),
