@@ -145,8 +145,7 @@ def equations(
     phi = ca.vertcat(ca.SX(0, 1), *(part.phi for part in (*loops, *held)), norms)
     independent = [*(range(phi.numel()) if kept is None else kept)]
     lam, every = ca.SX.sym("lam", len(independent)), ca.SX(phi.numel(), 1)
-    for k, row in enumerate(independent):
-        every[row] = lam[k]
+    every[independent] = lam
     sizes = (part.phi.numel() for part in (*loops, *held))
     own = [every[i:j, 0] for i, j in pairwise(accumulate(sizes, initial=0))]
     contacts = tuple(_contacts(kin))
@@ -164,12 +163,9 @@ def equations(
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (inertia * pushed)
-    pressing = dict[str, Wrench]()
-    for loop, (force, moment) in of_loops:
-        reactions[loop.joint.name] = loop.relative.R.T @ force, loop.relative.R.T @ moment
-        if loop.joint.closes:
-            pressing[loop.joint.name] = force, moment
+    reactions |= {loop.joint.name: loop.on_child(wrench) for loop, wrench in of_loops}
     reactions = {name: reactions[name] for name in topology.joints}
+    pressing = {loop.joint.name: wrench for loop, wrench in of_loops if loop.joint.closes}
     pressing = reactions | pressing
     phi = phi[independent, 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
