@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from symfric.bench import PICTURES, SUBJECTS, measure
 from symfric.cli import completions, output
 from symfric.cli import options as opt
 from symfric.cli.options import argument, option
@@ -22,28 +23,11 @@ from symfric.foundation.files import make_folder
 from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
-    from symfric.bench.table import Table
+    from symfric.bench.report import Table
     from symfric.gallery.rendering import Gallery
     from symfric.stress.campaign import Report
     from symfric.stress.cases import Case
     from symfric.stress.judge import Verdict
-
-SUBJECTS = (
-    "integrator",
-    "calls",
-    "ensemble",
-    "multibody",
-    "ivp",
-    "jitter",
-    "regularisation",
-    "ocp",
-    "interop",
-    "identification",
-    "codegen",
-    "embedded",
-)
-TABLES = ("calls", "ensemble", "embedded", "interop")
-"""Subjects without a picture."""
 
 
 def _completed(incomplete: str) -> list[str]:
@@ -61,7 +45,7 @@ def bench(
     ] = None,
     plot: opt.PlotOption = None,
     csv: Annotated[
-        Path | None, option("--csv FILE.csv", "Write the runs; multibody, regularisation only.")
+        Path | None, option("--csv FILE.csv", "Write the rows of the first table.")
     ] = None,
     json: opt.JsonOption = None,
 ) -> None:
@@ -82,23 +66,14 @@ def bench(
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
     check_names("bench", [subject], SUBJECTS)
-    drawn = tuple(name for name in SUBJECTS if name not in TABLES)
-    only = (
-        ("--links", links, ("multibody",)),
-        ("--csv", csv, ("multibody", "regularisation")),
-        ("--plot", plot, drawn),
-    )
+    only = (("--links", links, ("multibody",)), ("--plot", plot, PICTURES))
     given = [o for o, value, where in only if value is not None and subject not in where]
     if given:
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     opt.check_outputs(json, csv, picture=plot)
-    from symfric import bench as measures  # noqa: PLC0415  (for this command only)
-
     sizes = {"links": lengths(links)} if links else {}
     with output.progress("measuring") as tell:
-        result = getattr(measures, f"bench_{subject}")(
-            quick=quick, progress=output.unnamed(tell), **sizes
-        )
+        result = measure(subject, quick, output.unnamed(tell), **sizes)
     if plot:
         result.plot(plot)
     if csv:

@@ -71,7 +71,6 @@ def lines() -> Iterator[list[str]]:
         "bench multibody --links a",
         "demo --data none",
         "bench multibody --links 0",
-        "bench jitter --csv x.csv",
         "bench regularisation --links 2",
         "demo extra",
         "laws --set mu_d=1",
