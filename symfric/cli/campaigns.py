@@ -16,24 +16,19 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from symfric.bench import PICTURES, SUBJECTS, measure
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.foundation.files import check_folder, make_folder
 from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
-    from symfric.bench.table import Table
+    from symfric.bench.report import Table
     from symfric.gallery.rendering import Gallery
     from symfric.stress.campaign import Report
     from symfric.stress.cases import Case
     from symfric.stress.judge import Verdict
 
-SUBJECTS = (
-    "integrator", "calls", "ensemble", "multibody", "ivp", "jitter", "regularisation", "ocp",
-    "interop", "identification", "codegen", "embedded",
-)  # fmt: skip
-TABLES = ("calls", "ensemble", "embedded", "interop")
-"""Subjects without a picture."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 EVERY = 60.0
@@ -65,20 +60,14 @@ def bench(
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
     check_names("bench", [subject], SUBJECTS)
-    refused = {
-        "--links": links is not None and subject != "multibody",
-        "--csv": csv is not None and subject not in ("multibody", "regularisation"),
-        "--plot": plot is not None and subject in TABLES,
-    }
-    if any(refused.values()):
-        given = ", ".join(option for option, is_given in refused.items() if is_given)
-        raise ValueError(f"bench {subject}: expected no {given}, got one")
+    only = (("--links", links, ("multibody",)), ("--plot", plot, PICTURES))
+    given = [o for o, value, where in only if value is not None and subject not in where]
+    if given:
+        raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     opt.check_outputs(json, csv, picture=plot)
-    from symfric import bench as measures  # noqa: PLC0415  (for this command only)
-
     sizes = {"links": lengths(links)} if links else {}
     with output.progress("measuring") as tell:
-        result = getattr(measures, f"bench_{subject}")(quick=quick, progress=tell, **sizes)
+        result = measure(subject, quick, tell, **sizes)
     if plot:
         result.plot(plot)
     if csv:

@@ -87,7 +87,7 @@ def plates(incomplete: str) -> list[str]:
 
 def subjects(incomplete: str) -> list[str]:
     """Complete subjects of `symfric bench`."""
-    return _of(_from("symfric.cli.campaigns", "SUBJECTS"), incomplete)
+    return _of(_from("symfric.bench", "SUBJECTS"), incomplete)
 
 
 def problems(incomplete: str) -> list[str]:

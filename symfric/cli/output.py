@@ -96,7 +96,7 @@ def show_doc(text: str) -> None:
     paragraph: list[str] = []
     for line in [*text.splitlines(), ""]:
         kept = not line or line.startswith(" ")
-        if paragraph and (kept or line.startswith(("Defaults:", "Limits:", "Source:"))):
+        if paragraph and (kept or line.startswith(("Defaults:", "Limits:", "Source:", "Checked:"))):
             show(" ".join(paragraph))
             paragraph = []
         if kept:

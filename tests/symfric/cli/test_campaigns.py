@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 
-from symfric import bench
-from symfric.cli import demo, main
+from symfric.cli import campaigns, demo, main
 from symfric.gallery import rendering
 from symfric.gallery.rendering import Gallery
 from symfric.stress import Case, Report, Verdict, draw
@@ -99,21 +98,20 @@ def test_files_are_written_while_a_campaign_runs(
 
 
 def test_a_benchmark_is_printed_and_written(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[dict[str, Any]] = []
-
-    def measure(**how: Any) -> Any:
-        seen.append(how)
+    def measure(*given: Any, **how: Any) -> Any:
+        seen.append((*given[:2], how))
         table = SimpleNamespace(head=["tool", "ratio"], rows=[("ours", 1.0)], title="Runs")
         return SimpleNamespace(
             plot=lambda path: path.write_text("p"), write_csv=lambda path: path.write_text("c"),
             to_dict=lambda: {"a": 1}, shown=lambda: [table, "A sentence."],
         )  # fmt: skip
 
-    monkeypatch.setattr(bench, "bench_multibody", measure)
+    seen: list[Any] = []
+    monkeypatch.setattr(campaigns, "measure", measure)
     said = symfric("bench multibody --quick --links 4,2,2 --plot b.png --csv b.csv --json b.json")
     assert said.err == "wrote b.png, b.csv, b.json\n"
     assert all(text in said.out for text in ("Runs", "tool", "ours", "A sentence."))
-    assert (seen[0]["quick"], seen[0]["links"]) == (True, (2, 4))
+    assert seen == [("multibody", True, {"links": (2, 4)})]
     assert (Path("b.png").read_text(), Path("b.csv").read_text()) == ("p", "c")
 
 
