@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -74,6 +74,7 @@ class Integrator:
     _judged: dict[Point, "Integrator"] = field(default_factory=dict[Point, "Integrator"])
     _others: dict[Orders, "Integrator"] = field(default_factory=dict[Orders, "Integrator"])
     _spare: list[Work] = field(default_factory=list[Work])
+    memory: dict[str, Any] = field(default_factory=dict[str, Any])
 
     def __post_init__(self) -> None:
         begin = perf_counter()
