@@ -26,7 +26,7 @@ from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
@@ -77,7 +77,7 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
     """The compiled loop of `simulate` alone, from a consistent start to states: as peers run."""
     whole, inputs = equations(model, float(times[-1]))
     made = Integrator(model, inputs, chosen("bench", "auto", rtol))
-    engine, end = made.compiled(), float(times[-1])
+    engine, end = made.compiled, float(times[-1])
     rows, work = [whole.names.index(name) for name in watched], made.borrow()
     begin = _beginning(model, whole)
 
