@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
 from symfric.integrator.derivatives.functions import derivatives
@@ -40,6 +40,7 @@ from symfric.integrator.derivatives.path import Jump, Path
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consistent
 
 Array = NDArray[np.float64]
+Which = Sequence[int] | NDArray[np.intp]
 GRAZING = 1e-6
 """Rate of an event expression over its mean rate in the step before, below which it touches zero
 without crossing it; the square is the limit of the rate over its terms.
@@ -51,7 +52,7 @@ MOST = 4
 
 
 class Links(NamedTuple):
-    """Links of a run; its tables have one row per distinct jump, the first one for no jump.
+    """Links of a run; tables have one row per distinct jump, the first one for no jump.
 
     Attributes:
         start: passage of the start.
@@ -139,9 +140,8 @@ def _is_single(path: Path, jump: Jump) -> bool:
 
 
 def _passage(here: "_Instants") -> Array:
-    """Return the passage of the events at one instant.
-
-    Derivatives before it are of y at the time of the events; if these cut a step, at a fixed time.
+    """Return the passage of events at one instant, from derivatives of y at its time; from a fixed
+    time if they cut a step.
     """
     (jump,), path = here.jumps, here.path
     if jump.at_once:
@@ -266,6 +266,7 @@ class _Instants(NamedTuple):
         return f"sensitivities of '{model.name}': event {names} at t = {self.t[row]:.9g} s"
 
     def _values(self, function: ca.Function, *rows: Array) -> list[Array]:
+        """Return the results of a Function, matrices column by column."""
         made = derivatives(self.path.integrator)
         return made.many(function, [*rows, self.d], self.path.backend)
 
@@ -273,15 +274,14 @@ class _Instants(NamedTuple):
         """Return the rates y' of the equations."""
         system = self.path.integrator.system
         matrix, right = self._values(derivatives(self.path.integrator).rates, y)
-        # CasADi stores column by column
+        if system.is_ode:
+            return right
         matrix = matrix.reshape(-1, system.n, system.n).transpose(0, 2, 1)
-        return right if system.is_ode else np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+        return np.linalg.solve(matrix, right[:, :, None])[:, :, 0].astype(float)
 
     def rates_before(self) -> Array:
-        """Return the rates just before the events, where modes and inputs are unchanged.
-
-        They come from the equations: in a step that a jump of the force ended, dense output has a
-        mean rate.
+        """Return the rates just before the events, from the equations: in a step that a jump of the
+        force ended, dense output has a mean rate.
         """
         y, dense = self.before.copy(), self.path.dense
         cut = np.array([jump.size > 0 for jump in self.jumps])
@@ -291,14 +291,14 @@ class _Instants(NamedTuple):
         y[cut] = dense.piece(k, np.maximum(theta, 0.0))
         return self.rate(y)
 
-    def slopes(self, which: ArrayLike, y: Array) -> tuple[Array, Array, Array]:
+    def slopes(self, which: Which, y: Array) -> tuple[Array, Array, Array]:
         """Return the derivatives of the expression of one event each by t, y and d."""
         found = self._values(derivatives(self.path.integrator).of_events, self.t, y)
-        m, every = self.t.size, len(self.path.integrator.model.events)
-        by_t, by_y, by_d = (a.reshape(m, -1, every)[np.arange(m), :, which] for a in found)
+        m, every, own = self.t.size, len(self.path.integrator.model.events), np.asarray(which)
+        by_t, by_y, by_d = (a.reshape(m, -1, every)[np.arange(m), :, own] for a in found)
         return by_t[:, 0], by_y, by_d
 
-    def delay(self, which: ArrayLike, y: Array, rate: Array) -> Array:
+    def delay(self, which: Which, y: Array, rate: Array) -> Array:
         """Return the derivative of the time of one event each by y at a fixed time and by d, shape
         (m, n + n_d).
 
@@ -308,11 +308,13 @@ class _Instants(NamedTuple):
         by_t, by_y, by_d = self.slopes(which, y)
         speed = (by_y * rate).sum(axis=1) + by_t
         terms = (np.abs(by_y) * np.abs(rate)).sum(axis=1) + np.abs(by_t)
-        dense, m = self.path.dense, self.t.size
+        dense, row = self.path.dense, np.arange(self.t.size)
         k = np.minimum(np.searchsorted(dense.t1, self.t), dense.t1.size - 1)
         (began,) = self._values(self.path.integrator.events, dense.t0[k], dense.y0[k])
         ends = dense.t1[k] == self.t
-        mean = ends * np.abs(began[np.arange(m), which]) / np.where(ends, self.t - dense.t0[k], 1.0)
+        mean = (
+            ends * np.abs(began[row, np.asarray(which)]) / np.where(ends, self.t - dense.t0[k], 1.0)
+        )
         touches = ~(np.abs(speed) > np.maximum(GRAZING**2 * terms, GRAZING * mean))
         if touches.any():
             row = int(touches.argmax())
@@ -344,7 +346,7 @@ class _Instants(NamedTuple):
         crossings = self.path.integrator.crossings
         return () if crossings is None else crossings.resets
 
-    def jumped(self, y: Array, which: ArrayLike) -> Array:
+    def jumped(self, y: Array, which: Which) -> Array:
         """Return unknowns y after the resets of events, algebraic ones as before."""
         (fresh,), after = self._values(self.path.integrator.resets, self.t, y), y.copy()
         for k, (event, state) in enumerate(self._resets):
@@ -352,7 +354,7 @@ class _Instants(NamedTuple):
             after[here, state] = fresh[here, k]
         return after
 
-    def reset(self, y: Array, which: ArrayLike, found: Array) -> Array:
+    def reset(self, y: Array, which: Which, found: Array) -> Array:
         """Return the passages of the resets of the events `which`, (m, events), at y; `found` is y
         after them.
         """
@@ -391,7 +393,6 @@ class _Instants(NamedTuple):
         n, m, free = made.system.n, self.t.size, made.system.free
         if free.size:
             slope, more = self._values(made.algebraic, found)
-            # CasADi stores column by column
             slope = slope.reshape(m, n, -1).transpose(0, 2, 1)
             left = slope @ jumps[:, :n]
             left[:, :, n + 1 :] += more.reshape(m, -1, slope.shape[1]).transpose(0, 2, 1)

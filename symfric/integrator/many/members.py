@@ -19,7 +19,15 @@ from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
 from symfric.integrator.running.engine import VmEngine, Work
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.plants import AGAIN, REFUSED, SEARCH, Advance, Plants, loaded
+from symfric.integrator.running.plants import (
+    AGAIN,
+    MEMBERS,
+    REFUSED,
+    SEARCH,
+    Advance,
+    Plants,
+    loaded,
+)
 from symfric.integrator.running.record import Dense, Outputs
 from symfric.integrator.step.layout import Given, State
 
@@ -300,4 +308,4 @@ def plants_source(integrator: Integrator) -> str:
         "AGAIN": AGAIN,
     }  # fmt: skip
     defined = "".join(f"#define {name} ({value})\n" for name, value in numbers.items())
-    return every + c_text("../running/members.h") + defined + c_text("plants.c")
+    return every + MEMBERS + defined + c_text("plants.c")

@@ -186,6 +186,7 @@ class Held:
     force: ca.SX
     level: ca.SX
     screen: ca.Function | None
+    _limits: dict[Hashable, tuple[float, Array]] = field(default_factory=dict[Hashable, Any])
 
     @cached_property
     def watched(self) -> ca.SX:
@@ -208,10 +209,13 @@ class Held:
         """Return an upper bound of force over level in a run, from the extremes of each state."""
         if self.screen is None:
             return inf
-        tops = run.largest[self.rows]
+        tops = np.array([*map(run.farthest, self.rows)])
         if self.linear:
-            _, level, slope = self.screen(0.0, p)
-            return float(np.abs(slope.full()[0]) @ tops) / (float(level) or inf)
+            if (limits := self._limits.get(p.tobytes())) is None:
+                _, level, slope = self.screen(0.0, p)
+                limits = float(level) or inf, np.abs(slope.full()[0])
+                remember(self._limits, p.tobytes(), limits, REMEMBERED)
+            return float(limits[1] @ tops) / limits[0]
         every = np.column_stack([tops, -tops])
         return float(self.ratios(self.screen, every, np.tile(p[:, None], (1, 2))).max())
 

@@ -192,7 +192,7 @@ class VmEngine:
             made += used
             S[:] = S_out[used - 1]
         self._batches[size].append(batch)
-        records = np.vstack([work.rows[:0], *found])
+        records = np.vstack([work.rows[:0], *found]) if len(found) != 1 else found[0]
         if request is None:
             request = Stop.ATTEMPTS
             if S[State.T] >= t_end:

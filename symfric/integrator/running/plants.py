@@ -89,6 +89,8 @@ class Plants:
             getattr(self, name)[:] = getattr(before, name)
 
 
+MEMBERS = (FOLDER / "members.h").read_text(encoding="utf-8")
+"""C struct of the arrays."""
 SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
 """Arrays that C reads and writes, in this order."""
 
@@ -151,7 +153,7 @@ def plants_source(integrator: Integrator) -> str:
     )  # fmt: skip
     attempts = c_source(integrator.step, integrator.tableau.H.shape[0], *others)
     jump = "" if follow is None else follow.c_source
-    return attempts + jump + filled(FOLDER / "members.h") + plants
+    return attempts + jump + MEMBERS + plants
 
 
 def in_python(integrator: Integrator, plants: Plants, engine: Engine, tolerance: float) -> Advance:

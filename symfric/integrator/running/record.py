@@ -239,8 +239,10 @@ class Run:
 
     @property
     def _rows(self) -> list[Array]:
-        still = np.concatenate([[self.t, np.nextafter(self.t, np.inf)], self.y, self.y])
-        return self.kept or [still[None]]
+        """Kept rows, or one for a start without steps."""
+        if self.kept:
+            return self.kept
+        return [np.concatenate([[self.t, np.nextafter(self.t, np.inf)], self.y, self.y])[None]]
 
     @cached_property
     def dense(self) -> Dense:
@@ -296,10 +298,12 @@ class Run:
         times = [self.t], *(rows[:, 1] for rows in self._rows)
         return np.concatenate(times), np.concatenate([self.y[None], *self._ends])
 
-    @property
-    def largest(self) -> Array:
-        """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
-        return np.abs(self.reach).max(axis=0)
+    def farthest(self, unknown: int) -> float:
+        """Return the largest magnitude of an unknown at the start and at the ends of steps."""
+        rows, n = self._rows, self.y.size
+        first = rows[0][0, 2:] if self._before is None else self._before.reach
+        ends = first[..., unknown], *(part[:, 2 + n + unknown] for part in rows)
+        return max(float(np.abs(y).max()) for y in ends)
 
     def at(self, times: Array) -> Array:
         """Return unknowns at `times` [s], shape (n, times); for a long run by recomputation."""
