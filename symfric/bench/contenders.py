@@ -82,8 +82,8 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
     begin = _beginning(model, whole)
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
-        State.begin(work.S, 0.0, first_step(end), begin(**start))
-        Given.begin(work.R, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(0))
+        work.S[:] = State.at(0.0, first_step(end), begin(**start))
+        work.R[:] = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
         work.want(outputs, None)

@@ -191,12 +191,8 @@ class Search:
         self.eventful.count += 1
         # the step size after an event is a guess: the earlier ones are no guide, dynamics may be
         # faster
-        State.begin(
-            S,
-            t,
-            max(min(h, limits.RESTART * self.tolerance), limits.LEAST * h, SURE * abs(t)),
-            after,
-        )
+        again = max(min(h, limits.RESTART * self.tolerance), limits.LEAST * h, SURE * abs(t))
+        S[:] = State.at(t, again, after)
         return (Change.CUT if kept else Change.DROPPED), self._request(t, which)
 
     def _request(self, t: float, which: NDArray[np.bool_]) -> Stop | None:

@@ -152,13 +152,12 @@ class _March:
     def run(self) -> Run:
         """Run once over all input intervals; keep steps of up to `most` bytes."""
         integrator, allowed, crossings = self.integrator, self.tolerances, self.integrator.crossings
-        data, (t_start, t_end) = self.inputs.values[:, 0], self.inputs.span
-        y = integrator.start(self.y0, np.concatenate([self.p, data]) if data.size else self.p)
+        (t_start, t_end), d = self.inputs.span, np.concatenate([self.p, self.inputs.values[:, 0]])
+        y = integrator.start(self.y0, d)
         work = self.work = integrator.borrow()
         self.events = None if crossings is None else Eventful(crossings, allowed.event)
         h = min(first_step(t_end - t_start, t_start), allowed.max_step)
-        State.begin(work.S, t_start, h, y)
-        Given.begin(work.R, allowed.rtol, allowed.max_step, allowed.atol, self.p)
+        work.S[:], work.R[:] = State.at(t_start, h, y), allowed.given(t_end, d)
         work.loop.h_min = smallest_step(t_end - t_start)
         outputs = Outputs.at(self.times, y.size)
         work.want(outputs, self.events)
@@ -258,7 +257,7 @@ class _March:
         self.integrator = other
         self.places.append(here)
         h = max(float(self.work.S[State.H]), first_step(span, self.t))
-        State.begin(self.work.S, self.t, h, here)
+        self.work.S[:] = State.at(self.t, h, here)
         return True
 
     def _act(self, reason: Stop) -> None:
