@@ -17,7 +17,7 @@ from symfric import Law, SolveError, Status, law_from_text, parameters, with_val
 from symfric.choice import NEEDS, Choice, Friction
 from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
-from symfric.choice.text import LEGEND, lines
+from symfric.choice.ranking import LEGEND, lines
 from symfric.cli import completions, output
 from symfric.cli import options as opt
 from symfric.cli.identify import Reading, reading, residuals_of
