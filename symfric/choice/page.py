@@ -6,6 +6,7 @@ from math import isfinite
 from pathlib import Path
 from statistics import median
 from textwrap import wrap
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -63,7 +64,7 @@ def plot_choice(choice: Ranking, path: str | Path | None = None, wide: bool = Tr
         Line2D([], [], ls="", marker=MARKERS[k], color=colour(k), label=KINDS[k], markersize=5)
         for k in sorted(kinds)
     ]
-    hollow = {"ls": "", "marker": "o", "mfc": "none", "mec": "k", "markersize": 5}
+    hollow: dict[str, Any] = {"ls": "", "marker": "o", "mfc": "none", "mec": "k", "markersize": 5}
     figure.legend(
         handles=[*handles, Line2D([], [], label="not ranked", **hollow)],
         loc="outside lower center", ncols=6 if wide else 3, fontsize=SMALL, frameon=False,

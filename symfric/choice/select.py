@@ -12,7 +12,7 @@ from multiprocessing.connection import wait
 from multiprocessing.context import ForkProcess
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, cast, final
 
 from symfric.choice.continuation import RUN
 from symfric.choice.friction import Friction
@@ -273,7 +273,7 @@ def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
                 process.start()
                 theirs.close()
                 crew[ours] = process, name
-            for pipe in wait(list(crew)):
+            for pipe in cast("list[Any]", wait(list(crew))):
                 process, name = crew.pop(pipe)
                 row: Row | None = None
                 with suppress(EOFError):  # a process that died sends nothing

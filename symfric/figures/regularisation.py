@@ -22,6 +22,7 @@ rest is longer than motion, creep dominates.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, isfinite
 from time import process_time
 from typing import final
@@ -233,7 +234,7 @@ def machine_of(
     places: tuple[str, ...] | None = ("law",)
     make: Callable[[Law], object]
     if isinstance(scene, Scene):
-        first, make = scene, lambda law: replace(scene, law=law)
+        first, make = scene, partial(_in_scene, scene)
     elif isinstance(scene, type) and issubclass(scene, Scene):
         first, make = scene(probe), scene
     elif callable(scene):
@@ -247,6 +248,10 @@ def machine_of(
     name = first.name if isinstance(first, Model) else type(first).__name__
     end, given = driven(where, type(first), t_end, u)
     return Machine(name, make, end, of, given, places=places, backend=backend)
+
+
+def _in_scene(scene: Scene, law: Law) -> Scene:
+    return replace(scene, law=law)
 
 
 def driven(
