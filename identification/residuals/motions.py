@@ -96,8 +96,6 @@ def measure(
     for (x, v), velocity in zip(raw, velocities, strict=True):
         motion.append(derivatives(x, v, step, chosen, velocity))
         noise.append(velocity.deviation(chosen, step))
-    cut = chosen.trim(step)
-    inside = slice(cut, max(cut, record.size - cut))
     rows = [part[k] for k in range(3) for part in motion]
     inputs = slice(len(rows), len(rows) + len(forces))
     rows += [*forces, record.time]
@@ -107,7 +105,7 @@ def measure(
         step=step,
         w=np.vstack(rows),
         inputs=inputs,
-        inside=inside,
+        inside=chosen.inside(record.size, step),
         noise=np.array(noise),
         filter=chosen,
     )
