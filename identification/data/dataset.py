@@ -41,8 +41,9 @@ class Dataset:
         if not records:
             raise ValueError("Dataset: expected at least one record, got none")
         object.__setattr__(self, "records", records)
-        more = f" and {len(records) - 1} more" if len(records) > 1 else ""
-        object.__setattr__(self, "name", self.name or f"{records[0].name}{more}")
+        first, *others = [record.name for record in records]
+        more = f" and {len(others)} more" if others else ""
+        object.__setattr__(self, "name", self.name or f"{first}{more}")
         names = {_turns(r): r.name for r in reversed(records)}
         if {True, False} <= names.keys():
             raise ValueError(

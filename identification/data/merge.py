@@ -178,7 +178,7 @@ def _refined(
     slope = np.gradient(y2, two.step)
     begin = one.start - two.start + lag * one.step
     shift, drift, middle = begin, 0.0, float(t1.mean())
-    X, residual, scale = np.eye(4), np.ones(4), np.ones(4)
+    rows, residual, scale = np.eye(4), np.ones(4), np.ones(4)
     for _ in range(ITERATIONS):
         at = t1 - shift - drift * (t1 - middle)
         k = np.clip(np.rint((at - two.start) / two.step).astype(int), 0, y2.size - 1)
@@ -188,17 +188,16 @@ def _refined(
         columns = [-gain * inner, base, np.ones_like(base)]
         if drifting:
             columns.insert(1, -gain * inner * (t1[use] - middle))
-        X, residual = np.column_stack(columns), y1[use] - gain * base - offset
-        scale = np.linalg.norm(X, axis=0) + 1e-300
-        X = X / scale
-        step = np.linalg.lstsq(X, residual, rcond=1e-9)[0] / scale
+        scale = np.linalg.norm(np.column_stack(columns), axis=0) + 1e-300
+        rows, residual = np.column_stack(columns) / scale, y1[use] - gain * base - offset
+        step = np.linalg.lstsq(rows, residual, rcond=1e-9)[0] / scale
         shift += float(np.clip(step[0], -2 * one.step, 2 * one.step))
         turn = float(np.clip(step[1], -1e-3, 1e-3)) if drifting else 0.0
         drift += turn
         if abs(step[0]) < 1e-6 * one.step and abs(turn) < 1e-9:
             break
     rest = float(residual @ residual) * NEIGHBOURS / max(residual.size - 4, 1) + 1e-30
-    inverse = np.linalg.pinv(X.T @ X, rcond=1e-12)
+    inverse = np.linalg.pinv(rows.T @ rows, rcond=1e-12)
     error = float(np.sqrt(rest * inverse[0, 0] / (scale[0] * scale[0])))
     if not error < one.step or abs(shift - begin) > 20 * one.step:
         raise ValueError(

@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -50,7 +50,9 @@ AT_BOUND = 1e-5
 """Distance to a bound, over the width of the box or one, below which a value is at the bound."""
 
 
-class Coordinate(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Coordinate:
     """A coordinate w of a value p whose partner in an order, if any, has the value q.
 
     Attributes:
@@ -90,7 +92,7 @@ def coordinate(unknown: Unknown) -> Coordinate:
     upper = _log(high) if high < inf else inf
     reach = float(np.log(10.0)) * DECADES
     return Coordinate(
-        lambda w, _: ca.exp(w),
+        lambda w, _: _exp(w),
         lambda p, _: _log(p),
         lower if lower > first - reach else -inf,
         upper if upper < first + reach else inf,
@@ -119,13 +121,17 @@ def _above(high: float, scale: float, logarithmic: bool) -> Coordinate:
     if logarithmic:
         middle = _log(scale)
         return Coordinate(
-            lambda w, q: q + ca.exp(w), lambda p, q: float(np.log(excess(p, q))), -inf, inf,
+            lambda w, q: q + _exp(w), lambda p, q: float(np.log(excess(p, q))), -inf, inf,
             middle - VANISHED, middle + VANISHED,
         )  # fmt: skip
     return Coordinate(
-        lambda w, q: q + NEAR * scale * (ca.exp(w) - 1),
+        lambda w, q: q + NEAR * scale * (_exp(w) - 1),
         lambda p, q: float(np.log1p(excess(p, q) / (NEAR * scale))), 0.0, inf, ceiling=VANISHED,
     )  # fmt: skip
+
+
+def _exp(w: ca.SX) -> ca.SX:
+    return ca.exp(w)
 
 
 def _log(value: float) -> float:
@@ -211,7 +217,7 @@ class Unknowns:
     def limits(self) -> tuple[Array, Array]:
         """Coordinates beyond which values count as zero or infinite, see `Coordinate`."""
         each = [coordinate(u) for u in self.unknowns]
-        floor, ceiling = np.array([c[4:] for c in each]).reshape(-1, 2).T
+        floor, ceiling = np.array([(c.floor, c.ceiling) for c in each]).reshape(-1, 2).T
         return (
             np.where(np.isinf(self.lower), floor, -inf),
             np.where(np.isinf(self.upper), ceiling, inf),
@@ -259,5 +265,5 @@ def unknowns_of(
         raise ValueError(f"Fit: expected an unknown for each value, got none for {absent[0]}")
     column = ca.densify(ca.vertcat(*(values[n] for n in names))) if names else ca.SX(0, 1)
     function = ca.Function("values", [w], [column, ca.densify(ca.jacobian(column, w))])
-    box = np.array([c[2:4] for c in each]).reshape(-1, 2)
+    box = np.array([(c.lower, c.upper) for c in each]).reshape(-1, 2)
     return Unknowns(tuple(unknowns), tuple(names), box[:, 0], box[:, 1], function)
