@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu.variables import LEAST_RTOL
 from symfric.integrator.arguments import chosen
-from symfric.integrator.equations.expressions import pace
+from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import (
     FLOOR,
     LONGEST_FIRST,
@@ -201,7 +201,7 @@ def _longest(own: Equations) -> float:
     """Return the longest step [s]: a few straight pieces of events in time alone, see
     `run.integrate`.
     """
-    quickest = min((pace(f, *own.span) for f in own.integrator.schedules), default=inf)
+    quickest = min((pieces(f, *own.span).pace for f in own.integrator.schedules), default=inf)
     return PACES * quickest
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.following import Following
+from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
 from symfric.integrator.running.engine import Stop, VmEngine

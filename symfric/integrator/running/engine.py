@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import bound
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.following import Following
+from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
 from symfric.integrator.running.events import Change, Eventful, Happened, Search

@@ -15,8 +15,7 @@ from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.blocks import refinement
-from symfric.integrator.equations.following import Following, corrected, following
+from symfric.integrator.equations.blocks import Following, corrected, following, refinement
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.matrices import Order
@@ -238,8 +237,8 @@ class Integrator:
 
     @cached_property
     def has_pivots(self) -> bool:
-        """True if pivots have to be chosen, which may be stable at one point and not at another."""
-        return self.system.manifold is None and not self.system.is_ode
+        """See `System.has_pivots`."""
+        return self.system.has_pivots
 
     def suited(self, points: Sequence[tuple[Array, Array]], span: float) -> "Integrator":
         """Return this integrator, or one of the same model with stable pivots.

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import address
-from symfric.integrator.equations.following import Following
+from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
 from symfric.integrator.running.crossings import (
     ALIKE,

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
 """State of a plant: at its sample; out of attempts; steps too small; algebraic unknowns too far
-from the last ones to follow (`symfric.integrator.equations.following`); resolved by the caller, to
+from the last ones to follow (`symfric.integrator.equations.blocks`); resolved by the caller, to
 be continued; event storm; ended by a terminal event.
 """
 SAMPLES = 1000

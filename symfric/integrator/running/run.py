@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import evaluate
 from symfric.foundation.status import Status
-from symfric.integrator.equations.expressions import pace
+from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.diagnosis import chattering, explain
@@ -128,7 +128,7 @@ def integrate(
     nominal = integrator.system.nominal
     if integrator.model.events:
         # at equilibrium only the events show that an input has become large enough to start motion
-        quickest = min([inputs.pace, *(pace(f, *inputs.span) for f in integrator.schedules)])
+        quickest = min([inputs.pace, *(pieces(f, *inputs.span).pace for f in integrator.schedules)])
         tolerances = replace(tolerances, max_step=min(tolerances.max_step, PACES * quickest))
     scale, allowed = nominal, tolerances
     run, last = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)

@@ -22,7 +22,7 @@ derivatives and C code.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, final
 
 import casadi as ca
@@ -139,7 +139,7 @@ def steps(system: System, method: Method) -> Trials:
     def projected(y: Any, h: Any, d: Any) -> Trial:
         found = free(y, h, d)
         end = manifold.project(found.end, d)
-        return replace(found, end=end, shift=end - found.end)
+        return found._replace(end=end, shift=end - found.end)
 
     return projected
 

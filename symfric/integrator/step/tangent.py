@@ -168,9 +168,9 @@ class _Chart:
             ca.SX.sym("q0", rows.n),
             ca.SX.sym("V", rows.n, rows.nv),
             phi_q,
-            lu.packed_symbol,
+            lu.symbols,
             ca.Function("factor_chart", [phi_q], [lu.packed], {"cse": True}),
-            ca.Function("solve_chart", [lu.packed_symbol, r], [lu.solve(r)]),
+            ca.Function("solve_chart", [lu.symbols, r], [lu.solve(r)]),
         )
 
     @property
