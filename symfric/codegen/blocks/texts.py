@@ -78,7 +78,7 @@ def _text(law: Parametric) -> LawText:
         title=" ".join(paragraphs[0].split()),
         equations="\n".join(lines).replace("`", ""),
         limits=tuple(_limits(about)),
-        source=" ".join(source.split()),
+        source=" ".join(source.partition("\nChecked: ")[0].split()),
     )
 
 
