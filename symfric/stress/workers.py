@@ -2,10 +2,10 @@
 
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
@@ -45,7 +45,7 @@ class _Running:
 
 def outcomes(
     work: Work, tasks: Iterable[Task], size: int, limit: float
-) -> Iterator[tuple[int, Any]]:
+) -> Generator[tuple[int, Any]]:
     """Yield number and result of each task as they come, or `Crashed` or `TimedOut`.
 
     Each task has a process, a copy of one that has imported the module of `work`. Closing the
@@ -60,7 +60,7 @@ def outcomes(
     """
     context = get_context("forkserver")
     context.set_forkserver_preload(["__main__", work.__module__])
-    waiting, running = iter(tasks), dict[Connection, _Running]()
+    waiting, running = iter(tasks), dict[Any, _Running]()
     with TemporaryDirectory(prefix="symfric-") as folder:
         try:
             while True:
@@ -87,13 +87,13 @@ def outcomes(
                 _end(pipe, one)
 
 
-def _end(pipe: Connection, one: _Running) -> None:
+def _end(pipe: Any, one: _Running) -> None:
     one.process.kill()
     one.process.join(10)
     pipe.close()
 
 
-def _result(pipe: Connection, one: _Running, limit: float) -> Any:
+def _result(pipe: Any, one: _Running, limit: float) -> Any:
     """Return the result of a task, or describe how its process ended."""
     try:
         return pipe.recv()
@@ -107,7 +107,7 @@ def _result(pipe: Connection, one: _Running, limit: float) -> Any:
     return Crashed(how, lines[-1] if lines else "no output")
 
 
-def _run(work: Work, argument: Any, pipe: Connection, log: str, limit: float) -> None:
+def _run(work: Work, argument: Any, pipe: Any, log: str, limit: float) -> None:
     """Run one task; an exception ends the process, its traceback in `log`.
 
     The timer counts processor time and ends the process by SIGPROF, inside compiled code, too.

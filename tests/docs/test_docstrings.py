@@ -61,7 +61,9 @@ def test_sections_stay_and_blocks_are_literal() -> None:
 
 
 def test_equations_and_symbols_become_formulas() -> None:
-    shown = to_rst("Title of mu_s.\n\n    F = N v\n\nAnd:\n\n    run = simulate(model!)\n", formulas=True)
+    shown = to_rst(
+        "Title of mu_s.\n\n    F = N v\n\nAnd:\n\n    run = simulate(model!)\n", formulas=True
+    )
     assert shown.count(".. math::") == 1
     assert r"\ :math:`\mu_{\mathrm{s}}`\ " in shown
     assert "::\n\n   run = simulate(model!)" in shown
