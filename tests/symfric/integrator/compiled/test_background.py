@@ -192,7 +192,9 @@ def test_a_forked_process_leaves_the_compiler_of_its_parent_alone(
         "b.wait()\n"
     )
     code = ENDING.format(calls=str(calls), end=end)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=False, timeout=60
+    )
     assert done.returncode == 0, done.stderr
     assert [path.suffix for path in folder.iterdir()] == [".so"]
     assert count(calls) == 1
