@@ -5,7 +5,7 @@ import pickle
 import subprocess
 import sys
 import weakref
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,19 +76,23 @@ def test_equal_jobs_have_one_digest_and_every_field_counts() -> None:
     same, _ = task(switched(), [1.0, 0.0])
     assert digest(job) == digest(same) == digest(pickle.loads(pickle.dumps(job)))
     x = ca.SX.sym("x")
-    other = ca.Function("other", [x], [2 * x])
+    changes: dict[type, Any] = {
+        str: lambda v: v + " ", bool: lambda v: not v, int: lambda v: v + 1,
+        tuple: lambda v: (*v, "more"), np.ndarray: lambda v: v + 1e-15, type(None): lambda v: 1,
+        ca.Function: lambda v: ca.Function("other", [x], [2 * x]),
+    }  # fmt: skip
 
-    def changed(whole: Any) -> list[Any]:
+    def changed(whole: object) -> list[Any]:
+        """Copies of `whole`, each with one field changed at any depth."""
+        if not is_dataclass(whole):
+            return [None]
         found = []
         for item in fields(whole):
             value = getattr(whole, item.name)
-            new = {
-                str: lambda v: v + " ", bool: lambda v: not v, int: lambda v: v + 1,
-                tuple: lambda v: (*v, "more"), np.ndarray: lambda v: v + 1e-15,
-                ca.Function: lambda v: other, type(None): lambda v: 1,
-            }.get(type(value), lambda v: changed(v) if hasattr(v, "__dataclass_fields__") else None)(value)  # fmt: skip
-            for one in new if isinstance(new, list) else [new]:
-                found.append(replace(whole, **{item.name: one}))
+            new = changes.get(type(value), changed)(value)
+            found += [
+                replace(whole, **{item.name: n}) for n in (new if type(new) is list else [new])
+            ]
         return found
 
     every = changed(job)
