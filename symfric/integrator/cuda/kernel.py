@@ -73,7 +73,7 @@ def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE)
     Raises:
         ValueError: an operation that C does not have.
     """
-    known: dict[tuple[bool, str], Kernel] = vars(integrator).setdefault("kernels", {})
+    known: dict[tuple[bool, str], Kernel] = integrator.memory.setdefault("kernels", {})
     key = between, real.name
     if key not in known:
         known[key] = _written(integrator, between, real)

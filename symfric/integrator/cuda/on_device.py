@@ -15,7 +15,7 @@ from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
 from symfric.integrator.many.members import Advanced, Counts, Stretch, struct
 from symfric.integrator.many.program import Program, program
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import State
 from symfric.model import Model

@@ -108,7 +108,7 @@ class Program:
         """Runner of the members; raises CompileError without a working compiler."""
         if isinstance(self.code, str):
             return CompiledMembers.of(self.code, self.n_signals)
-        engine = VmEngine.of(self.code, follows=self.follows)
+        engine = VmEngine(self.code, follows=self.follows)
         return VmMembers(engine, Columns(self.signals), self.follow)
 
     @cached_property
@@ -127,7 +127,7 @@ class Program:
 def program(integrator: Integrator, compiled: bool) -> Program:
     """Return the program of an integrator, written once and cached with it."""
     with _LOCK:
-        known: dict[bool, Program] = vars(integrator).setdefault("programs", {})
+        known: dict[bool, Program] = integrator.memory.setdefault("programs", {})
         if compiled not in known:
             known[compiled] = _written(integrator, compiled)
         return known[compiled]

@@ -18,7 +18,8 @@ from symfric.integrator.many.members import (
     many_source,
 )
 from symfric.integrator.methods.tableaux import RODAS5P
-from symfric.integrator.running.engine import Stop, VmEngine
+from symfric.integrator.running.engine import VmEngine
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
 
@@ -29,7 +30,7 @@ def compiled(integrator: Integrator) -> Members:
 
 
 def vm(integrator: Integrator) -> Members:
-    return VmMembers(VmEngine.of(integrator.step), Columns(integrator.signals), None)
+    return VmMembers(VmEngine(integrator.step), Columns(integrator.signals), None)
 
 
 each_loop = pytest.mark.parametrize("make", [vm, compiled])
