@@ -309,7 +309,7 @@ def _task(
     compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
     if compiled and isinstance(executor, str):
         try:
-            assert program(integrator, True).members
+            _ = program(integrator, True).members
         except CompileError:
             if backend == "compiled":
                 raise
