@@ -44,7 +44,7 @@ def machine() -> str:
 def others() -> list[str]:
     """Return versions of installed tools that subjects compare with."""
     found: list[str] = []
-    for name in ("numpy", "scipy", "rockit-meco", "do-mpc", "exudyn"):
+    for name in ("numpy", "scipy", "rockit-meco", "do-mpc"):
         with suppress(PackageNotFoundError):
             found.append(f"{name} {version(name)}")
     return found

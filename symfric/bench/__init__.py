@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 TABLES = ("calls", "ensemble", "embedded", "interop")
 """Subjects without a picture."""
 PICTURES = (
-    *("integrator", "multibody", "ivp", "jitter", "regularisation", "ocp", "identification"),
+    *("integrator", "multibody", "ivp", "regularisation", "ocp", "identification"),
     "codegen",
 )
 """Subjects with a picture."""

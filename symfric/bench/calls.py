@@ -1,11 +1,9 @@
-"""Benchmarks of short calls, events, gradients, signals and import.
+"""Benchmarks of many short calls, and of events.
 
 Times are processor times of whole calls from Python, the shortest of several rounds in which all
 methods take turns. Ratios are relative to the first method of each task, which is symfric.
 """
 
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from math import nan
@@ -18,7 +16,6 @@ from symfric.bench.contenders import buffered, compiled, tolerances
 from symfric.bench.report import Found, Progress, Report, backend, interleaved, unwarned
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.by_peer import peer
-from symfric.integrator.compiled.background import wait
 from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.simulate import simulate
@@ -26,8 +23,7 @@ from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
 from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.model import Model
-from symfric.results.trajectory import Trajectory
-from symfric.scenes import Arm, Drive, FourBar, Rabinowicz
+from symfric.scenes import Arm, Drive, Rabinowicz
 
 Array = NDArray[np.float64]
 Calls = dict[str, Callable[[], object]]
@@ -139,9 +135,6 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
     return solve
 
 
-# ---- events, gradients, signals, import ----
-
-
 def _events(quick: bool) -> Iterator[Found]:
     """Measure exact Maxwell-slip elements with events, and their smooth form."""
     elements = 4 if quick else 30
@@ -167,69 +160,4 @@ def _gms(count: int, form: str) -> Law:
     return GMS(elements=tuple(Element(float(k), 1.0 / count) for k in stiffness), form=form)
 
 
-def _gradient(quick: bool) -> Iterator[Found]:
-    """Measure the gradient of the mean square position at 401 times by four parameters.
-
-    Errors are relative to the sum of the magnitudes of the terms.
-    """
-    model, times = Rabinowicz(BrownMcPhee()).model(free=FREE), np.linspace(0.0, 20.0, 401)
-
-    def run(rtol: float = RTOL, sensitivities: tuple[str, ...] = FREE) -> Trajectory:
-        return simulate(
-            model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=backend(),
-            method="radau5",
-        )  # fmt: skip
-
-    def slopes(rtol: float = RTOL) -> Array:
-        found = run(rtol).sensitivities
-        return np.array([found[name]["x"] for name in FREE])
-
-    weights = run(1e-11)["x"]
-    exact = slopes(1e-11)
-    scale = np.abs(exact) @ np.abs(weights)
-    methods: dict[str, Callable[[], Array]] = {
-        "forward": lambda: slopes() @ weights,
-        "adjoint": lambda: np.array(list(run().gradient({"x": weights}).values())),
-    }
-    errors = {
-        who: float(np.max(np.abs(found() - exact @ weights) / scale))
-        for who, found in methods.items()
-    }
-    times_s = interleaved({"run": lambda: run(sensitivities=())} | methods, 2 if quick else 20)
-    yield from _rows("gradient, 4 parameters", "run", times_s, errors)
-
-
-OFTEN = 60
-"""Number of calls after which signals are compiled in the background."""
-
-
-def _signals(quick: bool) -> Iterator[Found]:
-    """Measure all signals of a mechanism at 2001 times."""
-    for name, scene in {"four_bar": FourBar(BrownMcPhee()), "arm": Arm(BrownMcPhee())}.items():
-        calls: Calls = {}
-        for engine in dict.fromkeys((backend(), "vm")):
-            run = simulate(scene.model(), 0.1, samples=51 if quick else 2001, backend=engine)
-            calls[engine] = partial(run.at, run.t)
-            for _ in range(1 if quick else OFTEN):
-                run.at(run.t)
-        wait()
-        yield from _rows(f"signals of {name}", "call", interleaved(calls, 1 if quick else 3))
-
-
-def _imports(quick: bool) -> Iterator[Found]:
-    """Measure imports of the package, of a first simulation and of CasADi in a new interpreter."""
-    statements = (
-        "import symfric", "from symfric import LuGre, rabinowicz, simulate", "import casadi"
-    )  # fmt: skip
-    best: dict[str, float] = dict.fromkeys(statements, np.inf)
-    for _ in range(1 if quick else 7):
-        for text in statements:
-            code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"
-            done = subprocess.run(
-                [sys.executable, "-c", code], check=True, capture_output=True, text=True
-            )
-            best[text] = min(best[text], float(done.stdout))
-    yield from _rows("import", "import", best)
-
-
-TASKS = (_drive, _arm, _events, _gradient, _signals, _imports)
+TASKS = (_drive, _arm, _events)

@@ -1,11 +1,9 @@
-"""Friction with memory: six parameters of LuGre, compared with single shooting with cvodes; GMS."""
+"""Friction with memory: six parameters of LuGre, and GMS."""
 
 from collections.abc import Iterator
 from functools import lru_cache, partial
-from importlib import import_module
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,10 +36,8 @@ OFF = 3.0
 """Largest factor between the start values of stiffness and damping and their guess."""
 GUESS = 3.8e4
 """Mean of the start values of the stiffness [N/m]."""
-SCALES = np.array([1e-4, 1e-2, 1e-5])
-"""Scales of position, velocity and bristle for the error control of cvodes."""
-SEEDS, AGAINST = 100, 4
-"""Noise seeds, and those for which cvodes runs as well."""
+SEEDS = 100
+"""Number of noise seeds."""
 
 
 def driven() -> list[tuple[Array, Array]]:
@@ -94,50 +90,8 @@ def within(fit: Fitted) -> bool:
     return True
 
 
-def by_cvodes(fit: Fit) -> dict[str, float]:
-    """Fit the same six by single shooting: cvodes between samples with forward sensitivities.
-
-    SciPy's trust region works on the logarithms, from the same start.
-    """
-    optimize: Any = import_module("scipy.optimize")
-    runs = [_shoot(u) for _, u in driven()]
-    measured = [record["x"] for record in fit.data]
-
-    def residuals(q: Array) -> Array:
-        pairs = zip(runs, measured, strict=True)
-        return np.concatenate([(run[0](q).full().ravel() - y) / NOISE for run, y in pairs])
-
-    def slopes(q: Array) -> Array:
-        return np.vstack([run[1](q).full() for run in runs]) / NOISE
-
-    # bounds of three decades, which the trust region does not need, keep cvodes from stiffness far
-    # beyond that of any lugre
-    q0 = np.log([fit.start[n] for n in TRUTH])
-    box = (q0 - np.log(1e3), q0 + np.log(1e3))
-    end = optimize.least_squares(residuals, q0, slopes, x_scale="jac", bounds=box, max_nfev=60)
-    return dict(zip(TRUTH, np.exp(end.x).tolist(), strict=True))
-
-
-def _shoot(u: Array) -> tuple[ca.Function, ca.Function]:
-    """Return positions of one record as a function of the logarithms, and their derivatives."""
-    q, x, force = ca.SX.sym("q", len(TRUTH)), ca.SX.sym("x", 3), ca.SX.sym("force")
-    law = LuGre(**{n: ca.exp(q[i]) for i, n in enumerate(TRUTH)})
-    v, z = x[1] * SCALES[1], x[2] * SCALES[2]
-    rate = ca.vertcat(v, force - law.force(v, 1.0, z), law.rate(v, 1.0, z)) / SCALES
-    equations = {"x": x, "p": ca.vertcat(force, q), "ode": STEP * rate}
-    options = {"abstol": 1e-7, "reltol": 1e-7, "max_num_steps": 20000}
-    one = ca.integrator("one", "cvodes", equations, 0, 1, options)
-    X, U, Q = ca.MX.sym("X", 3), ca.MX.sym("U"), ca.MX.sym("Q", len(TRUTH))
-    step = ca.Function("step", [X, U, Q], [one(x0=X, p=ca.vertcat(U, Q))["xf"]])
-    count = u.size - 1
-    held = ca.DM(u[:-1]).T
-    path = step.mapaccum("path", count)(ca.DM.zeros(3), held, ca.repmat(Q, 1, count))
-    y = SCALES[0] * ca.horzcat(0, path[0, :]).T
-    return ca.Function("y", [Q], [y]), ca.Function("J", [Q], [ca.jacobian(y, Q)])
-
-
 def lugre(quick: bool) -> Iterator[Found]:
-    """Measure seeds that find the truth, the time of a fit, and that of cvodes on the same seeds.
+    """Measure seeds that find the truth, and the time of a fit.
 
     A mass of 1 kg is driven by a force that is held for each millisecond: pre-sliding, break-away
     with reversals, gross sliding; three records, 2600 samples. Each seed has other noise. Its start
@@ -145,7 +99,7 @@ def lugre(quick: bool) -> Iterator[Found]:
     stiffness and damping of the bristles are off by factors of up to 3 from a value that is itself
     too low.
     """
-    seeds, against = (4, 1) if quick else (SEEDS, AGAINST)
+    seeds = 4 if quick else SEEDS
     right, doubted, seconds = 0, 0, list[float]()
     for seed in range(seeds):
         spent, fit = timed(partial(case(seed).solve, throw=False))
@@ -157,14 +111,6 @@ def lugre(quick: bool) -> Iterator[Found]:
     yield goal("found, % of seeds", 100 * right / seeds, 95, ">=", total)
     yield goal("median of a fit, s", float(np.median(seconds)), 4, "<=", total, spread)
     yield goal("right model doubted, % of seeds", 100 * doubted / seeds, 5, "<=", total)
-    times, note = list[float](), list[str]()
-    for seed in range(against):
-        spent, values = timed(partial(by_cvodes, case(seed)))
-        times.append(spent)
-        error = max(abs(values[n] / x - 1) for n, x in TRUTH.items())
-        note.append(f"{spent:.1f} s, error {100 * error:.2g} %")
-    ratio = float(np.median(times) / np.median(seconds[:against]))
-    yield goal("cvodes, times as long", ratio, 5, ">=", sum(times), "; ".join(note))
 
 
 # ---- Maxwell-slip elements and GMS ----

@@ -1,11 +1,11 @@
 """Run time against error on Rabinowicz's stick-slip, for symfric and other integrators."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stderr, suppress
 from functools import partial
 from importlib.util import find_spec
 from io import StringIO
-from math import exp, inf, log, nan
+from math import nan
 from time import process_time
 
 import casadi as ca
@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 from symfric.bench import contenders
 from symfric.bench.contenders import Contender, equations, tolerances
 from symfric.bench.ensemble import threads
-from symfric.bench.report import Found, Progress, Report, Row, backend, best_time, curves, unwarned
+from symfric.bench.report import (
+    Found,
+    Progress,
+    Report,
+    backend,
+    best_time,
+    curves,
+    ratios,
+    unwarned,
+)
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.simulate import simulate
@@ -34,7 +43,6 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 ERRORS = (1e-4, 1e-5, 1e-7)
 OURS = "symfric compiled"
 RUNS = "Time of a run of 20 s against its error"
-RATIOS = "Time at equal error"
 FIRST = "First call on a new model"
 SLOPES = "Derivatives; ratios compare the run with derivatives to the run alone"
 
@@ -52,7 +60,7 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
         tasks[f"{case}: first call"] = partial(_first, case, law)  # before anything is cached
     for case, law in CASES.items():
         tasks[case] = partial(_runs, case, law, makers, quick)
-    tasks["ratios"] = lambda: ratios(report.tables[RUNS])
+    tasks["ratios"] = lambda: ratios(report.tables[RUNS], OURS, ERRORS)
     for case, law in CASES.items():
         tasks[f"{case}: ensembles"] = partial(threads, case, law, quick)
         tasks[f"{case}: derivatives"] = partial(_derivatives, case, law, quick)
@@ -125,40 +133,6 @@ def _runs(
                 "case": case, "integrator": name, "rtol": rtol, "relative error": error,
                 "time per run [ms]": 1e3 * time_s, "steps": int(steps),
             }  # fmt: skip
-
-
-def ratios(rows: Sequence[Row], reference: str = OURS) -> Iterator[Found]:
-    """Yield times relative to `reference` at equal error, where both integrators reach it."""
-    for case in dict.fromkeys(r["case"] for r in rows):
-        own = [r for r in rows if r["case"] == case]
-        for error in ERRORS:
-            times = {
-                name: time_at([r for r in own if r["integrator"] == name], error)
-                for name in dict.fromkeys(r["integrator"] for r in own)
-            }
-            for name, time_ms in times.items():
-                ratio = time_ms / times.get(reference, nan)
-                if ratio == ratio:
-                    yield RATIOS, {
-                        "case": case, "relative error": error, "integrator": name,
-                        "time per run [ms]": time_ms, f"ratio to {reference}": ratio,
-                    }  # fmt: skip
-
-
-def time_at(rows: Sequence[Row], error: float) -> float:
-    """Return the time [ms] to reach `error`, log-log interpolated; NaN if not reached."""
-    points = sorted((float(r["relative error"]), float(r["time per run [ms]"])) for r in rows)
-    best: list[tuple[float, float]] = []
-    for e, t in points:  # from the most accurate; keep rows that are cheaper than all before
-        if e > 0 and t < (best[-1][1] if best else inf):
-            best.append((e, t))
-    below, above = ([p for p in best if (p[0] > error) is side] for side in (False, True))
-    if not below:
-        return nan
-    if not above:
-        return below[-1][1]
-    at, times = np.log([below[-1], above[0]]).T
-    return exp(np.interp(log(error), at, times))
 
 
 # ---- derivatives, forward and adjoint, relative to the run alone ----

@@ -1,33 +1,59 @@
-"""Mechanisms: run time at equal error compared with other tools, cost of the step, counts."""
+"""Mechanisms: run time at equal error compared with other tools, size and cost of the step."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
-from importlib.util import find_spec
-from math import inf, nan
-from time import process_time
+from math import inf
+from time import perf_counter, process_time
 from typing import final
 
+import casadi as ca
 import numpy as np
 
-from symfric.bench import exudyn_peer, mechanisms
 from symfric.bench.contenders import MECHANISMS, Array, Contender
-from symfric.bench.mechanisms import SIZES, chain
-from symfric.bench.report import Found, Progress, Report, Row, best_time, curves, unwarned
+from symfric.bench.report import (
+    Found,
+    Progress,
+    Report,
+    Row,
+    best_time,
+    compile_time,
+    curves,
+    ratios,
+    unwarned,
+)
+from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
+from symfric.integrator.equations.initial import consistent, first_guess
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import c_source
+from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.simulate import simulate
-from symfric.laws import BrownMcPhee
-from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
+from symfric.integrator.step.layout import Given, State
+from symfric.laws import BrownMcPhee, Law, Viscous
+from symfric.model import Model
+from symfric.multibody import JointFriction, Mechanism, Revolute
+from symfric.scenes import DoublePendulum, FourMass, MechanismScene, PendulumBox, SliderCrank
 
-OURS, LOOP, EXUDYN = "symfric", "symfric loop", "exudyn"
+OURS = "symfric"
 ERRORS = (1e-4, 2e-5, 1e-5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-STEPS = (250, 500, 1000, 1250, 2500, 5000)
-"""Numbers of steps of Exudyn, whose step size is fixed."""
 CRANK = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
+LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+ALL = ("x1", "y2", "z3", "x4")
+METHOD = METHODS["rodas5p"]
+BOTH = ("joint", "absolute")
+"""Coordinates in which mechanisms are built."""
 RUNS = "Time of a run against its error"
-RATIOS = "Loosest tolerance that keeps an error"
-SETTING = "rtol (Exudyn: number of steps)"
+COUNTS = "Size of the equations of mechanisms; CasADi instructions"
+COMPILED = "Step of symfric as machine code, compiled once for all tolerances and parameters"
+CHAINS = "Step of a chain in the virtual machine"
+DRIFTS = "Energy of frictionless mechanisms"
+SIZES = (2, 4, 8, 16, 32, 64)
+X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+BUDGET = 120.0
+"""Build time [s] above which no longer chain is measured."""
 
 
 @final
@@ -67,7 +93,7 @@ def bench(quick: bool = False, links: Sequence[int] = SIZES, progress: Progress 
         links: lengths of the chains.
         progress: called with the current item and the fraction done.
     """
-    kinds = ("joint",) if quick else mechanisms.BOTH
+    kinds = ("joint",) if quick else BOTH
     draw = curves("case", ("integrator",), "relative error", "time per run [ms]")
     report = Report((RUNS, draw))
     tasks: dict[str, Callable[[], Iterable[Found]]] = {
@@ -78,20 +104,13 @@ def bench(quick: bool = False, links: Sequence[int] = SIZES, progress: Progress 
     }
     if not find_compiler():
         report.notes.append("runs: not run, no C compiler")
-    elif quick or find_spec(EXUDYN) is None:
-        why = "takes too long for --quick" if quick else "not installed (extra 'bench')"
-        report.notes.append(f"{EXUDYN}: not run, {why}")
-    else:
-        tasks[EXUDYN] = _exudyn
     make = partial(chain, law=BrownMcPhee(v_t=0.01))
     tasks |= {
-        "ratios": lambda: ratios(report.tables.get(RUNS, [])),
-        "compilation": partial(mechanisms.compilation, kinds),
-        "counts": partial(mechanisms.counts, kinds),
-        "chains": partial(mechanisms.chains, make, links),
-        "reference values": mechanisms.facts,
-        "constraints": partial(mechanisms.norms, kinds),
-        "energy": partial(mechanisms.drifts, 1.0 if quick else mechanisms.DRIFT_S),
+        "ratios": lambda: ratios(report.tables.get(RUNS, []), OURS, ERRORS),
+        "compilation": partial(compilation, kinds),
+        "counts": partial(counts, kinds),
+        "chains": partial(chains, make, links),
+        "energy": partial(drifts, 1.0 if quick else DRIFT_S),
     }
     return report.collect(tasks, progress)
 
@@ -103,13 +122,6 @@ def _runs(case: str, name: str, quick: bool) -> Iterator[Found]:
     for rtol in TOLERANCES[2:5] if quick else TOLERANCES:
         solver = partial(make, model, what.times, what.watched[formulation], rtol)
         yield _run(case, name, rtol, solver)
-
-
-def _exudyn() -> Iterator[Found]:
-    times = CASES["slider_crank"].times
-    for steps in STEPS:
-        solver = partial(exudyn_peer.slider_crank, SliderCrank(CRANK), CRANK, times, steps)
-        yield _run("slider_crank", EXUDYN, steps, solver)
 
 
 def _run(case: str, name: str, setting: float, make: Callable[[], Contender]) -> Found:
@@ -128,7 +140,7 @@ def _run(case: str, name: str, setting: float, make: Callable[[], Contender]) ->
     exact = _exact(case)
     error = float(np.abs(found - exact).max() / np.abs(exact).max()) if found.size else inf
     return RUNS, {
-        "case": case, "integrator": name, SETTING: setting, "relative error": error,
+        "case": case, "integrator": name, "rtol": setting, "relative error": error,
         "steps": count(), "time per run [ms]": 1e3 * time_s,
         "compile time [s]": contender.compile_s,
     }  # fmt: skip
@@ -144,37 +156,154 @@ def _exact(case: str) -> Array:
     return np.array([run[name] for name in what.watched["joint"]])
 
 
-def ratios(rows: Sequence[Row]) -> Iterator[Found]:
-    """Yield times of all integrators relative to symfric, at each of the errors that both keep.
+# ---- size and cost of the equations ----
 
-    Each integrator has the fewest requested steps whose error is at most the bound. Times are
-    relative to `simulate` in joint coordinates, and to its compiled loop without the overhead of
-    Python.
+
+def four_mass(joints: tuple[str, ...] = (), friction: JointFriction | None = None) -> Mechanism:
+    """Return the four-mass system with friction in `joints` only, by default that of the scene."""
+    m = FourMass(LAW).mechanism()
+    m.joints = [
+        replace(j, friction=(friction or j.friction) if j.name in joints else None)
+        for j in m.joints
+    ]
+    return m
+
+
+def turned_pendulum() -> Mechanism:
+    """Return the double pendulum with its second hinge turned, which makes the motion spatial."""
+    m = DoublePendulum(LAW).mechanism()
+    m.frame("upper.turned", at=(0.0, 0.0, -0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
+    m.frame("lower.turned", at=(0.0, 0.0, 0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
+    second = m.joints[1]
+    hinge = Revolute("phi_2", "upper.turned", "lower.turned", friction=second.friction)
+    m.joints = [m.joints[0], hinge]
+    return m
+
+
+VARIANTS: dict[tuple[str, str], Callable[[], Mechanism]] = {
+    ("four_mass", "frictionless"): four_mass,
+    ("four_mass", "constant normal"): lambda: four_mass(ALL, JointFriction(LAW, normal=50.0)),
+    ("four_mass", "reactions in one"): lambda: four_mass(("x1",)),
+    ("four_mass", "reactions in all"): lambda: four_mass(ALL),
+    ("double_pendulum", "planar"): lambda: DoublePendulum(LAW).mechanism(),
+    ("double_pendulum", "spatial"): turned_pendulum,
+}
+BUILT: dict[str, Callable[[], Mechanism]] = {
+    "slider_crank": lambda: SliderCrank(LAW).mechanism(),
+    "four_mass": lambda: four_mass(ALL),
+}
+
+
+def integrator(model: Model) -> Integrator:
+    """Return the adaptive integrator of a model without inputs."""
+    return Integrator(model, input_data(model, None, 0.0, 1.0), METHOD)
+
+
+@cache
+def count(mechanism: str, variant: str, coordinates: str) -> Row:
+    """Count unknowns, CasADi instructions and nonzeros of one of `VARIANTS`."""
+    model = VARIANTS[mechanism, variant]().build(formulation=coordinates)
+    made = integrator(model)
+    return {
+        "mechanism": mechanism, "variant": variant, "coordinates": coordinates,
+        "states": len(model.x), "algebraic variables": len(model.z),
+        "instructions, accelerations": model.function("ode").n_instructions(),
+        "instructions, step": made.instructions,
+        "nonzeros of the Jacobian": ca.jacobian(made.system.f, made.system.y).nnz(),
+    }  # fmt: skip
+
+
+def counts(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
+    """Count all variants."""
+    yield from ((COUNTS, count(*key, c)) for c in coordinates for key in VARIANTS)
+
+
+def compilation(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
+    """Measure times for building and compiling a step, if there is a compiler."""
+    for c in coordinates if find_compiler() else ():
+        for name, mechanism in BUILT.items():
+            begin = perf_counter()
+            made = integrator(mechanism().build(formulation=c))
+            source = c_source(made.step, METHOD.H.shape[0])
+            yield COMPILED, {
+                "mechanism": name, "coordinates": c, "build time [s]": perf_counter() - begin,
+                "lines of C": source.count("\n"), "compile time [s]": compile_time(source),
+            }  # fmt: skip
+
+
+def chain(links: int, law: Law | None = None) -> Model:
+    """Return a hanging chain of equal rods with hinges about x and y in turn; friction from
+    reactions.
     """
-    for case in dict.fromkeys(r["case"] for r in rows):
-        own = [r for r in rows if r["case"] == case]
-        for bound in ERRORS:
-            kept = [r for r in own if float(r["relative error"]) <= bound]
-            loosest = {
-                name: min((r for r in kept if r["integrator"] == name), key=_effort, default=None)
-                for name in dict.fromkeys(r["integrator"] for r in own)
-            }
-            base, loop = (_time(loosest.get(name)) for name in (OURS, LOOP))
-            for row in loosest.values():
-                if row and base == base:
-                    yield RATIOS, {
-                        "case": case, "error bound": bound, "integrator": row["integrator"],
-                        SETTING: row[SETTING], "relative error": row["relative error"],
-                        "steps": row["steps"], "time per run [ms]": _time(row),
-                        "ratio to simulate": _time(row) / base,
-                        "ratio to the loop": _time(row) / loop,
-                    }  # fmt: skip
+    m, length = Mechanism("chain"), 1.0
+    m.frame("ground.end", z=Y)
+    last = "ground"
+    for i in range(links):
+        body, axis = f"rod_{i + 1}", X if i % 2 else Y
+        m.body(body, 1.0, (length**2 / 12, length**2 / 12, 1e-3))
+        m.frame(f"{body}.top", at=(0.0, 0.0, length / 2), z=axis)
+        m.frame(f"{body}.end", at=(0.0, 0.0, -length / 2), z=Y if i % 2 else X)
+        friction = None if law is None else JointFriction(law, radius=0.02)
+        m.joint(Revolute(f"q{i + 1}", f"{last}.end", f"{body}.top", start=0.3, friction=friction))
+        last = body
+    return m.build()
 
 
-def _effort(row: Row) -> float:
-    """Return a number that increases with the requested number of steps."""
-    return (1.0 if row["integrator"] == EXUDYN else -1.0) * float(row[SETTING])
+def chains(
+    make: Callable[[int], Model], sizes: Sequence[int] = SIZES, budget: float = BUDGET
+) -> Iterator[Found]:
+    """Measure the step of `make(n)` for each n of `sizes`, until building exceeds `budget` [s]."""
+    rows: list[Row] = []
+    for n in sizes:
+        begin = perf_counter()
+        made = integrator(make(n))
+        build_s = perf_counter() - begin
+        rows.append(
+            {"links": n, "build time [s]": build_s, "instructions": made.instructions,
+             "time per step [us]": 1e6 * step_time(made)}
+        )  # fmt: skip
+        yield CHAINS, rows[-1]
+        if build_s > budget:
+            break
+    if len(rows) > 1:
+        growth = [f"{c} {exponent(rows, c):.2f}" for c in ("instructions", "time per step [us]")]
+        yield f"Growth exponents of a chain: {', '.join(growth)}"
 
 
-def _time(row: Row | None) -> float:
-    return float(row["time per run [ms]"]) if row else nan
+def exponent(rows: Sequence[Row], column: str, smallest: int = 8) -> float:
+    """Return the slope of the logarithm of a column over that of the links, from `smallest` on."""
+    used = [row for row in rows if float(row["links"]) >= smallest]
+    used = used if len(used) > 1 else rows[-2:]
+    links, values = (np.log([float(row[c]) for row in used]) for c in ("links", column))
+    return float(np.polyfit(links, values, 1)[0])
+
+
+def step_time(made: Integrator) -> float:
+    """Return the time [s] of an attempt from the start, in the virtual machine."""
+    whole, model = made.system, made.model
+    y = first_guess(whole, model, model.initial_state())
+    d = np.zeros(whole.d.numel())
+    y = consistent(whole, "bench", y, d)
+    S = State.at(0.0, 1e-4, y)
+    R = Given.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
+    S_out, D = np.zeros(S.size), np.zeros(made.step.numel_out(1))
+    return best_time(bound(made.step, (S, R), (S_out, D)), budget=0.1, most=1000)[0]
+
+
+DRIFT_S = 100.0
+"""Duration [s] of the run over which the energy of a frictionless mechanism is checked."""
+
+
+def drifts(t_end: float = DRIFT_S) -> Iterator[Found]:
+    """Measure the change of energy of frictionless mechanisms over `t_end` [s] at rtol 1e-10.
+
+    It is relative to the largest kinetic energy, or to the energy at the start if that is larger.
+    """
+    for kind in (FourMass, SliderCrank):
+        run = simulate(kind(Viscous(sigma_2=0.0)).model(), t_end, rtol=1e-10)
+        energy, kinetic = run["energy"], run["kinetic"]
+        relative = float(np.abs(energy - energy[0]).max() / max(kinetic.max(), abs(energy[0])))
+        yield DRIFTS, {
+            "scene": kind.__name__, "end time [s]": t_end, "steps": run.statistics.steps,
+            "relative change of energy": relative,
+        }  # fmt: skip

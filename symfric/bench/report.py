@@ -7,10 +7,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from math import inf, isfinite, log10
+from math import exp, inf, isfinite, log, log10, nan
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, TypeVar, final
+
+import numpy as np
 
 from symfric.foundation.files import write_table
 from symfric.foundation.programs import find_compiler, no_compiler
@@ -172,6 +174,45 @@ def plot_goals(rows: Iterable[Row]) -> "Figure":
     axis.set_xlabel("decades beyond the goal")
     axis.tick_params(axis="y", labelsize="small")
     return figure
+
+
+# ---- times at equal error ----
+
+RATIOS = "Time at equal error"
+
+
+def ratios(rows: Sequence[Row], reference: str, errors: Sequence[float]) -> Iterator[Found]:
+    """Yield times relative to `reference` at equal error, where both integrators reach it."""
+    for case in dict.fromkeys(r["case"] for r in rows):
+        own = [r for r in rows if r["case"] == case]
+        for error in errors:
+            times = {
+                name: time_at([r for r in own if r["integrator"] == name], error)
+                for name in dict.fromkeys(r["integrator"] for r in own)
+            }
+            for name, time_ms in times.items():
+                ratio = time_ms / times.get(reference, nan)
+                if ratio == ratio:
+                    yield RATIOS, {
+                        "case": case, "relative error": error, "integrator": name,
+                        "time per run [ms]": time_ms, f"ratio to {reference}": ratio,
+                    }  # fmt: skip
+
+
+def time_at(rows: Sequence[Row], error: float) -> float:
+    """Return the time [ms] to reach `error`, log-log interpolated; NaN if not reached."""
+    points = sorted((float(r["relative error"]), float(r["time per run [ms]"])) for r in rows)
+    best: list[tuple[float, float]] = []
+    for e, t in points:  # from the most accurate; keep rows that are cheaper than all before
+        if e > 0 and t < (best[-1][1] if best else inf):
+            best.append((e, t))
+    below, above = ([p for p in best if (p[0] > error) is side] for side in (False, True))
+    if not below:
+        return nan
+    if not above:
+        return below[-1][1]
+    at, times = np.log([below[-1], above[0]]).T
+    return exp(np.interp(log(error), at, times))
 
 
 # ---- curves ----

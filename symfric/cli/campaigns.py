@@ -47,15 +47,14 @@ def bench(
 
     integrator: stick-slip of one mass, ensembles and derivatives. calls: many short steps, events,
     gradients, signals, import. ensemble: ensembles and the same runs one by one, on one core.
-    multibody: mechanisms, cost and size of their equations, reference values. ivp: correct digits
-    on problems with published solutions (Test Set for IVP Solvers). jitter: total variation of
-    accelerations over law, step and transition velocity. regularisation: error of smooth laws
-    relative to dry friction, over their width or stiffness. ocp: optimal control from many starts,
-    verification, large programs, controllers; CasADi's Opti and rockit. interop: laws in Opti,
-    rockit, do-mpc and CasADi's integrators, as their users write them. identification: fits from
-    many starts and with many noise seeds, confidence intervals, measured machines, damaged files.
-    codegen: generated C, its goals, and C of CasADi. embedded: instructions and memory of generated
-    C on Cortex-M cores under QEMU.
+    multibody: mechanisms, cost and size of their equations, energy. ivp: correct digits
+    on problems with published solutions (Test Set for IVP Solvers). regularisation: error of smooth
+    laws relative to dry friction, over their width or stiffness. ocp: optimal control from many
+    starts, verification, large programs, controllers; CasADi's Opti and rockit. interop: laws in
+    Opti, rockit, do-mpc and CasADi's integrators, as their users write them. identification: fits
+    from many starts and with many noise seeds, confidence intervals, measured machines, damaged
+    files. codegen: generated C, its goals, and C of CasADi. embedded: instructions and memory of
+    generated C on Cortex-M cores under QEMU.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """

@@ -1,24 +1,20 @@
-"""Published problems, mechanisms, regularisation and jitter: errors have known limits."""
+"""Published problems, mechanisms and regularisation: errors have known limits."""
 
 from dataclasses import replace
 from math import atan2, hypot, isnan, pi
 
-import numpy as np
 import pytest
 from backends import needs_compiler
 
-from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, Viscous, parameters, simulate
-from symfric.bench import ivp, jitter, mechanisms, regularisation
+from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, parameters, simulate
+from symfric.bench import ivp, multibody, regularisation
 from symfric.bench.ivp import DIGITS, DRIFT, correct_digits
 from symfric.bench.ivp_mechanisms import ANDREWS, JOINT, PROBLEMS
 from symfric.bench.ivp_problems import Problem, hires
-from symfric.bench.mechanisms import CHAINS, chain, chains, count, exponent
+from symfric.bench.multibody import CHAINS, chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row
-from symfric.integrator.equations.blocks import refinement
-from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.equations.system import system
-from symfric.scenes import Rabinowicz, SliderCrank
+from symfric.scenes import Rabinowicz
 
 # ---- initial-value problems ----
 
@@ -139,7 +135,7 @@ def test_a_planar_mechanism_needs_fewer_instructions() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", FOUR)
 def test_joint_coordinates_need_a_fraction_of_absolute_ones(variant: str) -> None:
-    few, many = (count("four_mass", variant, c) for c in mechanisms.BOTH)
+    few, many = (count("four_mass", variant, c) for c in multibody.BOTH)
     assert many["states"] == 7 * few["states"]
     assert many[INSTRUCTIONS[0]] > 10 * few[INSTRUCTIONS[0]]
     assert many[INSTRUCTIONS[1]] > 15 * few[INSTRUCTIONS[1]]
@@ -148,7 +144,7 @@ def test_joint_coordinates_need_a_fraction_of_absolute_ones(variant: str) -> Non
 @needs_compiler
 @pytest.mark.slow
 def test_compilation_is_measured() -> None:
-    small, large = (row for _, row in mechanisms.compilation(("joint",)))
+    small, large = (row for _, row in multibody.compilation(("joint",)))
     assert (small["mechanism"], large["mechanism"]) == ("slider_crank", "four_mass")
     assert all(0 < row[c] < 60 for row in (small, large) for c in row if "time" in c)
     assert small["lines of C"] < large["lines of C"] < 20_000
@@ -181,24 +177,9 @@ def test_a_chain_keeps_its_energy_or_loses_it_to_friction() -> None:
     assert rough[-1] < rough[0] - 1e-2
 
 
-def test_reference_values_are_met_to_their_digits() -> None:
-    rows = [row for _, row in mechanisms.facts()]
-    assert len(rows) == 34
-    for row in rows:
-        assert 0 < abs(row["difference"]) < row["accuracy of the reference"], row
-
-
-@pytest.mark.parametrize("coordinates", ["joint", ABSOLUTE])
-def test_constraints_are_kept_on_three_levels(coordinates: str) -> None:
-    for _, row in mechanisms.norms((coordinates,)):
-        assert 0 < row["positions [m]"] < 1e-11
-        assert 1e-18 < row["velocities, relative"] < 1e-13
-        assert 1e-18 < row["accelerations, relative"] < 1e-13
-
-
 @pytest.mark.parametrize("t_end", [1.0, pytest.param(100.0, marks=pytest.mark.slow)])
 def test_energy_of_frictionless_mechanisms_is_constant(t_end: float) -> None:
-    for _, row in mechanisms.drifts(t_end):
+    for _, row in multibody.drifts(t_end):
         assert 0 < row["relative change of energy"] < 1e-8 * t_end, row
 
 
@@ -302,43 +283,3 @@ def test_the_peak_of_the_law_is_below_its_static_level() -> None:
     law = BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=1e-3)
     assert 0.9993 * 0.15 < peak(law) < 0.15
     assert parameters(law)["mu_s"].value == 0.15
-
-
-# ---- jitter ----
-
-
-@pytest.mark.parametrize(
-    ("a", "expected"), [([1.0, 1.0], 0.0), ([0.0, 2.0, -1.0], 5.0), ([0.0, np.inf], np.nan)]
-)
-def test_variation_sums_all_ups_and_downs(a: list[float], expected: float) -> None:
-    assert jitter.variation(np.array(a)) == pytest.approx(expected, nan_ok=True)
-
-
-def test_fine_fixed_steps_agree_with_error_control() -> None:
-    made = jitter.bench(scales=(0.02,), fixed_ms=(2.0, 0.5), rtol=1e-7, t_end=1.0)
-    rows = made.tables[jitter.TITLE]
-    ways = ["rtol = 1e-07", "RK4, h = 2 ms", "RK4, h = 0.5 ms", "Rodas5P, h = 1 ms"]
-    assert [(r["law"], r["step control"]) for r in rows] == [
-        (law, way) for law in jitter.LAWS for way in ways
-    ]
-    for row in rows:
-        exact = next(r for r in rows if r["law"] == row["law"])
-        for slider in jitter.SLIDERS:
-            assert row[slider] == pytest.approx(exact[slider], rel=0.02)
-            assert row[slider] > 1
-
-
-def test_classical_runge_kutta_has_order_4_on_the_constraints() -> None:
-    model = SliderCrank(Viscous(sigma_2=0.0)).model()
-    whole = system(model, input_data(model, None, 0.0, 0.05))
-    step, exact = jitter.runge_kutta_4(whole), simulate(model, 0.05, rtol=1e-12, t_eval=[0.05])
-    assert whole.manifold is not None
-    errors: list[float] = []
-    for steps in (50, 100):
-        y = np.concatenate([model.initial_state(), np.zeros(whole.n - whole.nx)])
-        y = refinement(whole)(y, 0).full()
-        for _ in range(steps):
-            y = step(y, 0.05 / steps, 0).full()
-        errors.append(abs(float(y[0, 0]) - exact["crank"][0]))
-        assert np.abs(whole.manifold.defect(y, 0).full()).max() < 1e-11
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.4)

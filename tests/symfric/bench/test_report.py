@@ -180,7 +180,7 @@ def test_the_command_prints_and_writes(
     ("arguments", "message"),
     [
         (["multibodies"], "expected one of integrator, multibody"),
-        (["jitter", "--links", "2"], "expected no --links"),
+        (["ivp", "--links", "2"], "expected no --links"),
         (["ensemble", "--plot", "x.png"], "bench ensemble: expected no --plot"),
         (["multibody", "--links", "2,x"], "--links: expected positive whole numbers"),
     ],

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, LuGre, Model, simulate
-from symfric.bench.mechanisms import chain
+from symfric.bench.multibody import chain
 from symfric.integrator.equations.blocks import blocks, refinement, signs
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system

@@ -7,7 +7,7 @@ import pytest
 
 import symfric.integrator.step.attempt as module
 from symfric import BrownMcPhee, rabinowicz
-from symfric.bench.mechanisms import chain
+from symfric.bench.multibody import chain
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
