@@ -73,7 +73,6 @@ def free_run(fit: Fitted, data: Dataset) -> np.ndarray:
 
 def main(out: Path) -> None:
     """Fit, judge, draw."""
-    out.mkdir(parents=True, exist_ok=True)
     data, other = records()
     loop = closed_loop(data)
     say(str(loop))

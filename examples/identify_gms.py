@@ -70,7 +70,6 @@ def record(law: Law, path: tuple[Array, Array], name: str, seed: int) -> Dataset
 
 def main(out: Path) -> None:
     """Make the records, fit, print, and leave a picture and a page in `out`."""
-    out.mkdir(parents=True, exist_ok=True)
     law, t = true_law(), np.arange(0.0, 4.0, 4e-3)
     fast = t, 80 * UM * np.sin(2 * np.pi * t) * np.sin(0.25 * np.pi * t + 0.5)
     data = record(law, slow((5, 0.05), (2, 0.13), (1, 0.31)), "slow", 0)

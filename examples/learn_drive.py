@@ -74,7 +74,6 @@ def episode(env: StickSlipDrive, k: Array, seed: int) -> tuple[Array, Array]:
 
 def main(out: Path) -> None:
     """Search, and show what came of it."""
-    out.mkdir(parents=True, exist_ok=True)
     env, rng = StickSlipDrive(CANDIDATES * EPISODES), np.random.default_rng(0)
     best, spread = np.array([5.0, -1.0, 0.0, 0.0]), np.array([20.0, 2.0, 20.0, 0.5])
     before, learnt = episode(env, np.tile(best, (env.envs, 1)), 99), list[float]()

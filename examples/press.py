@@ -71,7 +71,6 @@ def press(friction: bool) -> Trajectory:
 def main() -> None:
     """Both presses, the table, the picture and the film."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
-    out.mkdir(parents=True, exist_ok=True)
     smooth, real = press(friction=False), press(friction=True)
     table = Table("bearing", "lost a stroke [J]", "with the mean load [J]")
     for name in BEARINGS:

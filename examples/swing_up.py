@@ -72,6 +72,4 @@ def main(out: Path) -> None:
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
-    folder.mkdir(parents=True, exist_ok=True)
-    main(folder)
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "out"))

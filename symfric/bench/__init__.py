@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from symfric.bench.report import Progress, Report
 
-TABLES = ("calls", "ensemble", "embedded", "interop")
-"""Subjects without a picture."""
-PICTURES = (
-    *("integrator", "multibody", "ivp", "regularisation", "ocp", "identification"),
-    "codegen",
-)
+PICTURES = ("integrator", "multibody", "ivp", "regularisation", "ocp")
 """Subjects with a picture."""
+TABLES = ("identification", "codegen", "calls", "ensemble", "embedded", "interop")
+"""Subjects without a picture."""
 SUBJECTS = (*PICTURES, *TABLES)
 """Names of modules of this package that have a function `bench`."""
 

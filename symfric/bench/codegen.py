@@ -6,7 +6,7 @@ from math import nan
 
 from symfric.bench.codegen_runs import compensation, units
 from symfric.bench.embedded import CASES, whole
-from symfric.bench.report import GOALS, Found, Progress, Report, goal, plot_goals
+from symfric.bench.report import Found, Progress, Report, goal
 from symfric.codegen import Block, law_block, plant_block
 from symfric.codegen.fuzz import STEPS, fuzz
 from symfric.embedded import BY, Absent, find_tools, measure
@@ -113,4 +113,4 @@ def bench(
     """
     check_names("bench codegen: sections", sections, SECTIONS)
     tasks = {name: partial(SECTIONS[name], quick) for name in sections}
-    return Report((GOALS, plot_goals)).collect(tasks, progress)
+    return Report().collect(tasks, progress)

@@ -1,14 +1,12 @@
-"""Benchmarks of ensembles in SIMD lanes, on threads and on a graphics processor."""
+"""Benchmarks of ensembles in SIMD lanes and on a graphics processor."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from os import cpu_count
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.contenders import casadi
 from symfric.bench.report import Found, Progress, Report, best_time, interleaved, unwarned
 from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda.device import Device, DeviceError
@@ -18,9 +16,8 @@ from symfric.integrator.many.program import program
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
-from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
-from symfric.laws import BrownMcPhee, Law, LuGre
+from symfric.laws import BrownMcPhee, LuGre
 from symfric.model import Model
 from symfric.scenes import FourBar, Pendulum, SliderCrank, rabinowicz
 
@@ -29,7 +26,6 @@ RTOL, MOST = 1e-6, 10_000_000
 MEMBERS = 400
 LANES = "Processor time of an ensemble and of the same runs one by one, on one core"
 CUDA = "Ensembles on a graphics processor and on all cores"
-THREADS = "Ensembles on threads, and a Python loop over cvodes at the same rtol"
 
 
 class Case(NamedTuple):
@@ -151,57 +147,6 @@ def _one_by_one(
         return now, attempts
 
     return run
-
-
-# ---- on threads; measured by `symfric bench integrator` ----
-
-THREAD_END = 20.0
-THREADED, SAMPLED, REPEATS = 10_000, 200, 3
-
-
-def threads(case: str, law: Law, quick: bool) -> Iterator[Found]:
-    """Measure ensembles over the start velocity on one thread, two, four ... and all cores.
-
-    Errors are medians of the relative position error at the end on a sample of members, on which
-    cvodes runs as well. The parallel efficiency is the time on one thread over (threads * time).
-    """
-    members, sample = (40, 4) if quick else (THREADED, SAMPLED)
-    model, velocities = rabinowicz(law), np.linspace(-0.1, 0.1, members)
-    picked = np.linspace(0, members - 1, sample).astype(int)
-    some = velocities[picked]
-    end = partial(simulate, model, THREAD_END, t_eval=[THREAD_END], rtol=1e-11)
-    exact = np.array([end(x0={"v": v})["x"][0] for v in some])
-
-    def error(found: Array) -> float:
-        return float(np.median(np.abs(found - exact)) / np.abs(exact).max())
-
-    def ensemble(v: Array, workers: int) -> Ensemble:
-        chunk = max(1, min(500, v.size // (4 * workers)))
-        return simulate_many(
-            model, THREAD_END, x0={"v": v}, rtol=RTOL, workers=workers, chunk=chunk
-        )
-
-    solve = casadi(model, np.array([THREAD_END]), ("x",), RTOL, "cvodes", as_c=False).solve
-    cvodes_s, found = best_time(
-        lambda: np.array([solve(v=float(v))[0][0, -1] for v in some]),
-        budget=0.0 if quick else 1.0, most=REPEATS,
-    )  # fmt: skip
-    cores, alone = cpu_count() or 1, 0.0
-    ensemble(velocities[:1], 1)  # compiles
-    for workers in sorted({2**k for k in range(cores.bit_length()) if 2**k < cores} | {cores}):
-        time_s, many = best_time(
-            partial(ensemble, velocities, workers), budget=0.0 if quick else np.inf, most=REPEATS
-        )
-        alone = alone or time_s
-        yield THREADS, {
-            "case": case, "rtol": RTOL, "members": members, "threads": workers,
-            "time per member [us]": 1e6 * time_s / members,
-            "parallel efficiency": alone / (workers * time_s),
-            "relative error": error(many["x"][picked, 0]),
-            "cvodes, time per member [us]": 1e6 * cvodes_s / sample,
-            "cvodes, relative error": error(found),
-            "ratio of cvodes to symfric": (cvodes_s / sample) / (time_s / members),
-        }  # fmt: skip
 
 
 # ---- on a graphics processor ----

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from identification import Dataset, Fit, Fitted, InverseDynamics
 from symfric.bench.identification_files import File, campaign
-from symfric.bench.identification_measured import emps, franka, laws
+from symfric.bench.identification_measured import emps, franka
 from symfric.bench.identification_memory import gms, lugre
 from symfric.bench.identification_repeats import coverage, starts
-from symfric.bench.report import GOALS, Found, Progress, Report, goal, plot_goals, timed
+from symfric.bench.report import Found, Progress, Report, goal, timed
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import SolveError
 
@@ -121,7 +121,6 @@ CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
     "lugre": lugre,
     "coverage": coverage,
     "emps": emps,
-    "laws": laws,
     "franka": franka,
     "starts": starts,
     "gms": gms,
@@ -139,7 +138,7 @@ def bench(
     """
     check_names("bench identification: cases", cases, CASES)
     tasks = {case: partial(_named, case, quick) for case in cases}
-    return Report((GOALS, plot_goals)).collect(tasks, progress)
+    return Report().collect(tasks, progress)
 
 
 def _named(case: str, quick: bool) -> Iterator[Found]:

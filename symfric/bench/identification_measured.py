@@ -1,4 +1,4 @@
-"""Measured machines: EMPS, a drive; the joints of an arm at low speed; every static law on EMPS."""
+"""Measured machines: EMPS, a drive; the joints of an arm at low speed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,16 +17,14 @@ from identification.data.record import Record
 from identification.fit import Fit
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.initial import local, noise_of
-from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.residuals.shots import sampled_motion
 from identification.result.fitted import Fitted
 from symfric import GMS, Element, LuGre
 from symfric.bench.report import Found, Row, best_time, goal, timed
-from symfric.foundation.status import SolveError, Status
-from symfric.laws import Law, law_from_text
-from symfric.laws.catalogue import ALL_LAWS
+from symfric.foundation.status import SolveError
+from symfric.laws import Law
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -264,40 +262,3 @@ def _rest_error(path: Path, joint: str, law: Law, free: list[str]) -> float:
     fit = Fit(Points(offset=True), law, first, free=free, starts=3, evaluations=120)
     found = fit.solve(throw=False).validate(rest)
     return max(error.rms for error in found.values())
-
-
-BEST = "asymmetric(andersson)"
-ENDED = (Status.SOLVED, Status.DOUBTFUL)
-
-
-def laws(quick: bool) -> Iterator[Found]:
-    """Fit every static law to EMPS; `quick` takes every fourth law.
-
-    Each law of the catalogue without states is fitted by inverse dynamics, unchanged and with
-    parameters of its own for either direction. The fit of a law succeeds if it ends at a minimum:
-    status SOLVED or DOUBTFUL. The records have no licence and are no part of the package.
-    """
-    what = "laws that neither fit nor are refused"
-    if not (EMPS / ESTIMATION).is_file():
-        yield goal(what, nan, 0.0, note="data absent (../shared/data/EMPS)")
-        return
-    data = Dataset.read(EMPS / ESTIMATION)
-    static = [name for name in ALL_LAWS if not law_from_text(name).states]
-    names = [n for n in static for n in (n, f"asymmetric({n})")][:: 4 if quick else 1]
-    seconds, outcomes = timed(lambda: {name: outcome(name, data) for name in names})
-    lost = [name for name, text in outcomes.items() if text not in ("fits", "refused")]
-    note = f"of {len(names)}; refused: {sum(t == 'refused' for t in outcomes.values())}"
-    note += "".join(f"; {name}: {outcomes[name]}" for name in lost)
-    yield goal(what, float(len(lost)), 0.0, "<=", seconds, note)
-    seconds, best = timed(lambda: Fit(InverseDynamics(), BEST, data).solve(throw=False))
-    (error,) = best.errors.values()
-    yield goal(f"force error of {BEST} [%]", error.relative, 3.0, "<=", seconds)
-
-
-def outcome(name: str, data: Dataset) -> str:
-    """Fit a law; return "fits", "refused", or the failure."""
-    try:
-        found = Fit(InverseDynamics(), name, data).solve(throw=False)
-    except ValueError as error:
-        return "refused" if "\n" not in str(error) else f"{error}"
-    return "fits" if found.status in ENDED else f"{found.status.name}: {found.message}"

@@ -1,20 +1,15 @@
 """Run time against error on Rabinowicz's stick-slip, for symfric and other integrators."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import redirect_stderr, suppress
 from functools import partial
 from importlib.util import find_spec
-from io import StringIO
-from math import nan
 from time import process_time
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench import contenders
-from symfric.bench.contenders import Contender, equations, tolerances
-from symfric.bench.ensemble import threads
+from symfric.bench.contenders import Contender
 from symfric.bench.report import (
     Found,
     Progress,
@@ -26,7 +21,6 @@ from symfric.bench.report import (
     unwarned,
 )
 from symfric.foundation.programs import find_compiler
-from symfric.integrator.by_peer import peer
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model
@@ -62,8 +56,7 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
         tasks[case] = partial(_runs, case, law, makers, quick)
     tasks["ratios"] = lambda: ratios(report.tables[RUNS], OURS, ERRORS)
     for case, law in CASES.items():
-        tasks[f"{case}: ensembles"] = partial(threads, case, law, quick)
-        tasks[f"{case}: derivatives"] = partial(_derivatives, case, law, quick)
+        tasks[f"{case}: derivatives"] = partial(_derivatives, case, law)
     return report.collect(tasks, progress)
 
 
@@ -142,12 +135,11 @@ FREE = ("mu_s", "mu_d", "k", "m", "v_belt", "g")
 Call = Callable[[], Array]
 
 
-def _derivatives(case: str, law: Law, quick: bool) -> Iterator[Found]:
+def _derivatives(case: str, law: Law) -> Iterator[Found]:
     """Measure derivatives of the final state by one and by all parameters.
 
     The forward ratio includes derivatives of all states, the adjoint one the gradient of the
-    position; it is NaN if the integrator fails. The error is the largest relative error of a
-    derivative of the position.
+    position. The error is the largest relative error of a derivative of the position.
     """
     for names in (FREE[:1], FREE):
         model = rabinowicz(law, free=names)
@@ -157,15 +149,10 @@ def _derivatives(case: str, law: Law, quick: bool) -> Iterator[Found]:
             f"symfric {engine}": _of_ours(model, engine, names)
             for engine in dict.fromkeys((backend(), "vm"))
         }
-        if not quick:
-            ways |= {f"casadi {p}": _of_peer(model, p) for p in ("rosenbrock", "cvodes")}
         for integrator, (alone, forward, adjoint) in ways.items():
             base, _ = _repeated(alone)
             forward_s, found = _repeated(forward)
-            adjoint_s = nan
-            # SUNDIALS prints more than the exception
-            with redirect_stderr(StringIO()), suppress(RuntimeError):
-                adjoint_s, _ = _repeated(adjoint)
+            adjoint_s, _ = _repeated(adjoint)
             yield SLOPES, {
                 "case": case, "integrator": integrator, "parameters": len(names), "rtol": RTOL,
                 "time per run [ms]": 1e3 * base, "ratio, forward": forward_s / base,
@@ -196,25 +183,4 @@ def _of_ours(model: Model, engine: str, names: tuple[str, ...]) -> tuple[Call, C
         lambda: _run(model, engine, ())["x"],
         forward,
         lambda: np.array(list(_run(model, engine, names).gradient({"x": 1.0}).values())),
-    )
-
-
-def _of_peer(model: Model, plugin: str) -> tuple[Call, Call, Call]:
-    """Return the calls of CasADi's integrator, with start values that depend on parameters."""
-    whole, inputs = equations(model, T_END)
-    name = "rosenbrock" if plugin == "rosenbrock" else "sundials"
-    values = model.values("p")
-    problem = peer(whole, inputs, values, tolerances(whole, RTOL), name)
-    solver = ca.integrator("solver", plugin, problem.dae, 0.0, T_END, problem.options)
-    p, seed = ca.MX.sym("p", len(model.p)), ca.DM.eye(len(model.p))
-    x0 = model.initial_state({"v": V}) / whole.nominal
-    by_p = model.start_by_parameters({"v": V}) / whole.nominal[:, None]
-    start = x0 + ca.mtimes(ca.DM(by_p), p - ca.DM(values))
-    x = solver(x0=start, p=p)["xf"]
-    ahead = ca.Function("ahead", [p], [ca.jtimes(x, p, seed)])
-    back = ca.Function("back", [p], [ca.gradient(x[0], p)])
-    return (
-        lambda: solver(x0=x0, p=values)["xf"].full(),
-        lambda: ahead(values).full()[0] * whole.nominal[0],
-        lambda: back(values).full(),
     )

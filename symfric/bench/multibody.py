@@ -17,7 +17,6 @@ from symfric.bench.report import (
     Report,
     Row,
     best_time,
-    compile_time,
     curves,
     ratios,
     unwarned,
@@ -27,7 +26,6 @@ from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.engine import c_source
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
@@ -47,7 +45,6 @@ BOTH = ("joint", "absolute")
 """Coordinates in which mechanisms are built."""
 RUNS = "Time of a run against its error"
 COUNTS = "Size of the equations of mechanisms; CasADi instructions"
-COMPILED = "Step of symfric as machine code, compiled once for all tolerances and parameters"
 CHAINS = "Step of a chain in the virtual machine"
 DRIFTS = "Energy of frictionless mechanisms"
 SIZES = (2, 4, 8, 16, 32, 64)
@@ -107,7 +104,6 @@ def bench(quick: bool = False, links: Sequence[int] = SIZES, progress: Progress 
     make = partial(chain, law=BrownMcPhee(v_t=0.01))
     tasks |= {
         "ratios": lambda: ratios(report.tables.get(RUNS, []), OURS, ERRORS),
-        "compilation": partial(compilation, kinds),
         "counts": partial(counts, kinds),
         "chains": partial(chains, make, links),
         "energy": partial(drifts, 1.0 if quick else DRIFT_S),
@@ -188,10 +184,6 @@ VARIANTS: dict[tuple[str, str], Callable[[], Mechanism]] = {
     ("double_pendulum", "planar"): lambda: DoublePendulum(LAW).mechanism(),
     ("double_pendulum", "spatial"): turned_pendulum,
 }
-BUILT: dict[str, Callable[[], Mechanism]] = {
-    "slider_crank": lambda: SliderCrank(LAW).mechanism(),
-    "four_mass": lambda: four_mass(ALL),
-}
 
 
 def integrator(model: Model) -> Integrator:
@@ -216,19 +208,6 @@ def count(mechanism: str, variant: str, coordinates: str) -> Row:
 def counts(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
     """Count all variants."""
     yield from ((COUNTS, count(*key, c)) for c in coordinates for key in VARIANTS)
-
-
-def compilation(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
-    """Measure times for building and compiling a step, if there is a compiler."""
-    for c in coordinates if find_compiler() else ():
-        for name, mechanism in BUILT.items():
-            begin = perf_counter()
-            made = integrator(mechanism().build(formulation=c))
-            source = c_source(made.step, METHOD.H.shape[0])
-            yield COMPILED, {
-                "mechanism": name, "coordinates": c, "build time [s]": perf_counter() - begin,
-                "lines of C": source.count("\n"), "compile time [s]": compile_time(source),
-            }  # fmt: skip
 
 
 def chain(links: int, law: Law | None = None) -> Model:

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.phase import Span
+from ocp.formulation.expressions import at_end, effort, track
+from ocp.formulation.phase import Phase, Span
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import set_valued
-from ocp.problems import READY, Ready
+from ocp.problems import READY, Ready, guide
 from ocp.solve import solve
 from ocp.solving.one_solve import perturbed
 from ocp.solving.solution import Solution
@@ -27,9 +28,12 @@ from ocp.solving.starts import Start, initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.bench.ocp_contenders import Attempt, has_rockit, opti, rockit
-from symfric.bench.ocp_costs import controllers, program_sizes
 from symfric.bench.report import Found, Progress, Report, curves
+from symfric.foundation.programs import find_compiler
 from symfric.integrator import Hold, simulate
+from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre
+from symfric.model import Model
+from symfric.scenes.blocks import drive
 
 Array = NDArray[np.float64]
 STARTS, RANDOM = 12, 50
@@ -56,14 +60,13 @@ def bench(
 
     Args:
         quick: 3 starts, no far ones, other tools on one layer only.
-        cases: names of ready problems; default: all, and program sizes and controllers.
+        cases: names of ready problems; default: all, and controllers.
         progress: called with the current item and the fraction done.
     """
     tasks: dict[str, Callable[[], Iterator[Found]]] = {
         name: partial(_case, READY[name], quick) for name in cases or READY
     }
     if not cases:
-        tasks["program sizes"] = partial(program_sizes, quick)
         tasks["controllers"] = partial(controllers, quick)
     draw = curves("case", ("solver",), "processor time [s]", EXACT)
     report = Report((TITLE, draw))
@@ -230,3 +233,64 @@ def _miss(span: Span, signals: Mapping[str, Array], times: Sequence[float]) -> f
                 size = max(float(np.abs(signals[name]).max()), nominal[name])
                 worst = max(worst, (low - x) / size, (x - high) / size)
     return worst
+
+
+# ---- a model predictive controller on plants with other friction than its model ----
+
+MPC = "Model predictive controller of a drive"
+STEP, HORIZON = 0.01, 20
+GOAL = 0.1
+"""Distance between the positions of the controller [m]."""
+LOOK = 0.75
+"""Time [s] at which the distance from the goal is measured; the controller knows that it will move
+back at 1 s."""
+CYCLES = 1000
+
+
+def _drive(law: Law) -> Model:
+    return drive(law, m=1.0, N=1.0)
+
+
+LEVELS = {"mu_s": 6.0, "mu_d": 4.0}
+PLANTS: dict[str, Callable[[], Law]] = {
+    "brown_mcphee 1e-2": lambda: BrownMcPhee(v_t=1e-2, **LEVELS),
+    "brown_mcphee 1e-4": lambda: BrownMcPhee(v_t=1e-4, **LEVELS),
+    "lugre 1e5 N/m": lambda: LuGre(v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, **LEVELS),
+    "exact_coulomb": lambda: ExactCoulomb(mu_s=6.0, mu_d=4.0),
+}
+
+
+def receding() -> Problem:
+    """Return the problem of a drive that moves to a position and stays: 20 intervals of 10 ms."""
+    cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
+    cost += at_end(lambda s: 100.0 * (s.x - s.goal) ** 2 + s.v**2)
+    stage = _drive(guide(1e-2))
+    return Problem(
+        Phase(stage, T=STEP * HORIZON), cost, bounds={"force": (-20.0, 20.0)}, p={"goal": 0.0}
+    )
+
+
+def controllers(quick: bool) -> Iterator[Found]:
+    """Move every plant between two positions.
+
+    Unreported failures are cycles that report convergence but did not converge.
+    """
+    controller = receding().to_mpc(step=STEP)
+    cycles = CYCLES // 10 if quick else CYCLES
+
+    def goal(times: Array) -> Array:
+        """GOAL in every other second."""
+        return GOAL * (np.floor(times + 1e-9) % 2 == 0)
+
+    for name, law in PLANTS.items():
+        found = controller.simulate(_drive(law()), cycles * STEP, {"goal": goal})
+        moved = min(int(np.searchsorted(found.t, LOOK)), found.t.size - 1)
+        yield MPC, {
+            "plant": name, "cycles": found.t.size, "median time per cycle [ms]": 1e3 * found.median,
+            "largest time [ms]": 1e3 * found.worst,
+            "largest processor time [ms]": 1e3 * found.worst_cpu,
+            "most QPs per cycle": int(found.iterations.max()), "failed cycles": found.unconverged,
+            "unreported failures": found.unreported,
+            "distance from the goal [mm]": 1e3 * abs(float(found["x"][moved]) - GOAL),
+            "controller": "C" if find_compiler() else "Python",
+        }  # fmt: skip

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from math import exp, inf, isfinite, log, log10, nan
+from math import exp, inf, isfinite, log, nan
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, TypeVar, final
@@ -148,32 +148,6 @@ def goal(
         "quantity": quantity, "measured": measured, "goal": f"{side} {limit:g}",
         "met": "yes" if met else "no", "processor time [s]": seconds, "note": note,
     }  # fmt: skip
-
-
-def decades(row: Row) -> float:
-    """Return the decades by which a number misses its goal; NaN if either is not positive."""
-    side, limit = str(row["goal"]).split()
-    value, wanted = float(row["measured"]), float(limit)
-    if not (value > 0 and wanted > 0):
-        return float("nan")
-    return (1.0 if side == "<=" else -1.0) * log10(value / wanted)
-
-
-def plot_goals(rows: Iterable[Row]) -> "Figure":
-    """Draw a bar for each goal: decades by which it is missed; left of zero it is met."""
-    from symfric.foundation.panels import panels  # noqa: PLC0415  (matplotlib is slow to import)
-    from symfric.foundation.style import colour  # noqa: PLC0415  (likewise)
-
-    known = [(row, miss) for row in rows if (miss := decades(row)) == miss]
-    figure, (axis,) = panels(1, 8.0, 0.5 + 0.25 * len(known))
-    for row, miss in known:
-        met = row["met"] == "yes"
-        axis.barh(str(row["quantity"]), miss, color=colour(2 if met else 1), hatch="/" * (not met))
-    axis.axvline(0.0, color="0.3", linewidth=0.8)
-    axis.invert_yaxis()
-    axis.set_xlabel("decades beyond the goal")
-    axis.tick_params(axis="y", labelsize="small")
-    return figure
 
 
 # ---- times at equal error ----

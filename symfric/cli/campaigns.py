@@ -45,16 +45,15 @@ def bench(
 ) -> None:
     """Compare symfric with other tools in run time and error.
 
-    integrator: stick-slip of one mass, ensembles and derivatives. calls: many short steps, events,
-    gradients, signals, import. ensemble: ensembles and the same runs one by one, on one core.
-    multibody: mechanisms, cost and size of their equations, energy. ivp: correct digits
-    on problems with published solutions (Test Set for IVP Solvers). regularisation: error of smooth
-    laws relative to dry friction, over their width or stiffness. ocp: optimal control from many
-    starts, verification, large programs, controllers; CasADi's Opti and rockit. interop: laws in
-    Opti, rockit, do-mpc and CasADi's integrators, as their users write them. identification: fits
-    from many starts and with many noise seeds, confidence intervals, measured machines, damaged
-    files. codegen: generated C, its goals, and C of CasADi. embedded: instructions and memory of
-    generated C on Cortex-M cores under QEMU.
+    integrator: stick-slip of one mass, and derivatives. calls: many short steps, events. ensemble:
+    ensembles and the same runs one by one, on one core. multibody: mechanisms, cost and size of
+    their equations, energy. ivp: correct digits on problems with published solutions (Test Set for
+    IVP Solvers). regularisation: error of smooth laws relative to dry friction, over their width or
+    stiffness. ocp: optimal control from many starts, verification, controllers; CasADi's Opti and
+    rockit. interop: laws in Opti, rockit, do-mpc and CasADi's integrators, as their users write
+    them. identification: fits from many starts and with many noise seeds, confidence intervals,
+    measured machines, damaged files. codegen: generated C, its goals, and C of CasADi. embedded:
+    instructions and memory of generated C on Cortex-M cores under QEMU.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """

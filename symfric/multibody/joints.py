@@ -75,8 +75,8 @@ class Distance(Closing):
 class PointOnLine(Closing):
     """Origin of the child's frame stays on the parent's axis z; 2 constraints.
 
-    Example: a bead on a wire, with friction along the line. The pin that closes a planar loop, with
-    the same constraints, is `PlanarRevolute`, with friction of the rotation.
+    An example is a bead on a wire, with friction along the line. The pin that closes a planar loop,
+    with the same constraints, is `PlanarRevolute`, with friction of the rotation.
     """
 
     constrains = 2

@@ -4,7 +4,6 @@ from dataclasses import replace
 from math import atan2, hypot, isnan, pi
 
 import pytest
-from backends import needs_compiler
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, parameters, simulate
 from symfric.bench import ivp, multibody, regularisation
@@ -139,15 +138,6 @@ def test_joint_coordinates_need_a_fraction_of_absolute_ones(variant: str) -> Non
     assert many["states"] == 7 * few["states"]
     assert many[INSTRUCTIONS[0]] > 10 * few[INSTRUCTIONS[0]]
     assert many[INSTRUCTIONS[1]] > 15 * few[INSTRUCTIONS[1]]
-
-
-@needs_compiler
-@pytest.mark.slow
-def test_compilation_is_measured() -> None:
-    small, large = (row for _, row in multibody.compilation(("joint",)))
-    assert (small["mechanism"], large["mechanism"]) == ("slider_crank", "four_mass")
-    assert all(0 < row[c] < 60 for row in (small, large) for c in row if "time" in c)
-    assert small["lines of C"] < large["lines of C"] < 20_000
 
 
 def test_chains_are_measured_up_to_the_budget() -> None:

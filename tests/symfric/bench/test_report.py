@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Iterator
-from math import log10, nan
+from math import nan
 from pathlib import Path
 
 import pytest
@@ -17,10 +17,8 @@ from symfric.bench.report import (
     best_time,
     compile_time,
     curves,
-    decades,
     goal,
     interleaved,
-    plot_goals,
     timed,
 )
 from symfric.cli import main
@@ -98,10 +96,6 @@ def test_pictures_have_a_panel_for_each_case_and_a_curve_for_each_line(tmp_path:
     falling = [{"case": "a", "who": "x", "error": e, "time [ms]": 1.0} for e in (1e-2, 1e-4)]
     draw = curves("case", ("who",), "error", "time [ms]")
     assert draw(falling).axes[0].xaxis_inverted()
-    assert not draw(falling[::-1]).axes[0].xaxis_inverted()
-    many = [{"case": str(k), "who": "x", "error": 1.0, "time [ms]": 1.0} for k in range(7)]
-    axes = draw(many).axes
-    assert (len(axes), sum(axis.axison for axis in axes)) == (10, 7)
     with pytest.raises(ValueError, match="expected a benchmark with a picture"):
         Report().plot()
 
@@ -117,12 +111,6 @@ def test_goals_are_met_on_their_side_and_never_by_nan() -> None:
     assert [row["met"] for row in only] == ["yes", "no", "yes", "no", "no", "no", "yes"]
     assert (only[0]["goal"], only[2]["goal"]) == ("<= 10", ">= 2")
     assert (only[0]["processor time [s]"], only[0]["note"]) == (0.5, "n")
-    misses = [decades(row) for row in only]
-    assert misses[:4] == pytest.approx([-1, log10(1.5), -log10(1.5), log10(2)])
-    assert all(m != m for m in misses[4:])
-    bars = plot_goals(only).axes[0].patches
-    assert [bar.get_width() for bar in bars] == pytest.approx(misses[:4])
-    assert [bool(bar.get_hatch()) for bar in bars] == [False, True, False, True]
 
 
 def test_the_shortest_call_within_the_budget_counts() -> None:

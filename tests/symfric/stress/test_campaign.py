@@ -19,17 +19,17 @@ from symfric.stress.workers import Crashed, TimedOut
 
 COSTLY = ("arm", "four_bar", "double_pendulum")
 """Scenes of which the suite takes no case."""
-LONG = (2, 18)
+LONG = (2,)
 """Cases of seconds."""
 
 
 def test_a_few_random_cases_are_right() -> None:
-    numbers = [n for n in range(20) if draw(1, n).scene not in COSTLY and n not in LONG]
+    numbers = [n for n in range(12) if draw(1, n).scene not in COSTLY and n not in LONG]
     report = campaign(numbers, work=12_000)
     assert not {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert report.passed
     assert report.classes["right"] > 0.6 * len(numbers)
-    assert report.refereed > 0.3 * len(numbers)
+    assert report.refereed > 0.2 * len(numbers)
     assert len(report.verdicts) == report.asked == len(numbers)
 
 

@@ -1,11 +1,12 @@
 """Mechanisms at the edge: each run equals an oracle or states why it stops, and is finite."""
 
-from functools import cache
+from functools import cache, partial
 from math import atan, exp, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
-from mechanics import Rates, brown_mcphee, four_mass, pendulum_box, pendulum_period, slider_crank
+from mechanics import brown_mcphee, four_mass, pendulum_box, pendulum_period, slider_crank
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -24,7 +25,6 @@ from symfric.scenes import (
     MECHANISMS,
     DoublePendulum,
     FourBar,
-    FourMass,
     MechanismScene,
     Pendulum,
     PendulumBox,
@@ -51,65 +51,43 @@ def sound(run: Trajectory) -> None:
 # ---- narrow transitions and strong friction, beside a solver of SciPy ----
 
 
-def oracle(rates: Rates, y0: list[float], times: Array) -> Array:
-    run = solve_ivp(
-        rates, (0.0, times[-1]), y0, method="Radau", rtol=1e-8, atol=1e-10, t_eval=times
-    )
-    assert run.success
-    return run.y
+def law(mu_s: float, v_t: float) -> tuple[Law, Any]:
+    """Brown-McPhee friction, and its coefficient in plain Python."""
+    mu = partial(brown_mcphee, mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t)
+    return BrownMcPhee(mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t), mu
 
 
-VELOCITIES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-LEVELS = (0.3, 0.7, 1.0, 1.5)
-
-
-def pairs(mu_s: float, v_t: float, narrowest: int = 5) -> pytest.MarkDecorator:
-    """Levels and velocities of the law: narrow at one level, and strong at one velocity."""
-    cases = [(mu_s, v) for v in VELOCITIES[:narrowest]] + [(mu, v_t) for mu in LEVELS]
-    return pytest.mark.parametrize(("mu_s", "v_t"), cases)
-
-
-def law(mu_s: float, v_t: float) -> tuple[Law, Rates]:
-    def mu(v: float) -> float:
-        return brown_mcphee(v, mu_s, 0.8 * mu_s, v_t)
-
-    return BrownMcPhee(mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t), mu  # type: ignore[return-value]
+ORACLES: dict[str, tuple[Any, list[float], float, Any]] = {
+    "pendulum_box": (
+        partial(pendulum_box, 6.0, 20.0, 0.3, 0.01, G), [0, np.pi / 6, 0, 0], 3.0,
+        lambda y: {"x": y[0], "phi": y[1]},
+    ),
+    "four_mass": (
+        four_mass, [np.arctan2(3, 4), 5.0, 0.0, -1.0], 2.0,
+        lambda y: {"x1": 5 * np.cos(y[0]), "x4": y[1]},
+    ),
+    "slider_crank": (slider_crank, [0.0, 120.0], 0.25, lambda y: {"crank": y[0]}),
+}  # fmt: skip
+"""Scene -> equations by hand, start, end time [s], and signals of the states."""
+NARROW = [(0.12, 10.0**-k) for k in range(2, 6)]
+STRONG = [(mu, 1e-2) for mu in (0.3, 0.7, 1.0, 1.5)]
 
 
 @slow
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")  # of SciPy's differences
-@pairs(0.15, 1e-3)
-def test_pendulum_box(mu_s: float, v_t: float) -> None:
-    friction, mu = law(mu_s, v_t)
-    times = np.linspace(0.1, 3.0, 16)
-    expected = oracle(pendulum_box(6.0, 20.0, 0.3, 0.01, G, mu), [0, np.pi / 6, 0, 0], times)  # type: ignore[arg-type]
-    run = simulate(PendulumBox(friction).model(), 3.0, rtol=1e-9, t_eval=times)
-    sound(run)
-    assert run["x"] == pytest.approx(expected[0], abs=2e-6)
-    assert run["phi"] == pytest.approx(expected[1], abs=2e-6)
-
-
-@slow
-@pairs(0.12, 1e-2, 4)
-def test_four_mass_system(mu_s: float, v_t: float) -> None:
-    friction, mu = law(mu_s, v_t)
-    times = np.linspace(0.1, 2.0, 20)
-    th, x4, *_ = oracle(four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)  # type: ignore[arg-type]
-    run = simulate(FourMass(friction).model(), 2.0, rtol=1e-9, t_eval=times)
-    sound(run)
-    assert run["x1"] == pytest.approx(5 * np.cos(th), abs=5e-6)
-    assert run["x4"] == pytest.approx(x4, abs=5e-6)
-
-
-@slow
-@pairs(0.1, 1e-2)
-def test_slider_crank(mu_s: float, v_t: float) -> None:
-    friction, mu = law(mu_s, v_t)
-    times = np.linspace(0.01, 0.25, 25)
-    th, _ = oracle(slider_crank(mu), [0.0, 120.0], times)  # type: ignore[arg-type]
-    run = simulate(SliderCrank(friction).model(), 0.25, rtol=1e-9, t_eval=times)
-    sound(run)
-    assert run["crank"] == pytest.approx(th, rel=1e-6, abs=1e-6)
+@pytest.mark.parametrize("name", ORACLES)
+def test_narrow_and_strong_friction_is_that_of_equations_by_hand(name: str) -> None:
+    equations, start, t_end, signals = ORACLES[name]
+    times = np.linspace(t_end / 20, t_end, 20)
+    for levels in NARROW + STRONG:
+        friction, mu = law(*levels)
+        found = solve_ivp(
+            equations(mu), (0.0, t_end), start, "Radau", rtol=1e-8, atol=1e-10, t_eval=times
+        )
+        run = simulate(MECHANISMS[name](friction).model(), t_end, rtol=1e-9, t_eval=times)
+        sound(run)
+        for signal, expected in signals(found.y).items():
+            assert run[signal] == pytest.approx(expected, rel=1e-6, abs=5e-6), levels
 
 
 # ---- jamming: Painleve's paradox ----
@@ -138,7 +116,7 @@ def reserve(phi: Array, ratio: float) -> Array:
     [
         (1e-3, 1e-4, JOINT),
         (1e-3, 1e-7, JOINT),
-        *(pytest.param(1e-3, 10.0**-k, JOINT, marks=slow) for k in (5, 6, 8, 9, 10)),
+        pytest.param(1e-3, 1e-10, JOINT, marks=slow),
         *(pytest.param(1e-3, 1e-7, ("absolute", k), marks=slow) for k in (0, 1)),
         *(pytest.param(ratio, 1e-8, JOINT, marks=slow) for ratio in (1e-6, 1e-4)),
     ],
