@@ -328,7 +328,7 @@ def _held_controls(
     N = next(iter(controls.values())).size
     at = clock + T * (np.arange(N) / N if mesh is None else mesh)
     at[0] = clock
-    return {n: Hold(at, np.clip(u, *span.box(n))) for n, u in controls.items()}
+    return {n: Hold(at, np.clip(u, *span.boxes[n])) for n, u in controls.items()}
 
 
 def _miss(span: Span, signals: Mapping[str, Array], looks: Sequence[float]) -> float:
