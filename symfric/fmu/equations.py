@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu.variables import LEAST_RTOL
 from symfric.integrator.arguments import chosen
-from symfric.integrator.equations.expressions import pace
+from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import (
     FLOOR,
     LONGEST_FIRST,
@@ -29,8 +29,8 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import search_source
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import search_source
 from symfric.integrator.running.run import PACES
 from symfric.integrator.step.attempt import build_fixed
 from symfric.integrator.step.layout import GROWTH_MEMORY
@@ -201,7 +201,7 @@ def _longest(own: Equations) -> float:
     """Return the longest step [s]: a few straight pieces of events in time alone, see
     `run.integrate`.
     """
-    quickest = min((pace(f, *own.span) for f in own.integrator.schedules), default=inf)
+    quickest = min((pieces(f, *own.span).pace for f in own.integrator.schedules), default=inf)
     return PACES * quickest
 
 
