@@ -300,6 +300,7 @@ def _closed(span: Span, values: Mapping[str, float], named: Collection[str]) -> 
         free = [i for i in range(begin, begin + n) if names[i] not in named]
         f = ca.Function("loops", span.symbols, [defect, ca.jacobian(defect, symbols)[:, free]])
         z, u = np.zeros(len(model.z)), np.zeros(len(model.u))
+        met, size = False, np.inf
         for _ in range(ITERATIONS):
             error, slope = (m.full() for m in f.call([0.0, x, z, u, span.p]))
             size = float(np.abs(error).max())

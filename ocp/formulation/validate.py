@@ -6,7 +6,7 @@
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import inf, isfinite
-from typing import Any
+from typing import Any, cast
 
 from ocp.formulation.expressions import Cost
 from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range, limits
@@ -47,7 +47,7 @@ def _unknown(where: str, names: Iterable[str], known: Iterable[str], hint: str =
 
 def type_problems(problem: Statement) -> Iterator[str]:
     """Yield messages about values of the wrong type."""
-    phases: object = problem.phases
+    phases = cast(object, problem.phases)
     if not isinstance(phases, Phase | Chain):
         hint = "join phases with >>: out >> back" if isinstance(phases, list | tuple) else ""
         if isinstance(phases, Model):
@@ -84,7 +84,7 @@ def _fields(
     of: Statement | Phase, mappings: Iterable[str], conditions: Iterable[str]
 ) -> Iterator[str]:
     """Yield messages about the fields that problems and phases share."""
-    cost: object = of.cost
+    cost = cast(object, of.cost)
     if cost is not None and not isinstance(cost, Cost):
         hint = "wrap it in integral(...) or at_end(...)" if callable(cost) else ""
         yield str(checks.refused("cost", COST, cost, hint))

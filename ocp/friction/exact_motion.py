@@ -42,7 +42,7 @@ class Inputs:
         self._functions = {
             name: ca.Function("u", [symbol], [ca.SX(value(symbol))])
             for name, value in self.given.items()
-            if callable(value) and not isinstance(value, Hold | Linear)
+            if not isinstance(value, Hold | Linear) and callable(value)
         }
 
     def next(self, t: float, end: float) -> float:

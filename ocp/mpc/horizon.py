@@ -230,20 +230,21 @@ def _costs(where: str, v: ca.SX, squares: Terms, others: Terms) -> Costs:
         gradient += 2 * weight * r * slope.T
         hessian += 2 * weight * (slope.T @ slope)
     for weight, e in others:
-        H, g = ca.hessian(weight * e, v)
-        H = ca.simplify(H)
-        if ca.symvar(H):
+        second, slope = ca.hessian(weight * e, v)
+        second = ca.simplify(second)
+        if ca.symvar(second):
             raise ValueError(
                 f"{where}: expected squares or a convex quadratic cost, got one whose second "
                 "derivative varies; write it as track(name, reference, weight) or effort(name, "
                 "weight)"
             )
-        H = ca.DM(H)
+        H = ca.DM(second)
         least = float(np.linalg.eigvalsh(H.full()).min(initial=0.0))
         if least < -1e-9 * float(np.abs(H.full()).max(initial=1e-300)):
             text = f"{where}: expected a convex cost, got a second derivative of {least:g}"
             raise ValueError(text)
-        value, gradient, hessian = value + weight * e, gradient + g, hessian + ca.sparsify(ca.SX(H))
+        value, gradient = value + weight * e, gradient + slope
+        hessian += ca.sparsify(ca.SX(H))
     return Costs(value, gradient, hessian)
 
 

@@ -15,7 +15,7 @@ Source: Rao, Wright and Rawlings, Application of interior-point methods to model
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 
@@ -35,7 +35,8 @@ class Packed:
         """Append a matrix: its structural entries, without constants unless `all_of_it`."""
         matrix = ca.densify(ca.SX(matrix)) if all_of_it else ca.sparsify(ca.SX(matrix))
         places: list[int] = []
-        for entry in map(ca.SX, matrix.nonzeros()):
+        entries: list[Any] = matrix.nonzeros()
+        for entry in map(ca.SX, entries):
             varies = all_of_it or not entry.is_constant()
             places.append(len(self.entries) if varies else -1)
             self.entries += [entry] * varies

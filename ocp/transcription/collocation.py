@@ -110,7 +110,8 @@ def point_equations(local: Local) -> PointEquations:
     """Formulate the equations of a collocation point of a phase."""
     span, model, h = local.span, local.span.model, local.h
     mechanics, nominal, paths = model.holonomic, model.nominal("x"), Rows.of(span.path)
-    n, a, implicit, further = 0, ca.SX(0, 1), model.alg, model.ode
+    ode = ca.SX(0, 1) if model.ode is None else model.ode
+    n, a, implicit, further = 0, ca.SX(0, 1), model.alg, ode
     if mechanics is not None:
         n, a, implicit, further = mechanics.n, mechanics.a, mechanics.implicit, mechanics.rates
     slopes = ca.SX.sym("slopes", n)
@@ -118,8 +119,8 @@ def point_equations(local: Local) -> PointEquations:
     mass = at_start(ca.diag(ca.jacobian(implicit[:n, :], a))) * nominal[n : 2 * n]
     algebraic = implicit[n:, :]
     sizes = np.concatenate([*(model.nominal(letter) for letter in "xzu"), nominal[n : 2 * n]])
-    J = ca.jacobian(algebraic, ca.vertcat(*span.symbols[1:4], a))
-    J = ca.fabs(J) @ ca.diag(ca.DM(sizes))  # changes of the rows for nominal changes of unknowns
+    slope = ca.jacobian(algebraic, ca.vertcat(*span.symbols[1:4], a))
+    J = ca.fabs(slope) @ ca.diag(ca.DM(sizes))  # changes of rows for nominal changes of unknowns
     largest = stacked(ca.mmax(J[i, :]) if J[i, :].nnz() else 1.0 for i in range(len(model.z)))
     scale = np.concatenate([nominal[:n], mass, nominal[2 * n :], at_start(largest)])
     path = stacked(row.expression for row in span.path)

@@ -184,8 +184,8 @@ def stages_of(
         return None, f"{next(names)}, which depends on more than its interval"
     sizes = np.diff(np.append(first, layout.size))
     ng = np.bincount(owner[~gap], minlength=K + 1)
-    counts = (tuple(part.tolist()) for part in (nx, sizes - nx, ng))
-    return Stages(*counts, tuple(np.asarray(equality, dtype=bool).tolist())), ""
+    counts = (nx, sizes - nx, ng, np.asarray(equality, dtype=bool))
+    return Stages(*(tuple(part.tolist()) for part in counts)), ""
 
 
 def _owners(

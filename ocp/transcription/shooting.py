@@ -8,7 +8,7 @@ for the discrete map. Bounds and path conditions hold at the nodes.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -75,7 +75,7 @@ def _interval_block(interval: ca.Function) -> Block:
         flat = None
     short = flat is not None and flat.n_instructions() <= LARGEST
     function, kind = (flat, ca.SX) if flat is not None and short else (interval, ca.MX)
-    symbols = [kind.sym(name, interval.size1_in(i)) for i, name in enumerate(("v", "theta"))]
+    symbols: list[Any] = [kind.sym(n, interval.size1_in(i)) for i, n in enumerate(("v", "theta"))]
     return block("interval", *symbols, *function.call(symbols))
 
 

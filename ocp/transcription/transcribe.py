@@ -115,13 +115,15 @@ class Discretisation:
             pieces += largest(layout, scenarios, len(problem.spans), LARGEST)
             c[layout.largest] = 1.0
         assembled = assemble(w, p, pieces, slots, c)
-        f, g, *functions, rows_of = assembled
+        f, g, gradient, jacobian, hessian, rows_of = assembled
         lower, upper = np.zeros(g.numel()), np.zeros(g.numel())
         for piece, at in zip(pieces, rows_of, strict=True):
             rows = piece.rows
             lower[at], upper[at] = ((b / rows.scale)[:, None] for b in (rows.lower, rows.upper))
         bounds, scale = bounds_of(problem, grid), scale_of(problem, layout)
-        program = Program(w, p, f, g, *functions, *bounds, lower, upper, np.zeros(0), scale)
+        program = Program(
+            w, p, f, g, gradient, jacobian, hessian, *bounds, lower, upper, np.zeros(0), scale
+        )  # fmt: skip
         return Skeleton(problem, layout, program, tuple(pieces), assembled, self.closing)
 
     def _pieces(self, grid: Grid) -> Iterator[Piece]:
@@ -323,7 +325,7 @@ class Transcription:
         parts: list[ArrayLike] = []
         for span, mesh in zip(spans, self.meshes, strict=True):
             own = [given.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
-            parts += [own, [1.0 if isinstance(span.T, Free) else span.T], mesh]
+            parts += [np.asarray(own), [1.0 if isinstance(span.T, Free) else span.T], mesh]
         return np.concatenate([np.asarray(part, dtype=float) for part in parts])
 
     @cached_property

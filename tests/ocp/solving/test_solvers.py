@@ -3,8 +3,7 @@
 import os
 import signal
 import threading
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections.abc import Callable
 from typing import Any
 
 import casadi as ca
@@ -18,18 +17,12 @@ from phases import fastest_move, solve_once, there_and_back, unit_move
 from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.solving.methods import ANSWERS, Convexified, Fatrop, Ipopt, Sqp
+from ocp.solving.methods import ANSWERS, Fatrop, Ipopt, Sqp
 from ocp.solving.solution import Solution
 from ocp.solving.starts import start_of
-from ocp.solving.watch import WINDOW, Seen, Watch, as_fraction, not_finite, worst
 from ocp.transcription.program import (
-    Place,
-    Program,
     Progress,
-    SolverStatistics,
     in_stage,
-    outside,
-    worst_of,
 )
 from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
@@ -322,182 +315,3 @@ def test_narrow_widths_are_named_where_a_solve_fails(
     text = "Friction is smoothed over a small width: contact 'guide' has v_t = 0.0001 m/s; raise"
     assert (text in message) == named
     assert ("Friction" in message) == named
-
-
-@cache
-def bounded(**more: object) -> Program:
-    problem = unit_move(bounds={"a": (-8.0, 8.0)}, **more)
-    return discretise(problem, Radau()).on(make_meshes(problem, 4)).program
-
-
-def test_worst_of_rows_and_bounds_is_named_with_its_time() -> None:
-    made = bounded()
-    w = np.clip(np.zeros(made.w.numel()), made.lower_w, made.upper_w)
-    g = np.zeros(made.g.numel())
-
-    def text() -> str:
-        return worst(made, Seen(w, 7.5, g, w, g, worst_of(made, w, g)), as_fraction)
-
-    assert text() == "The best iterate satisfies all constraints, at a cost of 7.5."
-    inputs = [k for k, place in enumerate(made.unknowns) if place.name == "a"]
-    w[inputs[2]] = 8.5
-    assert worst_of(made, w, g) == 0.5
-    assert text() == (
-        "Most violated is the bound on a at 0.5 of the duration, by 0.5 in scaled units."
-    )
-    rows = [k for k, place in enumerate(made.rows) if place.name == "the equation of v"]
-    g[rows[-1]] = -0.75
-    assert text() == (
-        "Most violated is the equation of v at 1 of the duration, by 0.75 in scaled units."
-    )
-    g[5] = np.nan
-    assert worst_of(made, w, g) == np.inf
-    far = outside(np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0, -np.inf]), np.full(3, 2.5))
-    np.testing.assert_allclose(far, [1.0, 0.0, 0.5])
-
-
-@pytest.mark.parametrize(
-    ("cost", "text"),
-    [
-        (integral(lambda s: ca.log(s.a)), "It is the cost."),
-        (integral(lambda s: s.a**2 + ca.sqrt(s.v)), "It is the derivative of the cost in v at"),
-        (at_end(lambda s: ca.sqrt(s.x)), "It is the derivative of the cost in x at 1 of"),
-        (integral(lambda s: s.a**2), ""),
-    ],
-)
-def test_what_is_not_finite_is_named(cost: object, text: str) -> None:
-    problem = unit_move(cost=cost, end={})
-    made = discretise(problem, Radau()).on(make_meshes(problem, 4)).program
-    said = not_finite(made, np.zeros(made.w.numel()), made.values, as_fraction)
-    assert said.startswith(text) and bool(said) == bool(text)
-
-
-def test_times_of_places_continue_over_the_phases() -> None:
-    problem = there_and_back(scenarios={"dry": {}, "oiled": {}})
-    on = discretise(problem, Radau()).on(make_meshes(problem, 4))
-    places = {
-        (0, 0.25): "at t = 0.25 s in out of scenario dry",
-        (1, 0.25): "at t = 1.25 s in back of scenario dry",
-        (3, 1.0): "at t = 2 s in back of scenario oiled",
-        (2, np.nan): "in out of scenario oiled",
-    }
-    w = np.zeros(on.program.w.numel())
-    assert [on.when(w, Place("v", *at)) for at in places] == list(places.values())
-
-
-# --- watching an iteration ----------------------------------------------------------------------
-
-
-def seen(f: float, violation: float) -> Seen:
-    none = np.zeros(0)
-    return Seen(none, f, none, none, none, violation)
-
-
-@pytest.mark.parametrize(
-    ("better", "worse"),
-    [
-        ((5.0, 1e-8), (1.0, 1e-3)),
-        ((1.0, 1e-7), (5.0, 1e-9)),
-        ((5.0, 1e-3), (1.0, 1e-2)),
-        ((9.0, 1.0), (np.nan, 1e-9)),
-        ((9.0, 1.0), (1.0, np.inf)),
-    ],
-)
-def test_best_is_feasible_with_the_least_cost_or_least_violated(
-    better: tuple[float, float], worse: tuple[float, float]
-) -> None:
-    assert seen(*better).better_than(seen(*worse))
-    assert not seen(*worse).better_than(seen(*better))
-    assert seen(*worse).better_than(None)
-
-
-def test_watch_keeps_the_best_and_stops_on_request() -> None:
-    program = bounded()
-    watch = Watch(program, None, None)
-    w = np.clip(np.zeros(program.w.numel()), program.lower_w, program.upper_w)
-    g = np.zeros(program.g.numel())
-    for f, far in ((5.0, 1.0), (3.0, 0.0), (2.0, 0.0), (9.0, 0.0), (1.0, 0.3)):
-        assert not watch.see(w, f, np.full_like(g, far), w, g)
-    assert watch.best is not None
-    assert watch.last is not None
-    assert (watch.best.f, watch.last.f, watch.iterations) == (2.0, 1.0, 4)
-    watch.halt = Status.INTERRUPTED
-    assert watch.see(w, 0.0, g, w, g)
-    assert Watch(program, None, 1e-9).see(w, 0.0, g, w, g)
-
-
-def test_cycling_is_distinguished_from_progress() -> None:
-    k = np.arange(2.0 * WINDOW + 5)
-    wild, still = 1 + 0.5 * np.sin(k), np.full(k.size, 1.0)
-
-    def cycles(*columns: Sequence[float]) -> bool:
-        watch = Watch(bounded(), None, None)
-        watch.trace = [*zip(*columns, strict=True)]
-        return watch.cycles
-
-    assert cycles(5 + wild, wild, still)
-    assert not cycles((5 + wild)[:WINDOW], wild[:WINDOW], still[:WINDOW])
-    assert not cycles(5 + wild, wild * 0.9**k, still)
-    assert not cycles(5 + wild, wild, 0.8**k)
-    assert not cycles(5 - 0.01 * k, 1e-9 * wild, still)
-    assert cycles(5 + wild, 1e-9 * wild, still)
-
-
-def test_statistics_of_solves_add_up() -> None:
-    one = SolverStatistics(10, 5, 40, 20, 7, 0.5, 1.0, 0.25)
-    two = SolverStatistics(20, 8, 80, 30, 3, 0.25, 2.0, 0.5, solves=2)
-    assert one.then(two) == SolverStatistics(20, 8, 80, 30, 10, 0.75, 3.0, 0.75, solves=3)
-
-
-# --- Hessians of Sqp ----------------------------------------------------------------------------
-
-
-def convex(cost: ca.SX, w: ca.SX, fractions: list[float], at: np.ndarray) -> np.ndarray:
-    """Return the convexified Hessian of an unconstrained cost."""
-    p, g, n = ca.SX(0, 1), ca.SX(0, 1), w.numel()
-    lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", 0)
-    x, f = ca.MX.sym("x", n), ca.Function("f", [w], [cost])
-    points, both = ["x", "p"], ["x", "p", "lam_f", "lam_g"]
-    gradient = [cost, ca.gradient(cost, w)]
-    triangle = ca.triu(ca.hessian(lam_f * cost, w)[0])
-    none = np.zeros(0)
-    places = [Place(f"w_{k}", 0, s) for k, s in enumerate(fractions)]
-    made = Program(
-        x, ca.MX(0, 1), f(x), ca.MX(0, 1),
-        ca.Function("nlp_grad_f", [w, p], gradient, points, ["f", "grad_f_x"]),
-        ca.Function("nlp_jac_g", [w, p], [g, ca.SX(0, n)], points, ["g", "jac_g_x"]),
-        ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [triangle], both, ["triu_hess_gamma_x_x"]),
-        np.full(n, -np.inf), np.full(n, np.inf), none, none, none, np.ones(n),
-        places=lambda: ([], places),
-    )  # fmt: skip
-    return ca.DM(Convexified(made)(at, [], 1.0, [])).full()
-
-
-def test_negative_eigenvalues_vanish_block_by_block() -> None:
-    """Unknowns of the whole phase border every block: [[A_1, b_1], [b_1', c]] + ..."""
-    w = ca.SX.sym("w", 5)
-    cost = w[0] * w[3] - 2 * w[1] ** 2 + w[2] ** 2
-    expected = np.diag([0.5, 0.0, 2.0, 0.5, 0.0])
-    expected[0, 3] = expected[3, 0] = 0.5
-    np.testing.assert_allclose(convex(cost, w, [0.0] * 5, np.zeros(5)), expected, atol=1e-7)
-    bordered = [0.0] * 4 + [np.nan]
-    good = ca.sumsqr(w) + 0.5 * w[4] * ca.sum1(w[:4]) + 0.1 * w[0] * w[1]
-    whole = ca.DM(ca.hessian(good, w)[0]).full()
-    np.testing.assert_allclose(convex(good, w, bordered, np.ones(5)), whole, atol=1e-7)
-    bad = w[4] * ca.sumsqr(w[:4]) - w[4] ** 2 - w[0] * w[1]
-    found = convex(bad, w, bordered, np.arange(5.0) - 3)
-    assert np.linalg.eigvalsh(found).min() > -1e-12
-    assert found[2, 3] == 0.0
-
-
-def test_hessians_of_motions_become_semidefinite() -> None:
-    problem = fastest_move(0.1)
-    made = discretise(problem, Radau()).on(make_meshes(problem, 4)).program
-    random = np.random.default_rng(0)
-    w, lam = random.standard_normal(made.w.numel()), random.standard_normal(made.g.numel())
-    triangle = ca.DM(made.hessian(w, made.values, 1.0, lam)).full()
-    exact = triangle + np.triu(triangle, 1).T
-    found = ca.DM(Convexified(made)(w, made.values, 1.0, lam)).full()
-    np.testing.assert_allclose(found, found.T, atol=1e-9)
-    assert np.linalg.eigvalsh(exact).min() < -0.1
-    assert np.linalg.eigvalsh(found).min() > -1e-9
