@@ -1,18 +1,26 @@
-"""Classes that a file may name, and the check of their fields against their annotations."""
+"""Contents of untrusted files: arrays, classes that a file may name, and types of their fields."""
 
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import MISSING, Field, fields
 from functools import cache, cached_property
 from importlib import import_module
+from io import BytesIO
+from math import prod
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import IO, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 OWN = ("symfric", "ocp", "identification")
 """Packages whose classes are known."""
+ARRAYS = "biufU"
+"""NumPy kinds of numbers and texts that an array may hold; objects, which are pickles, are
+refused."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
 
 
@@ -142,3 +150,43 @@ def agree(what: str, *conditions: bool) -> None:
     """
     if not all(conditions):
         raise ValueError(f"{what}: expected consistent fields, got contradictory ones")
+
+
+def arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
+    """Read the arrays of an archive that `numpy.savez` wrote, by their names.
+
+    The arrays together take no more memory than the file: compressed members, overlapping members
+    and headers that announce more data than follow are refused.
+
+    Args:
+        file: open for reading.
+
+    Raises:
+        ValueError: such a member, one that is not an array of numbers or texts, or not an archive.
+    """
+    try:
+        size = file.seek(0, 2)
+        with ZipFile(file) as archive:
+            members = archive.infolist()
+            if sum(member.file_size for member in members) > size:
+                raise ValueError("expected members that do not overlap")
+            if any(member.compress_type != ZIP_STORED for member in members):
+                raise ValueError("expected members that are not compressed")
+            return {m.filename.removesuffix(".npy"): _array(archive.read(m), size) for m in members}
+    except Exception as error:  # zipfile and NumPy raise various errors on damaged bytes
+        raise ValueError(f"expected an archive of arrays, got another file: {error}") from error
+
+
+def _array(content: bytes, most: int) -> NDArray[Any]:
+    """Return the array in a member; `most` bounds its dimensions if it is empty."""
+    stream = BytesIO(content)
+    if npy.read_magic(stream) != (1, 0):
+        raise ValueError("expected format 1.0 of NumPy's arrays")
+    shape, by_columns, dtype = npy.read_array_header_1_0(stream)
+    data = stream.read()
+    if dtype.kind not in ARRAYS or not dtype.itemsize or not all(0 <= n <= most for n in shape):
+        raise ValueError("expected an array of numbers or texts")
+    if prod(shape) * dtype.itemsize != len(data):
+        raise ValueError("expected an array as long as its header says")
+    array = np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
+    return array.astype(dtype.newbyteorder("="))

@@ -1,6 +1,7 @@
 """Builder: collects bodies, joints and forces, checks them and writes the model."""
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Mechanism(Showing):
+class Mechanism(packed.Portable, Showing):
     """Mechanism of bodies, joints, forces and constraints; `build` writes the `Model`.
 
     Example:
@@ -103,14 +104,6 @@ class Mechanism(Showing):
     def to_pack(self) -> dict[str, Any]:
         """Return all added parts."""
         return vars(self)
-
-    def __copy__(self) -> "Mechanism":
-        """Return a mechanism with the same symbols."""
-        return packed.shallow(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle all added parts; symbols keep their identity."""
-        return packed.loads, (packed.dumps(self),)
 
     def body(
         self,
@@ -284,8 +277,8 @@ class Mechanism(Showing):
         _, J, phi_t = at(near)
         rates = following(J, made.qd0, phi_t)
         links = made.eq.kin.topology.link_of
-        copy = packed.shallow(self)
-        copy.joints = [
+        placed = copy(self)
+        placed.joints = [
             replace(
                 joint,
                 start=tuple(near[links[joint.name].rows].tolist()),
@@ -295,4 +288,4 @@ class Mechanism(Showing):
             else joint
             for joint in self.joints
         ]
-        return copy
+        return placed
