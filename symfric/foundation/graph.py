@@ -1,7 +1,8 @@
 """CasADi functions as graphs of operations without duplicates, and groups of coupled rows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -86,23 +87,45 @@ def graph(function: ca.Function) -> Graph:
     """
     _check(function)
     builder = _Builder()
-    slots: dict[int, int] = {}
-    rows: list[dict[int, int]] = [{} for _ in range(function.n_out())]
+
+    def made(k: int, operands: list[int]) -> int:
+        op, entry = function.instruction_id(k), function.instruction_input(k)
+        if op == ca.OP_INPUT:
+            return builder.add(Node(op, entry=(entry[0], entry[1])))
+        if op == ca.OP_CONST:
+            return builder.add(Node(op, value=function.instruction_constant(k)))
+        return builder.add(Node(op, tuple(operands)))
+
+    return pruned(builder.nodes, [tuple(row) for row in walk(function, made)])
+
+
+Made = TypeVar("Made")
+
+
+def walk(function: ca.Function, made: Callable[[int, list[Made]], Made]) -> list[list[Made]]:
+    """Return the nonzeros of each result of an SX function, from its instructions in order.
+
+    Args:
+        function: of SX.
+        made: value of instruction k from those of its operands, none for inputs and constants.
+    """
+    slots = dict[int, Made]()
+    results = [dict[int, Made]() for _ in range(function.n_out())]
     for k in range(function.n_instructions()):
         op = function.instruction_id(k)
         into, of = function.instruction_output(k), function.instruction_input(k)
         if op == ca.OP_OUTPUT:
-            rows[into[0]][into[1]] = slots[of[0]]
+            results[into[0]][into[1]] = slots[of[0]]
         elif op == ca.OP_ASSIGN:
             slots[into[0]] = slots[of[0]]
-        elif op == ca.OP_INPUT:
-            slots[into[0]] = builder.add(Node(op, entry=(of[0], of[1])))
-        elif op == ca.OP_CONST:
-            slots[into[0]] = builder.add(Node(op, value=function.instruction_constant(k)))
         else:
-            slots[into[0]] = builder.add(Node(op, tuple(slots[i] for i in of)))
-    results = [tuple(row[i] for i in range(len(row))) for row in rows]
-    return pruned(builder.nodes, results)
+            slots[into[0]] = made(k, [] if op in LEAVES else [slots[i] for i in of])
+    return [[row[i] for i in range(len(row))] for row in results]
+
+
+def applied(operation: int, operands: Sequence[ca.SX]) -> ca.SX:
+    """Apply one CasADi operation."""
+    return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
 
 
 def _check(function: ca.Function) -> None:
@@ -165,10 +188,8 @@ def rebuild(
         elif node.op == SELECT:
             condition, yes, no = args
             found.append(ca.if_else(condition, yes, no))
-        elif len(args) == 1:
-            found.append(ca.SX.unary(node.op, *args))
         else:
-            found.append(ca.SX.binary(node.op, *args))
+            found.append(applied(node.op, args))
     return [stacked(found[i] for i in row) for row in source.results]
 
 

@@ -156,7 +156,7 @@ def bound(
     for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
         for i, array in enumerate(arrays):
             if array.size:
-                place(i, flat_view(array))
+                place(i, memoryview(array.reshape(-1)))  # pyright: ignore
 
     def run(_alive: object = (function, buffer)) -> None:
         call()
@@ -169,10 +169,3 @@ def address(array: NDArray[np.float64]) -> int:
     if array.flags.writeable and array.size:  # three times faster than below
         return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
     return array.ctypes.data
-
-
-def flat_view(array: NDArray[np.float64]) -> Any:
-    """Return a flat memory view of a contiguous array for CasADi's buffers; keep the array
-    alive.
-    """
-    return memoryview(array.reshape(-1))  # pyright: ignore[reportArgumentType, reportCallIssue]

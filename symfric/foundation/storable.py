@@ -1,14 +1,14 @@
 """Contents of untrusted files: arrays, classes that a file may name, and types of their fields."""
 
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, Field, fields
 from functools import cache, cached_property
 from importlib import import_module
 from io import BytesIO
 from math import prod
 from pathlib import Path
-from types import NoneType, UnionType
+from types import UnionType
 from typing import IO, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 from zipfile import ZIP_STORED, ZipFile
 
@@ -109,8 +109,6 @@ def fits(value: Any, hint: Any) -> bool:
         return any(fits(value, one) for one in of)
     if kind is Literal:
         return any(type(value) is type(one) and value == one for one in of)
-    if kind is None or kind is NoneType:
-        return value is None
     if kind is np.ndarray or get_origin(kind) is np.ndarray:
         return isinstance(value, np.ndarray) and _of_numbers(value, of)
     if kind is Callable or getattr(kind, "__name__", "") == "Callable":
@@ -119,21 +117,16 @@ def fits(value: Any, hint: Any) -> bool:
     if getattr(kind, "_is_protocol", False) and not issubclass(kind, Collection):
         has = {*dir(type(value)), *getattr(value, "__dict__", ())}
         return has.issuperset(name for name in vars(kind) if not name.startswith("_"))
-    if kind is float:
-        return isinstance(value, float | int) and not isinstance(value, bool)
-    if kind is int:
-        return isinstance(value, int) and not isinstance(value, bool)
+    if kind in (float, int):
+        wanted = float | int if kind is float else int
+        return isinstance(value, wanted) and not isinstance(value, bool)
     if not isinstance(value, kind):
         return False
     if issubclass(kind, tuple) and of and of[-1] is not Ellipsis:
         return len(value) == len(of) and all(map(fits, value, of))
     if issubclass(kind, Mapping) and of:
-        return _all(value, of[0]) and _all(value.values(), of[1])
-    return not (isinstance(value, Collection) and of) or _all(value, of[0])
-
-
-def _all(values: Iterable[Any], hint: Any) -> bool:
-    return all(fits(value, hint) for value in values)
+        return all(fits(key, of[0]) and fits(held, of[1]) for key, held in value.items())
+    return not (isinstance(value, Collection) and of) or all(fits(one, of[0]) for one in value)
 
 
 def _of_numbers(array: np.ndarray[Any, Any], of: tuple[Any, ...]) -> bool:
