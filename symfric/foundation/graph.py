@@ -1,19 +1,17 @@
 """CasADi functions as graphs of operations without duplicates, and groups of coupled rows."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import LEAVES, applied, walk
 from symfric.foundation.variable import stacked
 
 SELECT = -1
 """Operation code of an `if_else` node, which CasADi writes as a sum of two halves."""
-
-LEAVES = frozenset({ca.OP_INPUT, ca.OP_CONST})
 
 
 @dataclass(frozen=True)
@@ -97,35 +95,6 @@ def graph(function: ca.Function) -> Graph:
         return builder.add(Node(op, tuple(operands)))
 
     return pruned(builder.nodes, [tuple(row) for row in walk(function, made)])
-
-
-Made = TypeVar("Made")
-
-
-def walk(function: ca.Function, made: Callable[[int, list[Made]], Made]) -> list[list[Made]]:
-    """Return the nonzeros of each result of an SX function, from its instructions in order.
-
-    Args:
-        function: of SX.
-        made: value of instruction k from those of its operands, none for inputs and constants.
-    """
-    slots = dict[int, Made]()
-    results = [dict[int, Made]() for _ in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        into, of = function.instruction_output(k), function.instruction_input(k)
-        if op == ca.OP_OUTPUT:
-            results[into[0]][into[1]] = slots[of[0]]
-        elif op == ca.OP_ASSIGN:
-            slots[into[0]] = slots[of[0]]
-        else:
-            slots[into[0]] = made(k, [] if op in LEAVES else [slots[i] for i in of])
-    return [[row[i] for i in range(len(row))] for row in results]
-
-
-def applied(operation: int, operands: Sequence[ca.SX]) -> ca.SX:
-    """Apply one CasADi operation."""
-    return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
 
 
 def _check(function: ca.Function) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import identity
-from symfric.foundation.graph import applied, walk
+from symfric.foundation.numeric import applied, walk
 
 UNARY = (
     "neg", "exp", "log", "sqrt", "sq", "twice", "sin", "cos", "tan", "asin", "acos", "atan",

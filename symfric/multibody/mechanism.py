@@ -30,7 +30,7 @@ from symfric.multibody.prepare import (
     without_inertia,
     written,
 )
-from symfric.multibody.results import sketch, thumbnail
+from symfric.multibody.results import sketch
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.start import following, project
 from symfric.multibody.topology import Topology, spanning_tree
@@ -94,12 +94,14 @@ class Mechanism(packed.Portable, Showing):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small figure of the machine at its start; None if it cannot be built yet."""
+        from symfric.results.animation import still  # noqa: PLC0415  (matplotlib is slow to import)
+
         try:
             made = self.prepare()
         except ValueError:
             return None
         drawn = sketch(made.eq, {})
-        return thumbnail(drawn, made.numbers(drawn.places)[0])
+        return still(drawn, made.numbers(drawn.places)[0])
 
     def to_pack(self) -> dict[str, Any]:
         """Return all added parts."""

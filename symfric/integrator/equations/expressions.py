@@ -28,8 +28,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.graph import applied, walk
-from symfric.foundation.numeric import reciprocal
+from symfric.foundation.numeric import applied, reciprocal, walk
 from symfric.integrator.compiled.columns import Columns
 
 Rule = Callable[[int, list[ca.SX]], ca.SX | None]
