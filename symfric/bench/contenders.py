@@ -26,7 +26,7 @@ from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
@@ -77,13 +77,13 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
     """Return the compiled loop of `simulate` alone, from a consistent start to states."""
     whole, inputs = equations(model, float(times[-1]))
     made = Integrator(model, inputs, chosen("bench", "auto", rtol))
-    engine, end = made.compiled(), float(times[-1])
+    engine, end = made.compiled, float(times[-1])
     rows, work = [whole.names.index(name) for name in watched], made.borrow()
     begin = _beginning(model, whole)
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
-        State.begin(work.S, 0.0, first_step(end), begin(**start))
-        Given.begin(work.R, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(0))
+        work.S[:] = State.at(0.0, first_step(end), begin(**start))
+        work.R[:] = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
         work.want(outputs, None)

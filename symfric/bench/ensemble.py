@@ -17,7 +17,7 @@ from symfric.integrator.equations.initial import first_guess, first_step, smalle
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.program import program
 from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
@@ -127,7 +127,7 @@ def _one_by_one(
     """Return a function that runs all members in the compiled loop; it returns states, attempts."""
     inputs = input_data(model, None, 0.0, end)
     integrator, _ = built(model, inputs, ADAPTIVE["rodas5p"])
-    engine, members = integrator.compiled(), next(iter(x0.values())).size
+    engine, members = integrator.compiled, next(iter(x0.values())).size
     x, p = model.initial_states(x0, {}, members)
     data = np.tile(inputs.values[:, 0], (members, 1))
     y, d = first_guess(integrator.system, model, x), np.hstack([p, data])

@@ -18,9 +18,9 @@ from identification.fit import Fit
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.initial import local, noise_of
 from identification.residuals.inverse import InverseDynamics
-from identification.residuals.open_loop import sampled_motion
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
+from identification.residuals.shots import sampled_motion
 from identification.result.fitted import Fitted
 from symfric import GMS, Element, LuGre
 from symfric.bench.report import Found, Row, best_time, goal, timed

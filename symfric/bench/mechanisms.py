@@ -19,8 +19,8 @@ from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import c_source
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import c_source
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
 from symfric.laws import BrownMcPhee, Law, SelfTuning, Viscous

@@ -11,7 +11,8 @@ from symfric import ALL_LAWS, parameters
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.figures import FIGURES, FigureData, compare
-from symfric.figures.data import NORMAL_FORCE, parts, phenomena
+from symfric.figures.data import parts, phenomena
+from symfric.figures.motion import NORMAL_FORCE
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text

@@ -20,7 +20,7 @@ from symfric.choice import NEEDS as NEEDS
 from symfric.choice import Choice, Friction
 from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
-from symfric.choice.text import LEGEND, lines
+from symfric.choice.ranking import LEGEND, lines
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.identify import reader, residuals_of

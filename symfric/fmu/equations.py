@@ -29,8 +29,8 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import search_source
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import search_source
 from symfric.integrator.running.run import PACES
 from symfric.integrator.step.attempt import build_fixed
 from symfric.integrator.step.layout import GROWTH_MEMORY

@@ -28,7 +28,7 @@ from symfric.integrator.many.given import input_of
 from symfric.integrator.many.members import Members, Stretch
 from symfric.integrator.many.program import Program, program
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale
 from symfric.integrator.step.layout import Given, State
