@@ -9,8 +9,7 @@ from typing import final
 
 from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
 from symfric.foundation.parameters import Option, Parametric, options
-from symfric.integrator.methods.explicit import Exponential
-from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock
+from symfric.integrator.methods.families import BackwardEuler, Exponential, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
 
 TELLING = (
