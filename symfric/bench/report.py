@@ -203,7 +203,8 @@ def _draw_curves(
     def label(row: Row) -> str:
         return ", ".join(c if isinstance(c := row[k], str) else f"{k} = {c:g}" for k in lines)
 
-    cases, labels = (list(dict.fromkeys(map(f, rows))) for f in (lambda r: r[panel], label))
+    cases = list(dict.fromkeys(row[panel] for row in rows))
+    labels = list(dict.fromkeys(map(label, rows)))
     points: dict[tuple[str, Cell, str], list[tuple[float, float]]] = {}
     for y in ys:
         for row in rows:
