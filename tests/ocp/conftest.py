@@ -2,7 +2,7 @@
 
 import pytest
 
-from ocp import Ipopt, Radau, Solution, solve
+from ocp import Ipopt, Radau, Solution, solve, strategies
 from ocp.friction.homotopy import Sharp, sharpened
 from ocp.problems import out_and_back
 
@@ -17,6 +17,8 @@ def steps() -> tuple[Sharp, ...]:
 
 
 @pytest.fixture(scope="session")
-def by_modes() -> Solution:
-    """Out and back, solved by modes from the default guess."""
-    return solve(out_and_back(SHARP))
+def by_modes(steps: tuple[Sharp, ...]) -> Solution:
+    """Out and back by modes, from `steps`."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(strategies, "sharpened", lambda *_, **__: iter(steps))
+        return solve(out_and_back(SHARP))

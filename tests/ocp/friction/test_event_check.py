@@ -53,11 +53,11 @@ SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_held_forces_move_one_and_two_blocks_as_by_the_law(seed: int) -> None:
     law = ExactCoulomb(form="stribeck", mu_s=0.3, mu_d=0.15, v_s=0.05, sigma_2=0.2)
-    motion = same(drive(law), 4.0, ("x", "v"), u={"force": random_hold(seed, 4.0)})
+    motion = same(drive(law), 2.0, ("x", "v"), u={"force": random_hold(seed, 4.0)})
     assert "stick" in kinds(motion, "guide")
-    assert len(motion.modes["guide"]) > 6
+    assert len(motion.modes["guide"]) >= 3
     names = ("x1", "x2", "v1", "v2")
-    motion = same(blocks(LAW), 2.0, names, u={"force": random_hold(seed, 15.0)})
+    motion = same(blocks(LAW), 1.0, names, u={"force": random_hold(seed, 15.0)})
     assert {"slip+", "stick", "slip-"} <= {*kinds(motion, "one"), *kinds(motion, "two")}
 
 

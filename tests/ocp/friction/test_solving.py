@@ -186,11 +186,8 @@ def judged(of: Machine, found: Solution) -> str:
     return "reported" if any(text in found.message for text in TELLING) else found.message
 
 
-@pytest.mark.parametrize(
-    "seed", [12, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (13, 48, 66, 80))]
-)
-def test_random_machines_are_solved_by_modes(seed: int) -> None:
-    of = machine(seed)
+def test_random_machine_is_solved_by_modes() -> None:
+    of = machine(12)
     assert judged(of, solve(of.problem(), starts=2, throw=False)) == "exact"
 
 

@@ -9,6 +9,7 @@ import pytest
 from phases import fastest_move, there_and_back, unit_move
 
 from ocp.formulation.expressions import at_end, integral
+from ocp.formulation.problem import Problem
 from ocp.solving.methods import Convexified
 from ocp.solving.watch import WINDOW, Seen, Watch, as_fraction, not_finite, worst
 from ocp.transcription.program import Place, Program, SolverStatistics, outside, worst_of
@@ -145,52 +146,25 @@ def test_statistics_of_solves_add_up() -> None:
 # --- Hessians of Sqp ----------------------------------------------------------------------------
 
 
-def convex(cost: ca.SX, w: ca.SX, fractions: list[float], at: np.ndarray) -> np.ndarray:
-    """Return the convexified Hessian of an unconstrained cost."""
-    p, g, n = ca.SX(0, 1), ca.SX(0, 1), w.numel()
-    lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", 0)
-    x, f = ca.MX.sym("x", n), ca.Function("f", [w], [cost])
-    points, both = ["x", "p"], ["x", "p", "lam_f", "lam_g"]
-    gradient = [cost, ca.gradient(cost, w)]
-    triangle = ca.triu(ca.hessian(lam_f * cost, w)[0])
-    none = np.zeros(0)
-    places = [Place(f"w_{k}", 0, s) for k, s in enumerate(fractions)]
-    made = Program(
-        x, ca.MX(0, 1), f(x), ca.MX(0, 1),
-        ca.Function("nlp_grad_f", [w, p], gradient, points, ["f", "grad_f_x"]),
-        ca.Function("nlp_jac_g", [w, p], [g, ca.SX(0, n)], points, ["g", "jac_g_x"]),
-        ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [triangle], both, ["triu_hess_gamma_x_x"]),
-        np.full(n, -np.inf), np.full(n, np.inf), none, none, none, np.ones(n),
-        places=lambda: ([], places),
-    )  # fmt: skip
-    return ca.DM(Convexified(made)(at, [], 1.0, [])).full()
-
-
-def test_negative_eigenvalues_vanish_block_by_block() -> None:
-    """Unknowns of the whole phase border every block: [[A_1, b_1], [b_1', c]] + ..."""
-    w = ca.SX.sym("w", 5)
-    cost = w[0] * w[3] - 2 * w[1] ** 2 + w[2] ** 2
-    expected = np.diag([0.5, 0.0, 2.0, 0.5, 0.0])
-    expected[0, 3] = expected[3, 0] = 0.5
-    np.testing.assert_allclose(convex(cost, w, [0.0] * 5, np.zeros(5)), expected, atol=1e-7)
-    bordered = [0.0] * 4 + [np.nan]
-    good = ca.sumsqr(w) + 0.5 * w[4] * ca.sum1(w[:4]) + 0.1 * w[0] * w[1]
-    whole = ca.DM(ca.hessian(good, w)[0]).full()
-    np.testing.assert_allclose(convex(good, w, bordered, np.ones(5)), whole, atol=1e-7)
-    bad = w[4] * ca.sumsqr(w[:4]) - w[4] ** 2 - w[0] * w[1]
-    found = convex(bad, w, bordered, np.arange(5.0) - 3)
-    assert np.linalg.eigvalsh(found).min() > -1e-12
-    assert found[2, 3] == 0.0
-
-
-def test_hessians_of_motions_become_semidefinite() -> None:
-    problem = fastest_move(0.1)
+def hessians(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Hessian of a Lagrangian, and its convexified form, at random unknowns."""
     made = discretise(problem, Radau()).on(make_meshes(problem, 4)).program
     random = np.random.default_rng(0)
     w, lam = random.standard_normal(made.w.numel()), random.standard_normal(made.g.numel())
     triangle = ca.DM(made.hessian(w, made.values, 1.0, lam)).full()
-    exact = triangle + np.triu(triangle, 1).T
-    found = ca.DM(Convexified(made)(w, made.values, 1.0, lam)).full()
+    convex = ca.DM(Convexified(made)(w, made.values, 1.0, lam)).full()
+    return triangle + np.triu(triangle, 1).T, convex
+
+
+def test_hessians_of_motions_become_semidefinite_and_convex_ones_stay() -> None:
+    """A free duration borders the blocks of all intervals."""
+    exact, found = hessians(fastest_move(0.1))
     np.testing.assert_allclose(found, found.T, atol=1e-9)
     assert np.linalg.eigvalsh(exact).min() < -0.1
     assert np.linalg.eigvalsh(found).min() > -1e-9
+    assert ((found != 0.0) >= (exact != 0.0)).all()
+    exact, found = hessians(unit_move(cost=integral(lambda s: s.a**2 + s.x**2 + s.x * s.a)))
+    np.testing.assert_allclose(found, exact, atol=1e-7)
+    turned, clipped = hessians(unit_move(cost=integral(lambda s: s.a**2 - s.x**2 + s.v * s.a)))
+    values, vectors = np.linalg.eigh(turned)
+    np.testing.assert_allclose(clipped, (vectors * np.maximum(values, 0)) @ vectors.T, atol=1e-6)

@@ -122,11 +122,8 @@ def test_conditions_at_starts_of_intervals_use_the_input_that_begins_there() -> 
 
 
 def test_nominal_values_scale_unknowns_and_rows() -> None:
-    larger = replace(
-        UNIT,
-        x=tuple(replace(v, nominal=10.0) for v in UNIT.x),
-        u=tuple(replace(v, nominal=10.0) for v in UNIT.u),
-    )
+    x, u = (tuple(replace(v, nominal=10.0) for v in group) for group in (UNIT.x, UNIT.u))
+    larger = replace(UNIT, x=x, u=u)
     one, ten = put(unit_move()), put(unit_move(model=larger))
     points = motion(one, lambda s: (s**3, 2 * s), 2.0, 1.0)
     (f, g), (f_10, g_10) = values(one, points), values(ten, points)
@@ -248,9 +245,8 @@ def test_scenarios_share_inputs_and_durations_and_the_largest_cost_bounds_each()
     rows = [i for i, place in enumerate(t.program.rows) if place.name == "the largest cost"]
     span = t.unpack(w).spans[0]
     assert len(rows) == 2
-    assert t.program.jacobian(w, t.program.values)[0].full()[rows].max() == pytest.approx(
-        0, abs=1e-12
-    )
+    g = t.program.jacobian(w, t.program.values)[0].full()
+    assert g[rows].max() == pytest.approx(0, abs=1e-12)
     expected = float(np.mean(span.u**2)) * span.T + span.T  # equal intervals
     assert float(t.program.gradient(w, t.program.values)[0]) == pytest.approx(expected)
 
