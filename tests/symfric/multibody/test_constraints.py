@@ -99,12 +99,8 @@ def test_accelerated_arm_needs_inertia_times_acceleration_and_weight() -> None:
 
 DRIVES: dict[str, tuple[int, str, int]] = {
     "hinge": (0, "turn", 0),
-    "slide": (1, "slide", 0),
     "slide of a tube": (2, "slide", 0),
-    "turn of a tube": (2, "turn", 1),
-    "cross": (3, "x", 0),
     "other arm of the cross": (3, "y", 1),
-    "plane along y": (4, "y", 1),
     "turn in the plane": (4, "turn", 2),
 }
 

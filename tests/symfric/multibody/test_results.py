@@ -132,7 +132,7 @@ def test_components_left_out_are_those_a_joint_cannot_transmit(kind: type[Joint]
             assert abs(value) < 1e-9 * np.abs(values).max(initial=1.0), component
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", ["four_bar", "four_mass", "pendulum_box"])
 def test_both_formulations_give_the_same_details(name: str) -> None:
     mechanism = MECHANISMS[name](LAW).mechanism()
     ours, expected = (at_start(mechanism.build(formulation=f)) for f in ("joint", "absolute"))
