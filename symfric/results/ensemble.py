@@ -252,7 +252,7 @@ class Ensemble(Showing):
         write_table(path, header, rows)
 
     def to_dataframe(self, *names: str) -> Any:
-        """Return a pandas table with a row for each member and time and varied quantities as columns.
+        """Return a pandas table with a row for each member and time, and columns of what varies.
 
         If only ends are known, it has a row for each member. Its `attrs` contain the units.
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, final
+from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 import numpy as np
@@ -87,18 +87,6 @@ CHEAP = 200_000
 """Steps times signals up to which extremes over all steps are always computed: about 20 ms."""
 
 
-class Kept(Protocol):
-    """Run as data, see `symfric.integrator.stored`."""
-
-    def unpacked(self) -> "Trajectory":
-        """Return the run again."""
-        ...
-
-    def save(self, path: str | Path) -> None:
-        """Write it to a file."""
-        ...
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(packed.Portable, Signals):
     """Named signals of a simulated model.
@@ -129,7 +117,7 @@ class Trajectory(packed.Portable, Signals):
 
     hidden = Signals.hidden | {"keep"}
 
-    keep: "Callable[[Trajectory], Kept] | None" = None
+    keep: "Callable[[Trajectory], Any] | None" = None
 
     def shown(self) -> Shown:
         """Return laws, the end of the run, and the start, end and extremes of every signal.
@@ -256,8 +244,8 @@ class Trajectory(packed.Portable, Signals):
         """Write the whole run to one file, which `symfric.load_run` reads to the bit.
 
         It holds the model, the signals at `t` and all accepted steps; a long run is repeated to
-        find its steps. A loaded run has all features of this one: times in between, extremes, further
-        results, plots, animations, energy, requested derivatives, another simulation of its
+        find its steps. A loaded run has all features of this one: times in between, extremes,
+        further results, plots, animations, energy, requested derivatives, another simulation of its
         `model`. Inputs given by functions are stored as expressions.
 
         Raises:
@@ -266,7 +254,7 @@ class Trajectory(packed.Portable, Signals):
         """
         self.packed_as().save(path)
 
-    def packed_as(self) -> "Kept":
+    def packed_as(self) -> Any:
         """Return the run as data."""
         if self.keep is None:
             raise ValueError(f"{self._where}: expected one of simulate, got another")
