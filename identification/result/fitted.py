@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Fitted(Outcome):
+class Fitted(packed.Portable, Outcome):
     """The result of a fit.
 
     `print(fit)` prints a one-page report; `fit.to_html("out.html")` writes one with figures;
@@ -71,14 +71,6 @@ class Fitted(Outcome):
         asked = self.asked if packed.holds(self.asked) else None
         return packed.state_of(self) | {"live": None, "asked": asked}
 
-    def __copy__(self) -> "Fitted":
-        """Return a fit with the same fields."""
-        return packed.shallow(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return the arguments of pickle; a pickle holds the same as a file."""
-        return packed.loads, (packed.dumps(self),)
-
     def save(self, path: str | Path) -> None:
         """Write the fit with its data to one file, which `identification.load_fit` reads.
 
@@ -111,7 +103,7 @@ class Fitted(Outcome):
         """
         if isinstance(self.machine, Scene):
             return self.machine.model()
-        return self.alive("model").model
+        return self.alive("model").closed.model
 
     def validate(self, data: Dataset) -> Errors:
         """Return the errors on other data with these parameters; start values are estimated there.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, TypeVar, final
 import numpy as np
 
 from symfric.foundation.files import write_table
-from symfric.foundation.programs import find_compiler, no_compiler
+from symfric.foundation.programs import find_compiler, needed_compiler
 from symfric.integrator.compiled.compiler import FLAGS
 
 if TYPE_CHECKING:
@@ -332,9 +332,7 @@ def compile_time(source: str, target: str | os.PathLike[str] = os.devnull) -> fl
     Raises:
         CompileError: no compiler.
     """
-    compiler = find_compiler()
-    if compiler is None:
-        raise no_compiler()
+    compiler = needed_compiler()
     before = os.times()
     compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
     after = os.times()
