@@ -66,13 +66,8 @@ def fig_04_position(quick: bool) -> Drawn:
     figure, (axis,) = panels(1, NARROW, 2.4)
     axis.plot(t, 1e6 * x, **look("generic_asperity"))
     turns = np.linspace(0.0, t[-1], len(paper.PATH))
-    axis.plot(
-        turns,
-        1e6 * np.array(paper.PATH),
-        "o",
-        color=look("leuven")["color"],
-        label="turning points, at rest",
-    )
+    mark = {"color": look("leuven")["color"], "label": "turning points, at rest"}
+    axis.plot(turns, 1e6 * np.array(paper.PATH), "o", **mark)
     axis.set(xlabel="time [s]", ylabel="position [µm]")
     axis.legend()
 
@@ -88,20 +83,11 @@ def fig_04_position(quick: bool) -> Drawn:
     table = paper.laws(count=1)
     given = [getattr(table["LuGre"], name) for name in ("mu_s", "mu_d", "v_s", "delta", "sigma_0")]
     given += [table["LuGre"].sigma_1, table["elasto-plastic"].z_ba, table["Leuven"].delta_l]  # pyright: ignore
-    numbers_of = (
-        paper.F_S,
-        paper.F_C,
-        paper.V_S,
-        paper.DELTA,
-        paper.SIGMA_0,
-        paper.SIGMA_1,
-        paper.Z_BA,
-        paper.DELTA_L,
-        paper.C,
-    )
+    by_hand = [paper.F_S, paper.F_C, paper.V_S, paper.DELTA, paper.SIGMA_0, paper.SIGMA_1]
+    by_hand += [paper.Z_BA, paper.DELTA_L, paper.C]
     claims = {
         "the laws have the numbers of table 1": [*map(float, given)] == [*TABLE_1[:-1]],
-        "so have the equations by hand": numbers_of == TABLE_1,
+        "so have the equations by hand": tuple(by_hand) == TABLE_1,
         "20 times faster it is half of V_s": 0.45 < fastest[-1] / paper.V_S < 0.5,
     }
     return figure, far, numbers, claims

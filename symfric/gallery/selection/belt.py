@@ -1,8 +1,10 @@
 """The block on the belt of figures 2 to 5: the laws with the numbers of tables 2 and 3."""
 
+from collections.abc import Callable, Mapping
 from functools import cache
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from symfric import Trajectory, simulate
@@ -30,9 +32,27 @@ def exact(t_end: float = T_END) -> tuple[Belt, dict[str, Array]]:
     return belt, belt.motion(np.linspace(0, t_end, round(1000 * t_end) + 1))
 
 
-def acceleration(one: Trajectory) -> Array:
+Signals = Trajectory | Mapping[str, Array]
+
+
+def acceleration(one: Signals) -> Array:
     """Return the acceleration of the block [m/s^2]."""
     return -(K * one["x"] + one["friction"]) / M
+
+
+def drawn(
+    quick: bool, short: float, signal: Callable[[Signals], Array], label: str, *limits: float
+) -> tuple[dict[str, Trajectory], dict[str, Array], Figure]:
+    """Return the runs of all forms, exact dry friction, and a panel per law with a signal.
+
+    The runs last 20 s, or `short` [s] at reduced size; `limits` are those of the ordinate.
+    """
+    t_end = short if quick else T_END
+    runs = {name: run(name, t_end) for name in laws.forms(laws.chosen(quick))}
+    dry = exact(t_end)[1]
+    curves = {name: (one.t, signal(one)) for name, one in runs.items()}
+    reference = next(iter(runs.values())).t, signal(dry)
+    return runs, dry, laws.small_multiples(curves, reference, label, *limits)
 
 
 def leaving(one: Trajectory) -> Array:
@@ -67,14 +87,9 @@ def fig_02_belt_displacement(quick: bool) -> Drawn:
     steps of 1 us and the text says ode15s; equal steps of 1 us would give the S of every ms, which
     is not that of table 4.
     """
-    names, t_end = laws.chosen(quick), 8.0 if quick else T_END
-    runs = {name: run(name, t_end) for name in laws.forms(names)}
-    _, dry = exact(t_end)
-
-    t = runs[names[0]].t
-    curves = {name: (one.t, one["x"]) for name, one in runs.items()}
-    figure = laws.small_multiples(curves, (t, dry["x"]), "displacement of the block [m]")
-
+    names = laws.chosen(quick)
+    label = "displacement of the block [m]"
+    runs, dry, figure = drawn(quick, 8.0, lambda one: one["x"], label)
     S = {name: spread(one["x"]) for name, one in runs.items()}
     at_steps = {name: spread(one.at(one.step_times)["x"]) for name, one in runs.items()}
     off = [abs(S[name] / laws.TABLE_4[name] - 1) for name in names]
@@ -96,7 +111,7 @@ def fig_02_belt_displacement(quick: bool) -> Drawn:
     }
     if not quick:
         held = [S[name] for name in runs if laws.law_of(name) not in laws.SLIDING]
-        sharper = (run(name, t_end, 1e-9)["x"] - one["x"] for name, one in runs.items())
+        sharper = (run(name, T_END, 1e-9)["x"] - one["x"] for name, one in runs.items())
         numbers["largest change by a tolerance of 1e-9 [m]"] = max(map(largest, sharper))
         for what, one in (("least", min), ("greatest", max)):
             numbers[f"{what} S x 100 of a law with a static level [m]"] = one(held)
@@ -129,15 +144,9 @@ def fig_03_belt_velocity(quick: bool) -> Drawn:
     laws without a static level never stick, in either form, and swing with the period of the free
     block, 3.9 s instead of 6.1 s.
     """
-    names, t_end = laws.chosen(quick), 14.0 if quick else T_END
-    belt, dry = exact(t_end)
-    runs = {name: run(name, t_end) for name in laws.forms(names)}
-
-    t = runs[names[0]].t
-    curves = {name: (one.t, one["v_rel"]) for name, one in runs.items()}
-    figure = laws.small_multiples(curves, (t, dry["v_rel"]), "velocity relative to the belt [m/s]")
-
-    period = float(np.diff(belt.leaves)[0])
+    label = "velocity relative to the belt [m/s]"
+    runs, dry, figure = drawn(quick, 14.0, lambda one: one["v_rel"], label)
+    period = float(np.diff(exact(14.0 if quick else T_END)[0].leaves)[0])
     numbers = {
         "period, exact dry friction [s]": period,
         "period of the free block [s]": 2 * np.pi * np.sqrt(M / K),
@@ -188,17 +197,9 @@ def fig_04_belt_acceleration(quick: bool) -> Drawn:
     Awrejcewicz without, peak at 1.3 ... 1.9 times that for some ms, in both forms; Karnopp without
     states and the other bristle laws do not.
     """
-    names, t_end = laws.chosen(quick), 14.0 if quick else T_END
-    _, dry = exact(t_end)
-    runs = {name: run(name, t_end) for name in laws.forms(names)}
-
-    t = runs[names[0]].t
-    curves = {name: (one.t, acceleration(one)) for name, one in runs.items()}
-    figure = laws.small_multiples(
-        curves, (t, dry["a"]), "acceleration of the block [m/s²]", (-0.8, 1.6)
-    )
-
-    after = t > 2.0
+    label = "acceleration of the block [m/s²]"
+    runs, dry, figure = drawn(quick, 14.0, acceleration, label, -0.8, 1.6)
+    after = next(iter(runs.values())).t > 2.0
     slips = after & (dry["v_rel"] < -0.02)
     greatest = float(np.abs(dry["a"][slips]).max())
     numbers = {"greatest in slip, exact dry friction [m/s^2]": greatest}
@@ -248,16 +249,9 @@ def fig_05_belt_friction(quick: bool) -> Drawn:
     to 0.1 %. That laws with states are the smooth ones: the undamped bristles of Dahl and
     Stick-slip ring.
     """
-    names, t_end = laws.chosen(quick), 14.0 if quick else T_END
-    _, dry = exact(t_end)
-    runs = {name: run(name, t_end) for name in laws.forms(names)}
-
-    t = runs[names[0]].t
-    curves = {name: (one.t, -one["friction"]) for name, one in runs.items()}
-    label, reference = "friction on the block [N]", (t, -dry["friction"])
-    figure = laws.small_multiples(curves, reference, label, (-0.15, 1.35))
-
-    after = t > 2.0
+    label = "friction on the block [N]"
+    runs, _, figure = drawn(quick, 14.0, lambda one: -one["friction"], label, -0.15, 1.35)
+    after = next(iter(runs.values())).t > 2.0
     numbers = {"static level [N]": F_S, "dynamic level [N]": F_C}
     off: list[float] = []
     rings, slips = dict[str, float](), dict[str, float]()

@@ -69,7 +69,8 @@ def small_multiples(
     curves: Mapping[str, tuple[Array, Array]],
     reference: tuple[Array, Array],
     label: str,
-    limits: tuple[float, float] = (-inf, inf),
+    low: float = -inf,
+    high: float = inf,
 ) -> Figure:
     """A panel per law, exact dry friction behind each; the kinds of laws by colour.
 
@@ -93,8 +94,8 @@ def small_multiples(
         axis.set_title(
             f"rms {off:.2g} {unit}", fontsize="x-small", loc="right", pad=3, color="0.35"
         )
-    if limits[0] > -inf:
-        places[0].set_ylim(*limits)
+    if low > -inf:
+        places[0].set_ylim(low, high)
     for axis in places[len(curves) :]:
         axis.axis("off")
     for axis in places[len(curves) - columns : len(curves)]:  # nothing stands below these
