@@ -104,7 +104,11 @@ class Shown:
         parts += [f"<div>{escape(line)}</div>" for line in self.lines]
         parts += [_html_table(self.table)] if self.table.rows else []
         parts += [f"<div>{escape(line)}</div>" for line in self.after]
-        parts += [_image(picture, self.title)] if picture is not None else []
+        if picture is not None:
+            parts += [
+                f'<img alt="{escape(self.title)}" style="max-width:100%;margin-top:6px" '
+                f'src="{data_uri(picture, DOTS_PER_INCH)}">'
+            ]
         return f'<div style="{BOX}">{"".join(parts)}</div>'
 
 
@@ -183,14 +187,6 @@ def png(figure: "Figure", dpi: float = 100) -> bytes:
 def data_uri(figure: "Figure", dpi: float = 60) -> str:
     """Return `figure` as a data URI for the `src` of an HTML image, without file and network."""
     return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
-
-
-def _image(figure: "Figure", words: str) -> str:
-    """Return a figure as an embedded image."""
-    return (
-        f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
-        f'src="{data_uri(figure, DOTS_PER_INCH)}">'
-    )
 
 
 SHORT = 8
