@@ -13,6 +13,39 @@ from symfric.foundation.status import Status
 Array = NDArray[np.float64]
 
 
+class Record(NamedTuple):
+    """Layout of the record (t0, t1, y0, y1, D) of an accepted step.
+
+    Attributes:
+        n: number of unknowns.
+        rows: of the dense output D, each of length n.
+    """
+
+    n: int
+    rows: int
+    T0 = 0
+    T1 = 1
+
+    @property
+    def width(self) -> int:
+        """Length of a record."""
+        return 2 + (2 + self.rows) * self.n
+
+    @property
+    def y0(self) -> slice:
+        """Slice of the unknowns at the start."""
+        return self.bend(-2)
+
+    @property
+    def y1(self) -> slice:
+        """Slice of the unknowns at the end."""
+        return self.bend(-1)
+
+    def bend(self, k: int) -> slice:
+        """Return the slice of row `k` of the dense output."""
+        return slice(2 + (2 + k) * self.n, 2 + (3 + k) * self.n)
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Dense:

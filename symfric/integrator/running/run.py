@@ -23,7 +23,7 @@ from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12

@@ -16,7 +16,7 @@ from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.many.chunk import Chunk, Job, digest, solve_chunk
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 
 def task(

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from symfric import LuGre, rabinowicz, simulate
 from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.record import Dense, hermite
-from symfric.integrator.step.layout import Record
+from symfric.integrator.running.record import Dense, Record, hermite
 
 Array = NDArray[np.float64]
 RNG = np.random.default_rng(7)

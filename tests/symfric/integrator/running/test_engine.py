@@ -13,8 +13,8 @@ from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
 from symfric.integrator.running.events import Stop
-from symfric.integrator.step.attempt import build_step
-from symfric.integrator.step.layout import Given, Record, State
+from symfric.integrator.running.record import Record
+from symfric.integrator.step.attempt import Given, State, build_step
 
 Array = NDArray[np.float64]
 ROWS = RODAS5P.H.shape[0]

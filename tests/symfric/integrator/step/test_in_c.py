@@ -13,8 +13,7 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.step.attempt import build_step
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State, build_step
 from symfric.integrator.step.pieces import Written, in_c, macros
 
 Array = NDArray[np.float64]
