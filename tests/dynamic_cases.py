@@ -34,9 +34,5 @@ DYNAMIC: dict[str, Law] = {
     "rate_and_state, slip": RateAndState(evolution="slip"),
 }
 
-SETTLED = {
-    "gonthier": 6e-3,
-    "bristle_2d": 1e-6,
-    "bristle_2d, kappa 0.2": 1e-6,
-}
+SETTLED = {"gonthier": 6e-3, "bristle_2d": 1e-6, "bristle_2d, kappa 0.2": 1e-6}
 """Speed [m/s] from which the steady state of a law is exact, as its docstring says."""

@@ -9,12 +9,7 @@ FLOORS: dict[str, set[str]] = {
     "symfric.laws": {"symfric.foundation"},
     "symfric.model": {"symfric.foundation"},
     "symfric.multibody": {"symfric.foundation", "symfric.laws", "symfric.model"},
-    "symfric.scenes": {
-        "symfric.foundation",
-        "symfric.laws",
-        "symfric.model",
-        "symfric.multibody",
-    },
+    "symfric.scenes": {"symfric.foundation", "symfric.laws", "symfric.model", "symfric.multibody"},
     "symfric.results": {"symfric.foundation", "symfric.model", "symfric.page"},
     "symfric.emitter": {"symfric.foundation"},
     "symfric.page": {"symfric.foundation"},
@@ -90,12 +85,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.emitter",
         "symfric.integrator",
     },
-    "symfric.codegen": {
-        "symfric.foundation",
-        "symfric.laws",
-        "symfric.model",
-        "symfric.emitter",
-    },
+    "symfric.codegen": {"symfric.foundation", "symfric.laws", "symfric.model", "symfric.emitter"},
     "symfric.compensation": {
         "symfric.foundation",
         "symfric.laws",
@@ -114,11 +104,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.integrator",
         "symfric.codegen",
     },
-    "symfric.embedded": {
-        "symfric.foundation",
-        "symfric.emitter",
-        "symfric.codegen",
-    },
+    "symfric.embedded": {"symfric.foundation", "symfric.emitter", "symfric.codegen"},
     "symfric.choice": {
         "symfric.foundation",
         "symfric.laws",
@@ -147,11 +133,7 @@ FLOORS: dict[str, set[str]] = {
     "ocp": {"symfric"},
     "identification.data": {"symfric"},
     "identification.unknowns": {"symfric"},
-    "identification.residuals": {
-        "symfric",
-        "identification.data",
-        "identification.unknowns",
-    },
+    "identification.residuals": {"symfric", "identification.data", "identification.unknowns"},
     "identification.starts": {
         "symfric",
         "identification.data",

@@ -272,10 +272,7 @@ FOLDER = Path(__file__).parent
 
 
 def c_source(
-    step: ca.Function,
-    dense_rows: int,
-    *others: ca.Function,
-    crossings: Crossings | None = None,
+    step: ca.Function, dense_rows: int, *others: ca.Function, crossings: Crossings | None = None
 ) -> str:
     """Return the CasADi C of the step with the attempt loop that calls it until it must stop.
 

@@ -9,11 +9,7 @@ from symfric import Model, Variable, simulate
 x, y = Variable("x", "m", start=1.0), Variable("y", "m")
 u, v, lam = Variable("u", "m/s"), Variable("v", "m/s"), Variable("lam", "N/m")
 X, Y, U, V, L = (w.symbol for w in (x, y, u, v, lam))
-CONSTRAINTS = {
-    3: X**2 + Y**2 - 1,
-    2: X * U + Y * V,
-    1: U**2 + V**2 - L * (X**2 + Y**2) - 9.81 * Y,
-}
+CONSTRAINTS = {3: X**2 + Y**2 - 1, 2: X * U + Y * V, 1: U**2 + V**2 - L * (X**2 + Y**2) - 9.81 * Y}
 
 
 def pendulum(index: int) -> Model:

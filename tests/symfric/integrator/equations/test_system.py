@@ -130,10 +130,7 @@ def test_monitors_and_nominal_values_are_carried_along() -> None:
     assert ca.DM(s.monitor_nominal).full().ravel().tolist() == [1e-3, 2.0]
     assert ca.Function("m", [s.y, s.d], [s.monitors])(
         [5.0, 6.0], [3.0]
-    ).full().ravel().tolist() == [
-        2.0,
-        6.0,
-    ]
+    ).full().ravel().tolist() == [2.0, 6.0]
 
 
 def test_consistent_values_solve_the_algebraic_equations_and_keep_the_rest() -> None:

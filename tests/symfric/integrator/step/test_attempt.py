@@ -40,12 +40,7 @@ def attempt(
 @pytest.mark.parametrize("h", [1e-7, 1e-3, 0.3])
 @pytest.mark.parametrize(
     "model",
-    [
-        rabinowicz(BrownMcPhee()),
-        rabinowicz(LuGre()),
-        smooth_dae().model,
-        timed_ode().model,
-    ],
+    [rabinowicz(BrownMcPhee()), rabinowicz(LuGre()), smooth_dae().model, timed_ode().model],
     ids=lambda m: m.name,
 )
 def test_graph_of_blocks_computes_what_the_flat_expression_does(
