@@ -116,15 +116,6 @@ def test_casadis_rosenbrock_has_the_same_derivatives(law: str) -> None:
             assert derivative(run, name, state) == pytest.approx(slopes[:, i, j], rel=1e-5)
 
 
-def test_gradient_of_the_study_of_peers() -> None:
-    """Measured in shared/reference/peers.md 1.5: block starts with the belt, 20 s."""
-    names = ("mu_s", "mu_d", "v_t", "k")
-    model = rabinowicz(BrownMcPhee(), free=names)
-    run = simulate(model, 20.0, x0={"v": 0.1}, rtol=1e-10, t_eval=[20.0], sensitivities=names)
-    found = [derivative(run, name, "x")[0] for name in names]
-    assert found == pytest.approx([8.20187, -1.87677, 9.65272, -0.619771], rel=5e-6)
-
-
 def test_bristle_in_steady_sliding_follows_parameters_and_start_velocity() -> None:
     """At t = 0 the bristle is z = g(v) sgn(v)/sigma_0 with g by mu_s: its derivatives by hand."""
     model = rabinowicz(LuGre(), free=["mu_s"])
@@ -241,18 +232,6 @@ def test_mechanism_starts_and_stays_on_its_constraints_with_its_derivatives() ->
         for signal in ("x", "vy", "lam"):
             quotient = (ahead[signal] - behind[signal]) / 2e-5
             assert derivative(run, name, signal) == pytest.approx(quotient, rel=1e-5, abs=1e-6)
-
-
-@each_law
-def test_engines_agree_on_derivatives(law: str) -> None:
-    model = rabinowicz(LAWS[law], free=["mu_s"])
-    vm, compiled = (
-        simulate(
-            model, 5.0, samples=11, rtol=1e-10, backend=b, sensitivities=["mu_s"]
-        ).sensitivities["mu_s"]["v"]
-        for b in ("vm", "compiled")
-    )
-    assert vm == pytest.approx(compiled, rel=1e-5, abs=1e-6 * np.abs(vm).max())
 
 
 def test_derivatives_reach_as_far_as_an_interrupted_run() -> None:

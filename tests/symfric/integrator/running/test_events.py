@@ -45,13 +45,6 @@ def test_bouncing_ball_hits_the_ground_at_the_times_of_the_closed_form(
     assert run.status is Status.SUCCESS
 
 
-def test_an_expression_that_dips_below_zero_within_one_long_step_is_seen() -> None:
-    """x' = 1 takes steps of most of the span; both ends lie above zero, a quarter below."""
-    dip = Event("dip", (X - 0.5) ** 2 - 0.04)
-    run = simulate(clock(dip), 1.0, rtol=1e-6)
-    assert [time for time, _ in run.happened] == pytest.approx([0.3, 0.7], abs=1e-9)
-
-
 def test_the_step_that_an_event_cuts_keeps_its_polynomial() -> None:
     """sin t up to an event: long steps of high order, the last one cut where the event is."""
     velocity = replace(y, start=1.0, unit="m/s")
@@ -281,28 +274,6 @@ def test_reset_of_a_mode_may_trigger_another_event_at_once() -> None:
     assert [name for _, name in run.happened] == ["first", "second"]
     assert run.happened[1][0] == pytest.approx(1.0, abs=1e-8)
     assert run.final["x"] == pytest.approx(11.0, abs=1e-8)
-
-
-def test_algebraic_variables_follow_a_reset() -> None:
-    z = Variable("z", "1", start=0.0)
-    model = Model(
-        "dae", x=(x,), z=(z,), ode=ca.SX(1.0), alg=z.symbol + z.symbol**3 - X,
-        events=(Event("jump", X - 2, 1, reset={"x": 10.0}),),
-        outputs={"twice": Output(2 * z.symbol, "1")},
-    )  # fmt: skip
-    run = simulate(model, 3.0, rtol=1e-9)
-    hit = run.happened[0][0]
-    before, after = run.at([hit - 1e-7, hit])["z"]
-    assert (before, after) == pytest.approx((1.0, 2.0), abs=1e-6)
-
-
-def test_event_may_depend_on_an_algebraic_variable() -> None:
-    z = Variable("z", "1")
-    model = Model(
-        "dae", x=(x,), z=(z,), ode=ca.SX(1.0), alg=z.symbol - X**2,
-        events=(Event("two", z.symbol - 2, 1),),
-    )  # fmt: skip
-    assert simulate(model, 3.0, rtol=1e-9).happened[0][0] == pytest.approx(sqrt(2), abs=1e-7)
 
 
 def test_reset_without_consistent_algebraic_values_is_a_failure_with_what_was_reached() -> None:
