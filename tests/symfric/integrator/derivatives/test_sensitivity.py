@@ -69,8 +69,9 @@ def test_linear_system_meets_the_matrix_exponential_between_the_steps(backend: s
     assert derivative(run, "k", "energy") == pytest.approx(by_hand, rel=0.0, abs=1e-6)
 
 
-@each_law
-@pytest.mark.parametrize("name", ["mu_s", "k", "x0.v"])
+@pytest.mark.parametrize(
+    ("law", "name"), [("brown_mcphee", "mu_s"), ("brown_mcphee", "x0.v"), ("lugre", "k")]
+)
 def test_difference_quotients_agree_over_a_scan_of_widths(law: str, name: str) -> None:
     model = rabinowicz(LAWS[law], free=FREE)
     at = 0.02 if name == "x0.v" else {v.name: float(v.start) for v in model.p}[name]
@@ -82,7 +83,7 @@ def test_difference_quotients_agree_over_a_scan_of_widths(law: str, name: str) -
 
     run = simulate(model, T_END, x0={"v": 0.02}, rtol=1e-12, t_eval=[T_END], sensitivities=[name])
     ours = derivative(run, name, "x")[0]
-    widths = at * 10.0 ** -np.array([1, 5, 6, 7, 9])
+    widths = at * 10.0 ** -np.array([1, 5, 6, 7])
     quotients = np.array([(x_end(at + h) - x_end(at - h)) / (2 * h) for h in widths])
     wrong = np.abs(quotients / ours - 1)
     assert wrong.min() <= (1e-6 if law == "brown_mcphee" else 1e-4)

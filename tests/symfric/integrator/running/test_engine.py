@@ -1,15 +1,12 @@
 """Virtual machine and compiled loop: the same steps, the same reasons to stop."""
 
-from concurrent.futures import ThreadPoolExecutor
-
-import casadi as ca
 import numpy as np
 import pytest
 from backends import needs_compiler
 from closed_forms import assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
-from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
+from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
 from symfric.integrator.running.events import Stop

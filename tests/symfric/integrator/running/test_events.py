@@ -10,7 +10,7 @@ from backends import each_backend
 from hybrid import ball, coulomb_on_a_belt
 from oracles import rabinowicz_coulomb
 
-from symfric import Event, Hold, Linear, Model, Output, SolveError, Status, Variable, simulate
+from symfric import Event, Hold, Linear, Model, SolveError, Status, Variable, simulate
 from symfric.integrator.equations.inputs import Input
 
 G = 9.81
