@@ -1,7 +1,7 @@
 """Data of the members of an ensemble: start values, parameters, inputs and end."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
@@ -22,7 +22,7 @@ WHERE = "simulate_many"
 
 @final
 @dataclass(frozen=True, eq=False)
-class Members:
+class MemberData:
     """All members of an ensemble and their data.
 
     Attributes:
@@ -72,20 +72,19 @@ class Members:
         k = np.searchsorted(self.sampled[1:-1], breaks[:-1], side="right")
         for name, signal in self.own.items():
             part = type(signal)(signal.t, np.asarray(signal.values)[pick])
-            value, rise = part.coefficients(self.sampled)
-            every[:, names.index(f"{name}_k")] = value[:, k]
-            if f"{name}_dot" in names:
-                every[:, names.index(f"{name}_dot")] = rise[:, k]
+            for symbol, rows in zip(("k", "dot"), part.coefficients(self.sampled), strict=True):
+                if f"{name}_{symbol}" in names:
+                    every[:, names.index(f"{name}_{symbol}")] = rows[:, k]
         return every
 
 
-def members_of(
+def member_data(
     model: Model,
     span: tuple[float, float | Array],
     x0: Mapping[str, ArrayLike] | None,
     u: Mapping[str, MemberInput] | None,
     p: Mapping[str, ArrayLike] | None,
-) -> Members:
+) -> MemberData:
     """Collect the members of an ensemble.
 
     Args:
@@ -96,29 +95,34 @@ def members_of(
     Raises:
         ValueError: unknown names, not numbers, arrays of different lengths.
     """
-    t_start, ends = span[0], np.asarray(span[1])
-    given = {
+    t_start, ends = span[0], np.asarray(span[1], dtype=float)
+    last = float(ends.max())
+    values = {
         f"{letter}.{name}": checks.array(f"{WHERE}: {letter}.{name}", value, ndim=None)
-        for letter, values in (("x0", model.named("x0", x0)), ("p", model.named("p", p)))
-        for name, value in values.items()
+        for letter, named in (("x0", x0), ("p", p))
+        for name, value in model.named(letter, named).items()
     }
-    signals = {name: _signal(name, value, t_start) for name, value in model.named("u", u).items()}
+    given: dict[str, Any] = model.named("u", u)
+    signals = {name: _signal(name, value, t_start) for name, value in given.items()}
     own = {n: s for n, s in signals.items() if isinstance(s, Sampled) and s.rows is not None}
-    lengths = {name: value.shape for name, value in given.items() if value.ndim}
+    lengths = {name: value.shape for name, value in values.items() if value.ndim}
     for name, signal in own.items():
-        value: Any = (u or {})[name]
-        lengths[f"u.{name}"] = np.shape(signal.values if isinstance(value, Sampled) else value)
+        samples = signal.values if isinstance(given[name], Sampled) else given[name]
+        lengths[f"u.{name}"] = np.shape(samples)
     lengths |= {"t_end": ends.shape} if ends.ndim else {}
     count = _count(lengths)
-    numbers = _numbers(given, u or {}) | ({"t_end": ends.astype(float)} if ends.ndim else {})
     for v in model.p:
-        for end in (np.min, np.max) if f"p.{v.name}" in given else ():
-            v.within(f"{WHERE}: p.{v.name}", float(end(given[f"p.{v.name}"])))
-    last = float(ends.max())
+        for end in (np.min, np.max) if f"p.{v.name}" in values else ():
+            v.within(f"{WHERE}: p.{v.name}", float(end(values[f"p.{v.name}"])))
     common = signals | {name: _one(signal, t_start, last) for name, signal in own.items()}
     times = [np.asarray(s.t) for s in common.values() if isinstance(s, Sampled)]
-    every = {name: np.broadcast_to(value, (count,)) for name, value in given.items()}
-    return Members(
+    numbers = {n.removeprefix("p."): values[n] for n in sorted(values, key=lambda n: n[0])}
+    for name, value in given.items():
+        if not (callable(value) or isinstance(value, Sampled) or np.ndim(value) > 1):
+            numbers[f"u.{name}"] = np.asarray(value, float)
+    numbers |= {"t_end": ends} if ends.ndim else {}
+    every = {name: np.broadcast_to(value, (count,)) for name, value in values.items()}
+    return MemberData(
         model,
         count,
         {v.name: every[f"x0.{v.name}"] for v in model.x if f"x0.{v.name}" in every},
@@ -127,21 +131,9 @@ def members_of(
         own,
         _between(times, t_start, last),
         np.broadcast_to(ends, (count,)).astype(float),
-        {name: np.array(values) for name, values in numbers.items() if values.ndim},
+        {name: np.array(value) for name, value in numbers.items() if value.ndim},
         {name: float(value) for name, value in numbers.items() if not value.ndim},
     )
-
-
-def _numbers(given: Mapping[str, Array], u: Mapping[str, Any]) -> Values:
-    """Return all numbers that were given: parameters by name, then "x0.v" and "u.force"."""
-    plain = {n: np.asarray(v, float) for n, v in u.items() if not callable(v) and _is_plain(v)}
-    found = {n.removeprefix("p."): v for n, v in given.items() if n.startswith("p.")}
-    found |= {name: value for name, value in given.items() if name.startswith("x0.")}
-    return found | {f"u.{name}": value for name, value in plain.items()}
-
-
-def _is_plain(value: Any) -> bool:
-    return not isinstance(value, Sampled) and np.ndim(value) < 2
 
 
 def _count(lengths: Mapping[str, tuple[int, ...]]) -> int:
@@ -150,8 +142,8 @@ def _count(lengths: Mapping[str, tuple[int, ...]]) -> int:
     Raises:
         ValueError: no members, or different lengths.
     """
-    wrong = (len(s) > 1 for name, s in lengths.items() if not name.startswith("u."))
-    if len({shape[0] for shape in lengths.values()}) > 1 or any(wrong):
+    matrix = any(len(s) > 1 for name, s in lengths.items() if not name.startswith("u."))
+    if matrix or len({shape[0] for shape in lengths.values()}) > 1:
         shapes = ", ".join(f"{name} of shape {shape}" for name, shape in lengths.items())
         raise ValueError(f"{WHERE}: expected numbers or arrays of one length, got {shapes}")
     count = next((shape[0] for shape in lengths.values()), 1)
@@ -164,8 +156,7 @@ def _signal(name: str, value: Any, t_start: float) -> Any:
     """Return an input for `input_data`; numbers per member become held samples."""
     if isinstance(value, Sampled) or callable(value) or checks.as_number(value) is not None:
         return value
-    numbers = checks.array(f"{WHERE}: u.{name}", value)
-    return Hold([t_start], numbers[:, None])
+    return Hold([t_start], checks.array(f"{WHERE}: u.{name}", value)[:, None])
 
 
 def _one(signal: Sampled, t_start: float, t_end: float) -> Sampled:
@@ -177,42 +168,17 @@ def _one(signal: Sampled, t_start: float, t_end: float) -> Sampled:
 
 def _between(times: list[Array], t_start: float, t_end: float) -> Array:
     """Return start and end, and the times between them."""
-    inner = np.concatenate([np.zeros(0), *times])
-    inner = inner[(inner > t_start) & (inner < t_end)]
-    return np.unique(np.concatenate([[t_start], inner, [t_end]]))
-
-
-def input_of(inputs: InputData, data: Array, end: float) -> InputData:
-    """Return the inputs of one member: its own data (n_data, intervals), up to its end."""
-    last = int(np.searchsorted(inputs.breaks, end)) - 1
-    breaks = np.append(inputs.breaks[: last + 1], end)
-    return replace(inputs, breaks=breaks, values=np.ascontiguousarray(data[:, : last + 1]))
+    every = np.unique(np.concatenate([[t_start, t_end], *times]))
+    return every[(every >= t_start) & (every <= t_end)]
 
 
 def ends_of(t_end: float | ArrayLike) -> float | Array:
     """Return the end of all members, or of each one [s]."""
     number = checks.as_number(t_end)
     if number is not None or isinstance(t_end, str | type):
-        return checks.number("simulate_many: t_end", t_end, unit="s")
+        return checks.number(f"{WHERE}: t_end", t_end, unit="s")
     what = "a number of seconds, or a sequence with one for each member"
-    ends = checks.array("simulate_many: t_end", t_end, what=what)
+    ends = checks.array(f"{WHERE}: t_end", t_end, what=what)
     if not ends.size:
-        raise ValueError("simulate_many: expected at least one member, got empty arrays")
+        raise ValueError(f"{WHERE}: expected at least one member, got empty arrays")
     return ends
-
-
-def all_later(ends: float | Array, t_start: float) -> None:
-    """Check that all ends are after the start."""
-    if np.min(ends) <= t_start:
-        raise ValueError(
-            f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
-            f"member {np.argmin(ends)}"
-        )
-
-
-def units_of(model: Model) -> dict[str, str]:
-    """Return the units of all values that may be given."""
-    found = {v.name: v.unit for v in model.p} | {"t_end": "s"}
-    for what, group in (("x0", model.x), ("u", model.u)):
-        found |= {f"{what}.{v.name}": v.unit for v in group}
-    return found
