@@ -122,11 +122,6 @@ class Blocks(NamedTuple):
         """Return the factors of W = M / (gamma h) - J at a point, for `solve`."""
         return self.pack(self.slopes(y, d), h)
 
-    @property
-    def instructions(self) -> int:
-        """Instructions of the Jacobian and the factorisation."""
-        return self.slopes.n_instructions() + self.pack.n_instructions()
-
 
 @lru_cache(maxsize=2)
 def blocks(system: System, gamma: float) -> Blocks:

@@ -331,12 +331,10 @@ class Run:
         times = [self.t], *(rows[:, 1] for rows in self._rows)
         return np.concatenate(times), np.concatenate([self.y[None], *self._ends])
 
-    def farthest(self, unknown: int) -> float:
-        """Return the largest magnitude of an unknown at the start and at the ends of steps."""
-        rows, n = self._rows, self.y.size
-        first = rows[0][0, 2:] if self._before is None else self._before.reach
-        ends = first[..., unknown], *(part[:, 2 + n + unknown] for part in rows)
-        return max(float(np.abs(y).max()) for y in ends)
+    @property
+    def farthest(self) -> Array:
+        """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
+        return np.abs(self.reach).max(axis=0)
 
     def at(self, times: Array) -> Array:
         """Return unknowns at `times` [s], shape (n, times); for a long run by recomputation."""

@@ -121,7 +121,7 @@ def integrate(
         # most states are not even small at the end
         if (np.abs(run.end[: nominal.size]) >= SMALL * nominal).all() or not run.status.ok:
             break
-        own = finer(scale, np.array([*map(run.farthest, range(nominal.size))]), nominal)
+        own = finer(scale, run.farthest[: nominal.size], nominal)
         if own is None:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)

@@ -90,7 +90,7 @@ def instructions(links: int, law: Law | None) -> int:
     made = unknowns(chain(links, law))
     block = blocks(made, GAMMA)
     stage = block.f.n_instructions() + block.solve.n_instructions()
-    return block.instructions + 8 * stage
+    return block.slopes.n_instructions() + block.pack.n_instructions() + 8 * stage
 
 
 @pytest.mark.slow
