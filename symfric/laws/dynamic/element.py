@@ -33,13 +33,12 @@ class StribeckLevel(Levels, _Smoothed):
 
     def level(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the Stribeck curve g(v, N) > 0 [N], the limit of the force of the states."""
-        falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
-        return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
+        return N * self.coefficient(smooth.stribeck(v, self.v_s, self.delta, self.v_eps))
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the steady sliding force [N] at a speed >= 0."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
-        return mu * N + self.sigma_2 * speed
+        falling = smooth.fall(speed, self.v_s, self.delta)
+        return self.coefficient(falling) * N + self.sigma_2 * speed
 
 
 @parametric
@@ -69,11 +68,6 @@ class Elements(Law):
         """Spring forces."""
         count = range(1, len(self.elements) + 1)
         return tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
-
-    def total(self, parts: Iterable[Scalar]) -> Scalar:
-        """Return the sum over all elements, in their order."""
-        first, *rest = parts
-        return sum(rest, start=first)
 
     def springs(self, z: Scalar) -> list[Scalar]:
         """Return the spring forces [N]."""
