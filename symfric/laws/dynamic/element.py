@@ -33,12 +33,13 @@ class StribeckLevel(Levels, _Smoothed):
 
     def level(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the Stribeck curve g(v, N) > 0 [N], the limit of the force of the states."""
-        return N * self.coefficient(smooth.stribeck(v, self.v_s, self.delta, self.v_eps))
+        falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
+        return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the steady sliding force [N] at a speed >= 0."""
-        falling = smooth.fall(speed, self.v_s, self.delta)
-        return self.coefficient(falling) * N + self.sigma_2 * speed
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
+        return mu * N + self.sigma_2 * speed
 
 
 @parametric
