@@ -154,11 +154,13 @@ class Verification:
         missed = "; ".join(miss.sentence for miss in self.misses[:3])
         more = len(self.misses) - 3
         missed += f"; and {more} more" if more > 0 else ""
-        if self.unstable:
+        if self.unstable and self.restarted is not None:
+            shown = ", ".join(f"{t:.4g}" for t in self.restarts[:4])
             return (
                 f"{self.status.value} Errors grow by a factor of {self.growth:.1g}, so under "
-                f"the control alone {missed}. Restarted at {_times(self.restarts)} it meets "
-                f"all conditions within {_relative(self.restarted)}."
+                f"the control alone {missed}. Restarted at {shown}"
+                f"{', ...' if len(self.restarts) > 4 else ''} s it meets all conditions within "
+                f"{self.restarted.largest:.1g}."
             )
         return f"{self.status.value} In the simulation {missed}."
 
@@ -189,14 +191,8 @@ class Verification:
             "growth": _plain(self.growth),
             "restarts": list(self.restarts),
             "checked": [
-                {
-                    "what": m.what,
-                    "name": m.name,
-                    "time": m.time,
-                    "value": _plain(m.value),
-                    "wanted": _plain(m.wanted),
-                    "relative": _plain(m.relative),
-                }
+                {"what": m.what, "name": m.name}
+                | {n: _plain(getattr(m, n)) for n in ("time", "value", "wanted", "relative")}
                 for m in self.checked
             ],
             "local_errors": [[_plain(e) for e in errors.tolist()] for errors in self.local_errors],
@@ -206,12 +202,3 @@ class Verification:
 
 def _plain(value: float) -> float | None:
     return float(value) if isfinite(value) else None
-
-
-def _times(times: tuple[float, ...]) -> str:
-    shown = ", ".join(f"{t:.4g}" for t in times[:4])
-    return f"{shown}{', ...' if len(times) > 4 else ''} s"
-
-
-def _relative(verification: "Verification | None") -> str:
-    return "?" if verification is None else f"{verification.largest:.1g}"
