@@ -10,11 +10,10 @@ from typing import Any
 
 import pytest
 from hostile import audit, hostile, nothing_runs
-from phases import there_and_back
+from phases import solve_once, there_and_back
 
 import ocp
 from identification import Fit, InverseDynamics, load_fit, synthetic_drive_data
-from ocp.solving.one_solve import solve_once
 from ocp.transcription.schemes import Legendre
 from symfric import load_ensemble, load_run
 from symfric.integrator import simulate, simulate_many

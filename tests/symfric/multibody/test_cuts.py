@@ -62,7 +62,7 @@ def test_steps_of_cut_chains_are_those_of_whole_ones(
     law: Law | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """W k = right for both, although one never sees W."""
-    cut, whole = both(5, law, monkeypatch)
+    cut, whole = both(4, law, monkeypatch)
     assert cut.inner is not None
     assert whole.inner is None
     y, right, memory = some(cut.n), some(cut.n, 1), some(cut.n, 2)
@@ -78,7 +78,7 @@ def test_steps_of_cut_chains_are_those_of_whole_ones(
 def test_signs_and_refined_unknowns_are_the_same(
     law: Law | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = both(4, law, monkeypatch)
+    made = both(3, law, monkeypatch)
     y = some(made[0].n)
     one, other = ([float(sign) for sign in signs(s, GAMMA)(y, 0.01, [])[:2]] for s in made)
     assert one == other

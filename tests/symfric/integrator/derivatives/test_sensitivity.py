@@ -283,5 +283,5 @@ def test_bad_requests_are_refused_saying_what_is_possible(
 
 
 def test_derivatives_that_were_not_asked_for_are_missed_by_name() -> None:
-    with pytest.raises(ValueError, match=r"got none; ask for them by\s+simulate\(\.\.\., sens"):
+    with pytest.raises(ValueError, match=r"got none; request them by\s+simulate\(\.\.\., sens"):
         _ = simulate(oscillator(), 1.0).sensitivities
