@@ -69,12 +69,8 @@ def shot(local: Local, scheme: Shooting) -> Shot:
 
 def _interval_block(interval: ca.Function) -> Block:
     """Return the block as expanded expressions if not too long, else as calls of steps."""
-    try:
-        flat = interval.expand()
-    except RuntimeError:  # it contains an implicit equation
-        flat = None
-    short = flat is not None and flat.n_instructions() <= LARGEST
-    function, kind = (flat, ca.SX) if flat is not None and short else (interval, ca.MX)
+    flat = interval.expand()
+    function, kind = (flat, ca.SX) if flat.n_instructions() <= LARGEST else (interval, ca.MX)
     symbols: list[Any] = [kind.sym(n, interval.size1_in(i)) for i, n in enumerate(("v", "theta"))]
     return block("interval", *symbols, *function.call(symbols))
 

@@ -28,7 +28,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.simulate import simulate
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 from symfric.laws import BrownMcPhee, Law, Viscous
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute

@@ -20,7 +20,6 @@ from symfric.results.kinds import Group, every, friction_laws, kinds, main
 from symfric.results.signals import Signals
 
 Array = NDArray[np.float64]
-CHOICES = ("main", "all")
 APART = 8
 """Largest number of signals that have a panel each if all are shown."""
 BLACK = COLOURS.index(EDGE)
@@ -52,7 +51,7 @@ def plot_trajectories(
             friction shows all.
         log: signals or details with a logarithmic axis; values that are not positive are left out.
     """
-    checks.choice("plot: panels", panels, CHOICES)
+    checks.choice("plot: panels", panels, ("main", "all"))
     log = (log,) if isinstance(log, str) else tuple(log)
     first = next(iter(trajectories.values()))
     for trajectory in trajectories.values():

@@ -57,7 +57,7 @@ def test_held_forces_move_one_and_two_blocks_as_by_the_law(seed: int) -> None:
     assert "stick" in kinds(motion, "guide")
     assert len(motion.modes["guide"]) >= 3
     names = ("x1", "x2", "v1", "v2")
-    motion = same(blocks(LAW), 1.0, names, u={"force": random_hold(seed, 15.0)})
+    motion = same(blocks(LAW), 2.0, names, u={"force": random_hold(seed, 15.0)})
     assert {"slip+", "stick", "slip-"} <= {*kinds(motion, "one"), *kinds(motion, "two")}
 
 

@@ -183,7 +183,9 @@ def test_shooting_converges_with_the_order_of_its_method(method: str, order: int
 def test_shooting_has_conditions_at_every_node_and_with_inputs_at_the_start_too() -> None:
     path = [lambda s: s.v * s.force <= 9]
     problem = Problem(Phase(stage(), 1.0), EFFORT, path=path, bounds={"power": (0.0, 9.0)})
-    rows = put(problem, 3, Shooting()).program.rows
+    made = discretise(problem, Shooting())
+    assert made.spans[0].block.rows.is_a("SXFunction")  # steps of a small model are expanded
+    rows = made.on(make_meshes(problem, 3)).program.rows
     at = {name: [r.fraction for r in rows if r.name == name] for name in {r.name for r in rows}}
     np.testing.assert_allclose(at["the bound on power"], [1 / 3, 2 / 3, 1.0])
     np.testing.assert_allclose(at["path condition 1"], [0.0, 1 / 3, 2 / 3, 1.0])
@@ -301,7 +303,6 @@ def test_nonzeros_grow_linearly_and_the_graph_does_not_grow(make: Callable[[], P
 
     (few, graph), (more, same), (many, still) = count(4), count(8), count(16)
     assert np.all(np.subtract(many, more) == 2 * np.subtract(more, few))
-    assert np.all(np.subtract(more, few) > 0)
     assert graph == same == still
 
 
