@@ -66,8 +66,8 @@ def fig_04_position(quick: bool) -> Drawn:
     figure, (axis,) = panels(1, NARROW, 2.4)
     axis.plot(t, 1e6 * x, **look("generic_asperity"))
     turns = np.linspace(0.0, t[-1], len(paper.PATH))
-    mark = {"color": look("leuven")["color"], "label": "turning points, at rest"}
-    axis.plot(turns, 1e6 * np.array(paper.PATH), "o", **mark)
+    mark, label = look("leuven")["color"], "turning points, at rest"
+    axis.plot(turns, 1e6 * np.array(paper.PATH), "o", color=mark, label=label)
     axis.set(xlabel="time [s]", ylabel="position [µm]")
     axis.legend()
 
