@@ -133,11 +133,6 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
     }
 
 
-def costs(law: AnyLaw) -> str:
-    """Return the quantity whose cost in instructions is reported."""
-    return "a step of one contact" if isinstance(law, Population) else "force and rate"
-
-
 LEGEND = """
 shows:
 {codes}
@@ -168,10 +163,11 @@ def show_law(name: str, law: AnyLaw) -> None:
     """Print docstring, properties and parameters of one law."""
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
+    unit = "a step of one contact" if isinstance(law, Population) else "force and rate"
     output.show(
         f"{name} shows {', '.join(PHENOMENA[code] for code in phenomena(law))}.\n"
         f"Smoothness: {law.facts.smoothness}.\nFormula: {law.facts.formula}.\n"
-        f"Cost: {cost(law).value} CasADi instructions for {costs(law)}, "
+        f"Cost: {cost(law).value} CasADi instructions for {unit}, "
         f"{cost(law).gradient} for their derivatives.\n"
     )
     for warning in law.warnings():
