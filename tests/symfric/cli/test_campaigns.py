@@ -126,6 +126,7 @@ def check_folder(out: Path) -> dict[str, Any]:
     return json.loads((out / "summary.json").read_text())
 
 
+@pytest.mark.slow
 def test_the_demo_runs_on_a_simulated_record(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "INTERVALS", 12)
     monkeypatch.setattr(Figure, "savefig", lambda _, to, **__: Path(to).write_bytes(PNG))

@@ -12,11 +12,11 @@ from robots import SMALL
 from symfric.cli import main
 
 TEXT = Path(__file__).with_name("refusals.toml").read_text(encoding="utf-8")
-NUMBERS = ["abc", "nan", "-inf", "1e400", "1,5", "0x10", "[1]"]
-COUNTS = [*NUMBERS, "1.5", "1e12", "-1", "10000000000000000000000"]
+NUMBERS = ["abc", "nan", "-inf", "1,5"]
+COUNTS = [*NUMBERS, "1.5", "1e12", "-1", "10000000000000000000000", "1e400"]
 PAIRS = ["mu_d=", "=1", "nonsense=1", "mu_d=1=2", *(f"mu_d={x}" for x in NUMBERS[:5])]
 LAWS = [
-    "", " ", "+", "lugre)", "lagged()", "lugre(", "LuGre()", "x" * 5000,
+    "", " ", "+", "lugre)", "lagged()", "x" * 5000,
     "lagged(" * 500 + "lugre" + ")" * 500, "\x1b[31m", "../lugre", "%s",
 ]  # fmt: skip
 FILES = ["/a-folder-nobody-has/x{}", "record.csv/x{}", ".", "loop/x{}", "a" * 300 + "{}"]

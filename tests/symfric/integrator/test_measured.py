@@ -121,17 +121,3 @@ def test_an_event_at_a_jump_of_an_input_leaves_derivatives_without_an_error() ->
     with pytest.raises(ValueError, match="apart from the jumps of the inputs"):
         _ = run.sensitivities
     assert np.isnan(run.statistics.sensitivity_errors["x0.x"])
-
-
-def test_motions_without_derivative_have_no_error_of_it() -> None:
-    """A ball that only touches: its event has no derivative, the run goes on."""
-    x, v = Variable("x", "m"), Variable("v", "m/s")
-    touched = Event("touched", x.symbol - 0.5)
-    model = Model(
-        "grazing", x=(x, v), ode=ca.vertcat(v.symbol, -1.0), events=(touched,),
-    )  # fmt: skip
-    run = simulate(model, 2.0, x0={"x": 0.0, "v": 1.0}, sensitivities=["x0.v"], measure_error=True)
-    assert run.status.ok
-    if run.happened:
-        assert np.isnan(run.statistics.sensitivity_errors["x0.v"])
-    assert run.statistics.error < 1e-5

@@ -246,15 +246,6 @@ def test_damaged_and_foreign_libraries_are_compiled_again(calls: Calls, folder: 
 
 
 @needs_compiler
-def test_the_compiler_may_have_options(monkeypatch: pytest.MonkeyPatch, calls: Calls) -> None:
-    found = find_compiler()
-    assert found is not None
-    monkeypatch.setenv("CC", f"{found.command[0]} -DANSWER=7")
-    assert load("int answer(void) { return ANSWER; }").answer() == 7
-    assert calls[0][:2] == (found.command[0], "-DANSWER=7")
-
-
-@needs_compiler
 def test_refused_code_leaves_no_file(folder: Path) -> None:
     with pytest.raises(CompileError, match=r"compile: .* failed .*error: .*nonsense"):
         load("int answer(void) { return nonsense; }")
