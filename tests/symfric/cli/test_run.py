@@ -11,7 +11,7 @@ from robots import SMALL
 from symfric import Linear, LuGre, drive, parameters, rabinowicz, simulate
 from symfric.cli.machines import input_from_text
 from symfric.results import animation
-from symfric.scenes import ALL_SCENES, Robot
+from symfric.scenes import Robot
 
 PNG = b"\x89PNG\r\n\x1a\n"
 RABINOWICZ = "run rabinowicz --law lugre --t-end 2"
@@ -91,18 +91,6 @@ def test_a_failed_solve_has_status_1_and_keeps_the_results_so_far(symfric) -> No
     assert result["status"] != "SUCCESS"
     assert 1.0 <= result["t_end"] < 2.0
     assert Path("x.csv").read_text().startswith("t [s],x [m]")
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] if name in ("arm", "four_bar") else [])
-        for name in ALL_SCENES
-    ],
-)
-def test_every_scene_runs_with_its_defaults(scene: str, symfric) -> None:
-    end = min(1.0, ALL_SCENES[scene].t_end)
-    symfric(f"run {scene} --law coulomb+viscous --backend vm --t-end {end}")
 
 
 def test_warnings_of_a_law_concern_numbers_that_were_changed(symfric) -> None:
