@@ -6,14 +6,11 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from backends import needs_compiler
 from numpy.typing import NDArray
 from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
-from symfric.integrator import simulate_by_peer
-from symfric.integrator.by_peer import PEERS
 
 Array = NDArray[np.float64]
 SPAN = 20.0
@@ -70,25 +67,6 @@ def test_solution_is_that_of_scipy(name: str, rates: object, start: list[float])
     ours = simulate(MODELS[name], SPAN, rtol=1e-10, t_eval=times)
     assert deviation(ours["x"], scipy[0]) < 1e-9
     assert deviation(ours["v"], scipy[1]) < 1e-8
-
-
-@each_law
-@pytest.mark.parametrize(
-    ("backend", "rtol", "bound"),
-    [
-        ("vm", 1e-8, 1e-7),
-        pytest.param("compiled", 1e-8, 1e-7, marks=needs_compiler),
-        ("rosenbrock", 1e-8, 2e-5),
-        ("sundials", 1e-8, 5e-5),
-    ],
-)
-def test_backends_agree(name: str, backend: str, rtol: float, bound: float) -> None:
-    """CasADi's own integrators accumulate more error at the same tolerance."""
-    if backend in PEERS:
-        run = simulate_by_peer(MODELS[name], SPAN, backend, rtol=rtol)
-    else:
-        run = simulate(MODELS[name], SPAN, rtol=rtol, backend=backend)
-    assert deviation(run["x"], reference(name)) < bound
 
 
 def worst_break_away(model: Model, velocities: Array, span: float = SPAN, **run: object) -> float:

@@ -8,7 +8,7 @@ import pytest
 from differentiable import oscillator, pendulum, root
 from scipy.linalg import expm
 
-from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, drive, flow, rabinowicz, simulate
+from symfric import BrownMcPhee, LuGre, Model, Variable, flow, rabinowicz, simulate
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
 
@@ -97,29 +97,6 @@ def test_derivatives_of_both_orders_meet_the_matrix_exponential() -> None:
     assert by_k == pytest.approx((tower[:2, 2:4] @ START)[0], rel=1e-6)
     assert by_kk == pytest.approx(2 * (tower[:2, 4:] @ START)[0], rel=1e-5)
     assert by_T == pytest.approx(exact(2.0)[1], rel=1e-6)
-
-
-def test_flow_inside_an_optimisation_of_the_user() -> None:
-    """Multiple shooting in Opti: push a mass with friction 1 m in 1 s, at rest at both ends."""
-    intervals, T = 20, 1.0
-    step = flow(drive(Viscous(sigma_2=0.5), m=0.8), steps=2)
-    opti = ca.Opti()
-    X, U = opti.variable(2, intervals + 1), opti.variable(1, intervals)
-    for k in range(intervals):
-        ahead = step(x0=X[:, k], u=U[k], T=T / intervals)["xf"]
-        opti.subject_to(X[:, k + 1] == ahead)
-    opti.subject_to(X[:, 0] == 0)
-    opti.subject_to(X[:, -1] == ca.vertcat(1.0, 0.0))
-    opti.minimize(ca.sumsqr(U) * T / intervals)
-    opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
-    found = opti.solve()
-    # linear dynamics, quadratic cost: one Newton step with exact second derivatives
-    assert found.stats()["iter_count"] <= 2
-    run = np.zeros(2)
-    A = expm(np.array([[0, 1, 0], [0, -0.5 / 0.8, 1 / 0.8], [0, 0, 0]]) * T / intervals)
-    for k in range(intervals):
-        run = (A @ [*run, found.value(U)[k]])[:2]
-    assert run == pytest.approx([1.0, 0.0], abs=1e-6)
 
 
 def falling() -> Model:

@@ -151,16 +151,6 @@ def test_failures_are_silent(monkeypatch: pytest.MonkeyPatch, folder: Path) -> N
         assert not list(folder.iterdir())
 
 
-def test_a_compiler_that_hangs_is_stopped(calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("symfric.foundation.programs.PATIENCE", 0.0)
-    monkeypatch.setattr("symfric.foundation.programs.PER_BYTE", 0.0)
-    some = prospect()
-    assert not some.pays(1.0)
-    started(calls)
-    wait()
-    assert some.hopeless
-
-
 ENDING = """
 import os, sys
 import symfric.integrator.compiled.background as b
