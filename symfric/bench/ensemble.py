@@ -169,12 +169,8 @@ def threads(case: str, law: Law, quick: bool) -> Iterator[Found]:
     model, velocities = rabinowicz(law), np.linspace(-0.1, 0.1, members)
     picked = np.linspace(0, members - 1, sample).astype(int)
     some = velocities[picked]
-
-    def end_position(v: float) -> float:
-        run = simulate(model, THREAD_END, x0={"v": v}, t_eval=[THREAD_END], rtol=1e-11)
-        return run["x"][0]
-
-    exact = np.array([end_position(v) for v in some])
+    end = partial(simulate, model, THREAD_END, t_eval=[THREAD_END], rtol=1e-11)
+    exact = np.array([end(x0={"v": v})["x"][0] for v in some])
 
     def error(found: Array) -> float:
         return float(np.median(np.abs(found - exact)) / np.abs(exact).max())
