@@ -45,7 +45,6 @@ from symfric.integrator.many.chunk import (
     Job,
     Points,
     Solved,
-    Task,
     digest,
     suited,
 )
@@ -62,6 +61,9 @@ from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from symfric.integrator.cuda.on_device import OnDevice
+
+    Task = Job | EventJob | OnDevice
+    """Common part of all chunks of an ensemble."""
 
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")

@@ -168,8 +168,11 @@ class Stored:
                 return {v.name: by_name[v.name] for v in self.model.x}
             return made.states(at)
 
+        def keep(_: Trajectory) -> Stored:
+            return self
+
         return replace(
-            made, evaluate=evaluate, states=states, keep=lambda _: self,
+            made, evaluate=evaluate, states=states, keep=keep,
             **self._derivatives(integrator, made.t),
         )  # fmt: skip
 
