@@ -97,7 +97,7 @@ def test_no_break_away_is_missed(name: str, rtol: float, method: str, count: int
 
 @each_law
 def test_no_break_away_is_missed_at_a_loose_tolerance(name: str) -> None:
-    """Where nearly every other integrator loses whole slips."""
+    """Nearly every other integrator loses whole slips there."""
     velocities = np.linspace(-0.1, 0.1, 6)
     with pytest.warns(UserWarning, match="stick phases may be lost"):
         assert worst_break_away(MODELS[name], velocities, rtol=1e-4) < 0.02

@@ -1,4 +1,4 @@
-"""Ensembles: every member as `simulate` runs it, on every executor, whatever fails."""
+"""Ensembles: members equal runs of `simulate`, on every executor; failures are reported."""
 
 import os
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""The flow of a model as a Function: values, derivatives of both orders, inside an optimisation."""
+"""The flow of a model as a Function: values, and derivatives of both orders."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""All adaptive methods through `simulate`, `simulate_many` and their derivatives."""
+"""Adaptive methods through `simulate`, `simulate_many` and derivatives."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Plants from sample to sample: the bits of `simulate`, many at once, what stands in the way."""
+"""Plants from sample to sample: equal to `simulate` to the bit, in batches, and failures."""
 
 import copy
 import sys
@@ -84,7 +84,7 @@ def test_accurate_whatever_the_interval(backend: str) -> None:
 
 @each_backend
 def test_a_batch_is_each_one_alone(backend: str) -> None:
-    """With parameters and starts of their own, and one of them put back on the way."""
+    """Each has its own parameters and start; one of them is reset in between."""
     model = drive(LuGre(), free=["m"])
     held = np.random.default_rng(1).normal(size=(30, 3)) * 3
     mass, start = np.array([0.5, 0.8, 1.1]), np.array([0.0, 0.1, -0.1])
@@ -127,7 +127,7 @@ def test_a_thousand_samples_are_compiled_once_and_searched_for_never(
     assert calls == ["symfric_plants"] * (len(BACKENDS) - 1)
 
 
-def test_a_copy_goes_its_own_way() -> None:
+def test_a_copy_is_independent() -> None:
     one = stepper(followed(), 0.1, backend="vm")
     one.step(1.0)
     other = one.copy()
@@ -175,7 +175,7 @@ def test_inputs_come_by_name_as_numbers_and_as_arrays() -> None:
     assert nothing.step() == pytest.approx([np.exp(-1)], rel=1e-5)
 
 
-def test_time_in_the_equations_begins_where_it_is_told() -> None:
+def test_time_in_the_equations_starts_at_t_start() -> None:
     t = ca.SX.sym("t")
     model = Model("timed", x=(x,), ode=2 * t, t=t)
     plant = stepper(model, 0.5, t_start=3.0, backend="vm")
@@ -247,7 +247,7 @@ def test_bad_inputs_are_refused_and_nothing_has_happened(backend: str) -> None:
 
 
 def test_an_interrupted_step_has_not_happened(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two of three plants were at their sample; then all of them are where they were."""
+    """Two of three plants had reached their sample; all of them are set back."""
     plant = stepper(followed(), 0.1, batch=3, backend="vm")
     alone, before = plant.copy(), plant.copy()
     before.step([1.0, 2.0, 3.0])

@@ -1,4 +1,4 @@
-"""Runs in files and pickles: everything that a run answers, to the bit, in another process, too."""
+"""Runs in files and pickles: all results are equal to the bit."""
 
 import pickle
 from pathlib import Path
@@ -27,7 +27,7 @@ def through_file(run: Trajectory, folder: Path) -> Trajectory:
 
 
 def assert_same(one: Trajectory, other: Trajectory) -> None:
-    """All that can be asked is the same to the bit."""
+    """Signals, details, steps and statistics are equal to the bit."""
     times = np.linspace(*one.span, 137)
     for a, b in ((one.at(times), other.at(times)), (one.signals, other.signals)):
         assert list(a) == list(b)
@@ -45,7 +45,7 @@ def assert_same(one: Trajectory, other: Trajectory) -> None:
 
 
 def own_model() -> Model:
-    """With what no pickle takes: a function inside a function."""
+    """A model with a nested function, which pickle rejects."""
     x = Variable("x", "V", start=1.0)
     return Model(
         "own",
@@ -147,7 +147,7 @@ def test_derivatives_between_the_times_of_the_result_are_found_again(tmp_path: P
             assert twice.differentiate is not None
 
 
-def test_what_a_file_holds_is_not_computed_again(
+def test_stored_results_are_not_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = simulate(rabinowicz(LuGre(), free=["mu_s"]), 1.0, sensitivities=["mu_s"], samples=11)
@@ -162,8 +162,8 @@ def test_what_a_file_holds_is_not_computed_again(
     assert loaded.event_sensitivities["mu_s"].size == 0
 
 
-def test_a_motion_without_derivative_says_so_out_of_its_file(tmp_path: Path) -> None:
-    """An event where an input jumps: behind it the motion leads elsewhere in another order."""
+def test_a_stored_run_without_derivatives_reports_the_reason(tmp_path: Path) -> None:
+    """An event at a jump of an input: the motion after it depends on their order."""
     x, u = Variable("x", "m"), Variable("u", "m/s")
     done = Event("done", x.symbol - 1.0, terminal=True)
     model = Model("filled", x=(x,), u=(u,), ode=u.symbol, events=(done,))

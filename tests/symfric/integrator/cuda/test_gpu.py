@@ -1,4 +1,4 @@
-"""On a machine with a graphics processor: what it gives beside the CPU, and how fast.
+"""On a machine with a graphics processor: results equal those of the CPU, and run times.
 
 `pytest tests/symfric/integrator/cuda -m "slow or not slow" -rs` on such a machine, with the extra
 'cuda'; elsewhere everything here is skipped, and says why.
