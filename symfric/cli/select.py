@@ -25,6 +25,7 @@ from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.identify import reader, residuals_of
 from symfric.cli.machines import formed, kind_of
+from symfric.cli.options import Strings
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
@@ -34,7 +35,6 @@ from symfric.scenes import Scene
 OFTEN = 10.0
 """Seconds between progress lines if standard error is not a terminal."""
 OF_FRICTION = ("mu_s", "mu_d", "v_s")
-Strings = list[str] | None
 
 
 def select(

@@ -149,10 +149,7 @@ class Peer:
         f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
         # its own first step is so long that tight tolerances are never met
-        return {
-            "init_xdot": slope.tolist(),
-            "step0": first_step(float(grid[-1] - grid[0])),
-        }
+        return {"init_xdot": slope.tolist(), "step0": first_step(float(grid[-1] - grid[0]))}
 
 
 def rates_of(system: System) -> tuple[list[int], Array]:

@@ -135,16 +135,14 @@ def test_derivatives_between_the_times_of_the_result_are_found_again(tmp_path: P
     }
     for name, (model, wanted) in models.items():
         run = simulate(model, 2.0, sensitivities=wanted, samples=7, backend="vm")
-        for loaded in (through_file(run, tmp_path), pickle.loads(pickle.dumps(run))):
-            assert run.differentiate is not None
-            assert loaded.differentiate is not None
-            one, other = (r.differentiate(between) for r in (run, loaded))  # pyright: ignore
-            for seed, slopes in one.items():
-                for signal, values in slopes.items():
-                    found = other[seed][signal]
-                    np.testing.assert_array_equal(found, values, f"{name} {signal}")
-            twice = through_file(loaded, tmp_path)
-            assert twice.differentiate is not None
+        pickled = name == "events"
+        loaded = pickle.loads(pickle.dumps(run)) if pickled else through_file(run, tmp_path)
+        assert run.differentiate is not None
+        one, other = (r.differentiate(between) for r in (run, loaded))
+        for seed, slopes in one.items():
+            for signal, values in slopes.items():
+                np.testing.assert_array_equal(other[seed][signal], values, f"{name} {signal}")
+        assert through_file(loaded, tmp_path).differentiate is not None
 
 
 def test_stored_results_are_not_computed_again(
