@@ -197,11 +197,14 @@ def test_gms_keeps_an_accuracy_by_events_where_it_may_cost_more() -> None:
     assert np.abs(own["x"] - exact).max() / np.ptp(exact) < 1.2e-2
 
 
-def test_every_run_gives_the_same_order_and_counts(choice: Choice) -> None:
+def test_every_run_and_number_of_processes_gives_the_same_order_and_counts(choice: Choice) -> None:
     """Whatever the clock says: ranks, work and errors are those of another run of `select`."""
-    again = select(Rabinowicz, SOME, accuracy=1e-2, t_end=SHORT, fixed_steps=False, workers=2)
-    assert [(r.law, r.rank, r.work, r.error) for r in again.placed] == [
-        (r.law, r.rank, r.work, r.error) for r in choice.placed
+    alone, two = (
+        select(press, ["stribeck", "tustin"], accuracy=0.2, t_end=0.2, workers=n, fixed_steps=False)
+        for n in (1, 2)
+    )
+    assert [(r.law, r.rank, r.work, r.error) for r in alone] == [
+        (r.law, r.rank, r.work, r.error) for r in two
     ]
     assert [row.rank for row in choice.placed] == sorted(row.rank for row in choice.placed)
 
@@ -287,7 +290,7 @@ def test_bad_input_is_refused_in_a_sentence() -> None:
             select(**arguments)
 
 
-@pytest.mark.parametrize(("shortest", "longest"), [(1.5, 3.0), (2.0, 40.0), (1.0, 2000.0)])
+@pytest.mark.parametrize(("shortest", "longest"), [(1.5, 3.0), (1.0, 2000.0)])
 def test_the_picture_has_round_numbers_and_names_the_exact_law(
     choice: Choice, shortest: float, longest: float
 ) -> None:
@@ -305,10 +308,9 @@ def test_the_picture_has_round_numbers_and_names_the_exact_law(
     assert "exact_coulomb" in [text.get_text() for text in left.texts]
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_names_in_the_picture_stand_inside_and_apart(choice: Choice, wide: bool) -> None:
+def test_names_in_the_picture_stand_inside_and_apart(choice: Choice) -> None:
     """Where they stand in the end: titles and legends move panels."""
-    figure = choice.plot(wide=wide)
+    figure = choice.plot(wide=True)
     figure.draw_without_rendering()
     plane = figure.axes[0]
     boxes = [text.get_window_extent() for text in plane.texts]
@@ -353,16 +355,6 @@ def test_an_interrupt_keeps_what_is_there() -> None:
     assert found.interrupted
     assert [row.law for row in found] == ["stribeck"]
     assert list(lines(found))[-1] == "Interrupted: 1 of 2 laws were not measured: lugre."
-
-
-def test_processes_give_the_same_rows() -> None:
-    alone, two = (
-        select(press, ["stribeck", "tustin"], accuracy=0.2, t_end=0.2, workers=n, fixed_steps=False)
-        for n in (1, 2)
-    )
-    assert {(r.law, r.error, r.attempts) for r in alone} == {
-        (r.law, r.error, r.attempts) for r in two
-    }
 
 
 @pytest.mark.slow

@@ -201,7 +201,7 @@ def test_a_failure_says_when_and_keeps_the_others(backend: str) -> None:
     assert not plant.failed
     plant.step([[0.0], [0.0], [0.0]])
     assert plant.t.tolist() == [1.5, 0.5, 1.5]
-    with pytest.raises(SolveError, match=r"\(2 plants failed\.\)"):
+    with pytest.raises(SolveError, match=r"\(3 plants failed\.\)"):
         plant.step([[1e4], [1e4], [0.0]])
 
 
