@@ -208,16 +208,6 @@ class Machine:
                 return guess[name]
         return float(at_start(ca.substitute(ca.SX(v.start), model.vector("p"), ca.DM(self.p)), ()))
 
-    def margin(self, modes: Modes, at: Instant) -> float:
-        """Return the least friction margin of sticking contacts, over nominal loads; < 0: slip."""
-        _, look = self.solved(modes, at)
-        margins = [
-            min(row[0], row[1]) / self.sizes[c.name]
-            for c, row in zip(self.contacts, look, strict=True)
-            if not modes[c.name]
-        ]
-        return min(margins, default=np.inf) + OVERLOAD
-
     def undecided(self, t: float, why: str) -> SolveError:
         """Return the SolveError for undetermined contact modes."""
         return SolveError(
