@@ -23,7 +23,14 @@ from numpy.typing import NDArray
 
 from ocp.formulation.expressions import arguments
 from ocp.formulation.statement import further_states, rebuilt
-from ocp.friction.mode_models import SIDES, loops_of, mode_model, nominal_load, slip_change
+from ocp.friction.mode_models import (
+    KINDS,
+    SIDES,
+    loops_of,
+    mode_model,
+    nominal_load,
+    slip_change,
+)
 from ocp.friction.smooth_models import sticking
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
@@ -290,5 +297,4 @@ class Machine:
 
 def shown(modes: Modes) -> str:
     """Return modes as text."""
-    words = {1: "slip+", 0: "stick", -1: "slip-"}
-    return ", ".join(f"{name} {words[mode]}" for name, mode in modes.items())
+    return ", ".join(f"{name} {KINDS[mode]}" for name, mode in modes.items())

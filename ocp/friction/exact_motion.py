@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.friction.contact_modes import Modes
+from ocp.friction.mode_models import KINDS
 from ocp.solving.solution import Mode
 from symfric import Hold, Linear, Statistics, Trajectory
 from symfric.foundation import checks
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 Given = float | Hold | Linear | Callable[[ca.SX], Any]
 LATER = 1e-13
 """Relative time difference that separates before from after an instant."""
-KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
 @final
