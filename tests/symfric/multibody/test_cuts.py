@@ -6,7 +6,7 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre, Model
 from symfric.bench.mechanisms import chain
-from symfric.integrator.equations.blocks import blocks, refinement, signs
+from symfric.integrator.equations.blocks import blocks, corrected, signs
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
@@ -82,7 +82,7 @@ def test_signs_and_refined_unknowns_are_the_same(
     y = some(made[0].n)
     one, other = ([float(sign) for sign in signs(s, GAMMA)(y, 0.01, [])[:2]] for s in made)
     assert one == other
-    refined = [refinement(s)(y, []).full().ravel() for s in made]
+    refined = [corrected(s)(y, []).full().ravel() for s in made]
     assert refined[0] == pytest.approx(refined[1], rel=1e-9, abs=1e-9)
 
 
@@ -90,7 +90,7 @@ def instructions(links: int, law: Law | None) -> int:
     made = unknowns(chain(links, law))
     block = blocks(made, GAMMA)
     stage = block.f.n_instructions() + block.solve.n_instructions()
-    return block.instructions + 8 * stage
+    return block.slopes.n_instructions() + block.pack.n_instructions() + 8 * stage
 
 
 @pytest.mark.slow
