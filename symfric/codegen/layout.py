@@ -19,9 +19,8 @@ from textwrap import wrap
 from typing import final
 
 from symfric.codegen.blocks.block import GROUPS, Block
-from symfric.emitter.arrays import Arrays
 from symfric.emitter.c99 import Real
-from symfric.emitter.rolling import Array
+from symfric.emitter.rolling import Array, Arrays
 
 
 @final

@@ -12,9 +12,9 @@ from typing import final
 import casadi as ca
 
 from symfric.codegen.blocks.block import GROUPS, RESERVED, Block, Elements
-from symfric.emitter.arrays import Arrays
+from symfric.emitter.arrays import looped
 from symfric.emitter.c99 import TRANSCENDENTAL
-from symfric.emitter.rolling import LEAST, Array
+from symfric.emitter.rolling import LEAST, Array, Arrays
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Parametric, Variable, parameters, with_values
@@ -259,8 +259,7 @@ def _used(block: Block) -> set[tuple[str, str]]:
             if a.group in groups
         )
 
-    used = Arrays(of(GROUPS[:3]), of(("state",))).used(graph(block.step))
-    texts = {array.text for array in (*used.read, *used.written)}
+    texts = looped(graph(block.step), Arrays(of(GROUPS[:3]), of(("state",))))
     return {(a.group, a.name) for a in block.arrays if f"{a.group}->{a.name}" in texts}
 
 
