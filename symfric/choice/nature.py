@@ -8,7 +8,8 @@ import numpy as np
 
 from symfric.choice.friction import Friction
 from symfric.codegen.blocks.from_law import law_block
-from symfric.codegen.routines import routines
+from symfric.codegen.layout import CBlock
+from symfric.codegen.source import routines
 from symfric.embedded import measure
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
@@ -163,7 +164,7 @@ def c_operations(law: Law) -> tuple[int | None, str]:
     """Operations of the law's step in C, float, parameters constant; or why it has none."""
     try:
         block = law_block(law, h=STEP if law.states else None, free=())
-        steps = [r for r in routines(block, REALS["float"]) if _is_step(r.name)]
+        steps = [r for r in routines(CBlock(block, REALS["float"])) if _is_step(r.name)]
     except ValueError as problem:
         return None, str(problem)
     return sum(r.operations + sum(r.calls.values()) for r in steps), ""

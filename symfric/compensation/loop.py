@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
-from symfric.codegen.layout import TEMPLATES, called, filled, prefix
+from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.codegen.runner import FLAGS
 from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
-from symfric.emitter.c99 import REALS, Real
+from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.numeric import bound
@@ -78,35 +78,19 @@ class Members:
         return lambda: COMPILED[key](*given)
 
     def _compiled(self, real: str, compiler: Compiler) -> Any:
-        kind = REALS[real]
-        name = prefix(self.block, kind)
+        c = CBlock(self.block, REALS[real])
         with TemporaryDirectory(prefix="symfric-") as folder:
-            generate(self.block, folder, real=real, kit=False)
+            made = generate(self.block, folder, real=real, kit=False)
             glue, library = Path(folder) / "members.c", Path(folder) / "members.so"
-            call = self._call(kind)
-            write_text(glue, filled(TEMPLATES / "members.c", name=name, real=kind.name, call=call))
-            sources = [str(Path(folder) / f"{name}.c"), str(glue)]
-            compiler.run(*FLAGS, "-shared", "-fPIC", *sources, "-o", str(library), "-lm")
+            write_text(glue, filled(TEMPLATES / "members.c", **c.sizes))
+            parts = [str(made.source(real)), str(glue), "-o", str(library), "-lm"]
+            compiler.run(*FLAGS, "-shared", "-fPIC", *parts)
             try:
                 found = ctypes.CDLL(str(library))["members"]
             except OSError as error:
                 raise CompileError(f"the library does not load on this machine: {error}") from None
         found.restype = None
         return found
-
-    def _call(self, real: Real) -> str:
-        """Return the statements of a step of member i."""
-        name = prefix(self.block, real)
-        arrays = {"state": self.state, "param": self.param, "in": self.input, "out": self.output}
-        sizes = {group: array.shape[1] for group, array in arrays.items()}
-        pointers = {
-            group: f"({'const ' * (group in ('param', 'in'))}{name}_{group}_t *)({group} + {n} * i)"
-            for group, n in sizes.items()
-        }
-        inputs = [f"in[{sizes['in']} * i + {k}]" for k in range(sizes["in"])]
-        call = called(self.block, real, True, pointers, inputs, "&status[i]")
-        idle = "".join(f"(void){group}; " for group, n in sizes.items() if not n)
-        return f"{idle}{'out[i] =' if self.block.is_function else 'status[i] |='} {call}"
 
     def _in_vm(self) -> Any:
         # CasADi's columns are the rows of the arrays

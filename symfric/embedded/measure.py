@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import Generated
-from symfric.codegen.layout import filled, prefix
-from symfric.codegen.runner import link_program, program, run_c, run_vm
+from symfric.codegen.layout import CBlock, filled
+from symfric.codegen.runner import compiled, run_c, run_vm
 from symfric.embedded.target import (
     BY,
     CORES,
@@ -143,7 +143,7 @@ def measure(
         target = Target(CORES[core], found, flags)
         image = built(subject, real, inputs, _columns(block), target)
         heard = said(target.heard(image), real, _columns(block))
-        equal = _equal(block, subject.source, (real, guards), inputs, heard.rows)
+        equal = _equal(CBlock(block, REALS[real], guards), subject.source, inputs, heard.rows)
     return _measured(block, real, CORES[core], by, inputs, heard, equal)
 
 
@@ -154,7 +154,8 @@ def _columns(block: Block) -> int:
 def _measured(
     block: Block, real: str, core: Core, by: str, inputs: Array, heard: Said, equal: float
 ) -> Measured:
-    expected = run_vm(block, REALS[real], inputs, heard.rows[:, : len(block.states)])
+    c = CBlock(block, REALS[real])
+    expected = run_vm(c, inputs, heard.rows[:, : len(block.states)])
     return Measured(
         block.name,
         real,
@@ -186,19 +187,12 @@ def _error(block: Block, a: Array, b: Array) -> float:
     return float(np.where(np.isnan(ratio), inf, ratio).max(initial=0.0))
 
 
-def _equal(block: Block, source: Path, how: tuple[str, bool], inputs: Array, rows: Array) -> float:
-    """Share of numbers with the bits of our C on the host; NaN without a compiler or with others'.
-
-    Args:
-        how: floating point type, and whether there are guards.
-    """
-    compiler, folder = find_compiler(), source.parent
-    real, guards = REALS[how[0]], how[1]
-    if compiler is None or source.stem != prefix(block, real):
+def _equal(c: CBlock, source: Path, inputs: Array, rows: Array) -> float:
+    """Share of numbers with the bits of our C on the host; NaN without a compiler or with others'."""
+    compiler = find_compiler()
+    if compiler is None or source.stem != c.name:
         return nan
-    write_text(folder / "main.c", program(block, real, guards))
-    link_program(compiler, [folder / "main.c", source], folder, folder / "main")
-    host = run_c(block, real, folder / "main", inputs, guards=guards)
+    host = run_c(c, compiled(c, [source], source.parent, compiler), inputs)
     return float((host[:, : rows.shape[1]] == rows).mean())
 
 
@@ -229,7 +223,7 @@ def wrong_on_target(
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
         raise CompileError(f"{where}: {found.advice}")
-    name = prefix(generated.block, REALS[real])
+    name = generated.c(real).name
     sources = [generated.folder / f"{name}{ending}.c" for ending in ("", "_test")]
     target = Target(CORES[core], found, flags)
     with TemporaryDirectory(prefix="symfric-") as folder:

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.header import header
-from symfric.codegen.layout import called, filled, prefix
-from symfric.codegen.routines import source
+from symfric.codegen.layout import CBlock, filled
+from symfric.codegen.source import header, source
 from symfric.emitter.c99 import REALS
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, Compiler, ProgramError, finished
@@ -52,17 +51,17 @@ class Subject:
 
 def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
     """Our C, written into `folder`, and its call."""
-    name, kind = prefix(block, REALS[real]), REALS[real]
-    write_text(folder / f"{name}.h", header(block, kind, guards))
-    write_text(folder / f"{name}.c", source(block, kind, guards))
+    c = CBlock(block, REALS[real], guards)
+    name = c.name
+    write_text(folder / f"{name}.h", header(c))
+    write_text(folder / f"{name}.c", source(c))
     pointers = {
         "state": "&state",
         "param": f"&{name}_default",
         "in": f"(const {name}_in_t *)U[k]",
         "out": f"({name}_out_t *)(Y[k] + {len(block.states)})",
     }
-    inputs = [f"U[k][{i}]" for i in range(len(block.inputs))]
-    step = called(block, kind, guards, pointers, inputs)
+    step = c.call(pointers, [f"U[k][{i}]" for i in range(len(block.inputs))])
     declarations, start, keep = ["unsigned int status;"], "status = 0u;", "(void)k;"
     if block.states:
         declarations.append(f"{name}_state_t state;")

@@ -51,14 +51,14 @@ class Real:
         """
         with np.errstate(over="ignore", under="ignore"):
             rounded = self.kind(value)
-        vanishes = rounded == 0.0 and value != 0.0
+        vanishes = bool(rounded == 0.0 and value != 0.0)
         if math.isnan(value) or vanishes or (math.isinf(rounded) and not math.isinf(value)):
             raise ValueError(
                 f"codegen: expected constants within the range of {self.name}, got {value!r}"
                 + ", which would become 0" * vanishes
             )
         if math.isinf(value):
-            return f"{'-' * (value < 0)}HUGE_VAL{self.letter.upper()}"
+            return f"{'-' if value < 0 else ''}HUGE_VAL{self.letter.upper()}"
         if rounded == 0.0 or 1e-4 <= abs(rounded) < 1e7:
             return np.format_float_positional(rounded, trim="0") + self.letter
         return np.format_float_scientific(rounded, trim="0", exp_digits=1) + self.letter

@@ -11,10 +11,10 @@ from typing import final
 
 import casadi as ca
 
-from symfric.codegen.blocks.block import GROUPS, RESERVED, Block, Elements
+from symfric.codegen.blocks.block import RESERVED, Block, Elements
 from symfric.emitter.arrays import looped
 from symfric.emitter.c99 import TRANSCENDENTAL
-from symfric.emitter.rolling import LEAST, Array, Arrays
+from symfric.emitter.rolling import LEAST
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Parametric, Variable, parameters, with_values
@@ -251,15 +251,7 @@ def _with(block: Block, found: Mapping[str, Sequence[Family]]) -> Block:
 
 def _used(block: Block) -> set[tuple[str, str]]:
     """Return (group, name) of the arrays that loops of the step read or write."""
-
-    def of(groups: Sequence[str]) -> tuple[Array, ...]:
-        return tuple(
-            Array(groups.index(a.group), a.first, a.size, f"{a.group}->{a.name}")
-            for a in block.arrays
-            if a.group in groups
-        )
-
-    texts = looped(graph(block.step), Arrays(of(GROUPS[:3]), of(("state",))))
+    texts = looped(graph(block.step), block.indexed(("state",), guards=False))
     return {(a.group, a.name) for a in block.arrays if f"{a.group}->{a.name}" in texts}
 
 

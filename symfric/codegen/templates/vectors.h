@@ -7,10 +7,13 @@
 #define @{macro}_VECTORS @count
 
 typedef struct {
-@members} @{name}_vector_t;
+@members
+} @{name}_vector_t;
 
 @tolerances
+
 static const @{name}_vector_t @{name}_vectors[@{macro}_VECTORS] = {
-@rows};
+@rows
+};
 
 #endif
