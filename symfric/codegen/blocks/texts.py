@@ -1,11 +1,11 @@
 """Texts of a data sheet, from the docstring of a law and the method of its steps."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from inspect import getdoc
 from re import match, search, split
 from textwrap import dedent
-from typing import final
+from typing import NamedTuple
 
 from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
 from symfric.foundation.parameters import Option, Parametric, options
@@ -22,9 +22,7 @@ LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
 """Patterns of sentences that depend on the previous one, or describe another form."""
 
 
-@final
-@dataclass(frozen=True)
-class LawText:
+class LawText(NamedTuple):
     """Texts about a law, without Python terms.
 
     Attributes:
@@ -42,7 +40,16 @@ class LawText:
 
 def texts(law: Parametric) -> tuple[LawText, ...]:
     """Return the texts of a law and of its parts, each once."""
-    return tuple(dict.fromkeys(_all(law)))
+
+    def every(part: Parametric) -> Iterator[LawText]:
+        yield _text(part)
+        for item in fields(part):
+            value = getattr(part, item.name)
+            for inner in value if isinstance(value, tuple) else (value,):
+                if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
+                    yield from every(inner)
+
+    return tuple(dict.fromkeys(every(law)))
 
 
 def equations(obj: Parametric) -> str:
@@ -55,28 +62,17 @@ def equations(obj: Parametric) -> str:
     return "\n\n".join(f"{text.title}\n{text.equations}".rstrip() for text in found)
 
 
-def _all(law: Parametric) -> Iterator[LawText]:
-    yield _text(law)
-    for item in fields(law):
-        value = getattr(law, item.name)
-        for inner in value if isinstance(value, tuple) else (value,):
-            if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
-                yield from _all(inner)
-
-
 def _text(law: Parametric) -> LawText:
     paragraphs = (getdoc(type(law)) or type(law).__name__).split("\n\n")
-    paragraphs = (
-        paragraphs[: paragraphs.index("Raises:")] if "Raises:" in paragraphs else paragraphs
-    )
-    formulas = list(_formulas(paragraphs, options(law).values()))
+    if "Raises:" in paragraphs:
+        paragraphs = paragraphs[: paragraphs.index("Raises:")]
+    formulas = [dedent(p) for p in _formulas(paragraphs, options(law).values())]
     prose = "\n".join(p for p in paragraphs[1:] if not p.startswith(("    ", "Raises:")))
     about, _, source = prose.partition("\nSource: ")
-    chosen = [f"{name}: {option.value}." for name, option in options(law).items()]
-    lines = [dedent(p) for p in formulas] + ["    ".join(chosen).capitalize()] * bool(chosen)
+    chosen = "    ".join(f"{name}: {option.value}." for name, option in options(law).items())
     return LawText(
         title=" ".join(paragraphs[0].split()),
-        equations="\n".join(lines).replace("`", ""),
+        equations="\n".join(formulas + [chosen.capitalize()] * bool(chosen)).replace("`", ""),
         limits=tuple(_limits(about)),
         source=" ".join(source.split()),
     )
