@@ -336,21 +336,29 @@ def excitation(block: Block, steps: int) -> Array:
 
 
 def _signal(variable: Variable, steps: int, random: np.random.Generator) -> Array:
-    k, stretches = np.arange(steps), -(-steps // STRETCH)
+    stretches = -(-steps // STRETCH)
     if variable.lower >= 0.0:
         levels = np.repeat(random.choice(LOADS, stretches), STRETCH)[:steps]
-        wavering = 1.0 + 0.5 * np.sin(0.003 * k + random.uniform(0.0, 6.0))
+        wavering = 1.0 + 0.5 * np.sin(0.003 * np.arange(steps) + random.uniform(0.0, 6.0))
         return _within(variable, variable.nominal * levels * wavering)
-    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
-    pieces = [
-        0.05 * np.sin(0.008 * k),
-        np.clip(random.standard_normal(steps), -2.0, 2.0),
-        tiny,
-        0.1 * np.sign(np.sin(0.03 * k)),
-        np.zeros(steps),
-    ]
+    pieces = motions(random, steps, 0.008, 0.03)
     turn = np.repeat(random.integers(0, len(pieces), stretches), STRETCH)[:steps]
     return _within(variable, variable.nominal * np.choose(turn, pieces))
+
+
+def motions(
+    random: np.random.Generator, steps: int, slow: float, turning: float, phase: float = 0.0
+) -> list[Array]:
+    """Return slow sines, bursts up to 2, values of 1e-12 ... 1e-3, reversals, and rest.
+
+    Args:
+        slow, turning: phase per step of sines and reversals [rad]; the latter begin at `phase`.
+    """
+    k = np.arange(steps)
+    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
+    bursts = np.clip(random.standard_normal(steps), -2.0, 2.0)
+    turns = 0.1 * np.sign(np.sin(turning * k + phase))
+    return [0.05 * np.sin(slow * k), bursts, tiny, turns, np.zeros(steps)]
 
 
 def _within(variable: Variable, values: Array) -> Array:

@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any, final
@@ -18,28 +17,28 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.codegen.blocks.from_model import fixed_method
+from symfric.codegen.layout import filled
 from symfric.fmu.equations import equations, fingerprint, header, source
 from symfric.fmu.package import (
-    Described,
-    build_description,
+    SOURCES,
     compiled,
     described,
     fixed_text,
     packed,
     platform_name,
+    shared_name,
     sources,
 )
 from symfric.fmu.variables import LARGEST_RTOL, LEAST_RTOL, Entry, entries
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
-from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
+from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.model import Model, check_model
 from symfric.scenes.base import Scene
 
 KINDS = ("co-simulation", "model-exchange")
 VERSIONS = (2, 3)
-INTERVALS = 200
-"""Communication steps of the default experiment."""
 
 
 @final
@@ -165,40 +164,23 @@ def export_fmu(
     model_c = source(own)
     shared = {f"fmi{fmi}.c": fixed_text(f"fmi{fmi}.c"), "model.c": model_c, "kind": kind}
     token = fingerprint(shared | {"sizes": header(own, ""), "unit": fixed_text("unit.c")})
-    texts = sources(header(own, token), model_c, fmi, step is not None, exchange)
-    write_time, begin = perf_counter() - begin, perf_counter()
-    binary = compiled(texts, identifier, fmi)
-    compile_time = perf_counter() - begin
-    loops = made.holonomic is not None and made.holonomic.phi.numel() > 0
-    listed = entries(made, own.start, 0.0 if step else own.rtol, not loops, exchange)
-    what = Described(
-        name=made.name,
-        identifier=identifier,
-        token=token,
-        doc=f"{made.name}: {own.formula} of symfric",
-        tool=f"symfric {version('symfric')}",
-        span=span,
-        rtol=None if step else own.rtol,
-        step=step,
-        interval=(span[1] - span[0]) / INTERVALS,
-        files=("all.c",),
-        exchange=exchange,
-        slopes=not loops,
-    )
-    build = build_description(what) if fmi == 3 else ""
-    size = packed(target, described(what, listed, fmi), build, texts, binary)
-    return Exported(
-        path=target,
-        size=size,
-        fmi=fmi,
-        kind=kind,
-        identifier=identifier,
-        variables=listed,
-        binary=binary.name if binary.content else "",
-        missing=binary.missing,
-        method=own.formula,
-        times=(write_time, compile_time),
-    )
+    texts = sources(own, header(own, token), model_c, fmi)
+    written, library = perf_counter(), shared_name(identifier)
+    binary, missing = compiled(texts, library)
+    times = written - begin, perf_counter() - written
+    listed = entries(made, own.start, 0.0 if step else own.rtol, not own.has_loops, exchange)
+    files: dict[str, str | bytes] = {
+        "modelDescription.xml": described(own, identifier, token, listed, fmi),
+        **{f"sources/{name}": text for name, text in texts.items()},
+    }
+    if fmi == 3:
+        build = filled(SOURCES / "buildDescription.xml", identifier=identifier)
+        files["sources/buildDescription.xml"] = build
+    place = f"binaries/{platform_name(fmi)}/{library}" if binary else ""
+    if binary:
+        files[place] = binary
+    size = packed(target, files)
+    return Exported(target, size, fmi, kind, identifier, listed, place, missing, own.formula, times)
 
 
 def _model(
@@ -209,7 +191,8 @@ def _model(
     if isinstance(given, Scene):
         until = given.t_end
         known = parameters(given)
-        names = [n for n, p in known.items() if _switches_on(p.value)] if free is None else free
+        numbers = {n: checks.as_number(p.value) for n, p in known.items()}
+        names = [n for n, value in numbers.items() if value] if free is None else free
         given = given.model(names)
     elif free is not None:
         raise ValueError(
@@ -224,12 +207,6 @@ def _model(
     return given, (0.0, until)
 
 
-def _switches_on(value: object) -> bool:
-    """Return True if a parameter is a number other than zero."""
-    number = checks.as_number(value)
-    return number is not None and number != 0.0
-
-
 def _method(where: str, model: Model, method: str, step: float | None) -> str:
     """Return the formula of the steps."""
     if step is None:
@@ -240,10 +217,7 @@ def _method(where: str, model: Model, method: str, step: float | None) -> str:
             f"{where}: step: expected a model without events, got {len(model.events)}; leave the "
             "step adaptive, or use a smooth or bristle law"
         )
-    method = checks.choice(f"{where}: method", method, ["auto", *METHODS])
-    if method == "auto":
-        method = "backward_euler" if model.holonomic and model.monitors else "rodas3"
-    return method
+    return fixed_method(where, model, method)
 
 
 Array = NDArray[np.float64]
