@@ -127,7 +127,7 @@ def generate(
     compiler = find_compiler() if kit else None
     for c in several if compiler else ():
         try:
-            sizes = footprint(c, folder, compiler).to_dict()
+            sizes = footprint(c, folder, compiler)
         except CompileError:  # no sizes without a working compiler; `verify` reports why
             continue
         content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}

@@ -18,20 +18,14 @@ from symfric.codegen.layout import (
     TEMPLATES,
     CBlock,
     banner,
-    block_comment,
+    comment,
     filled,
     folded,
+    head,
     indented,
 )
 from symfric.codegen.vectors import BASE, PARAMETER_SHARE, ROUNDINGS, Vectors, vectors
 from symfric.emitter.c99 import Real
-
-EXPLAINED = """\
-A number passes if it differs from the result of CasADi in double precision by no more than its
-tolerance: {base:g} of the peak of its signal over all rows, for the rounding of a few operations,
-of the functions of math.h and of fused multiply-add, which differ between compilers and targets; or
-{roundings:g} times what rounding to this type changes in nine of ten rows, where that is more,
-as in differences of large numbers."""
 
 
 def kit_files(several: Sequence[CBlock]) -> dict[str, str]:
@@ -94,19 +88,11 @@ def unit_test(c: CBlock) -> str:
     The function returns the number of wrong results and needs neither stdio nor memory of its own;
     with NAME_TEST_PRINT it prints them, with NAME_TEST_NO_MAIN it has no `main`.
     """
-    macro = c.name.upper()
-    about = [
-        *banner(c.block, f"{c.name}_test.c"),
-        "",
-        f"Unit test of {c.name}: returns the number of wrong results. No stdio is needed.",
-        f"Define {macro}_TEST_PRINT to print them, and {macro}_TEST_NO_MAIN to call",
-        f"{c.name}_test() from elsewhere.",
-    ]
     return filled(
         TEMPLATES / "test.c",
-        banner=block_comment(about),
+        head=head(c.block, f"{c.name}_test.c"),
         name=c.name,
-        macro=macro,
+        macro=c.name.upper(),
         real=c.real.name,
         letter=c.real.letter,
         declarations=indented([*declarations(c), "int failures = 0;", "int row;"]),
@@ -186,18 +172,13 @@ def vector_header(found: Vectors) -> str:
         parts += [braces(found.results[k, a:b], real) for a, b in pairwise(ends) if b > a]
         parts += [f"{found.status[k]}u"] * c.guards
         rows.append(folded("{" + ", ".join(parts) + "},", "    "))
-    texts = [
-        *banner(block, f"{c.name}_vectors.h"),
-        "",
-        "Independent steps: the states before, the inputs, one parameter that is changed (by",
-        f"{PARAMETER_SHARE:.0%} of its default) or none, and the states after and the outputs.",
-        f"States: {', '.join(v.name for v in block.states) or 'none'}.",
-        "",
-        *EXPLAINED.format(base=BASE[real.size], roundings=ROUNDINGS).splitlines(),
-    ]
     return filled(
         TEMPLATES / "vectors.h",
-        about=block_comment(texts),
+        head=head(block, f"{c.name}_vectors.h"),
+        share=f"{PARAMETER_SHARE:.0%}",
+        states=comment(", ".join(v.name for v in block.states) or "none"),
+        base=f"{BASE[real.size]:g}",
+        roundings=f"{ROUNDINGS:g}",
         name=c.name,
         macro=c.name.upper(),
         count=len(rows),
@@ -281,47 +262,29 @@ def wrapper(c: CBlock) -> str:
     for i, place in enumerate([*fields(c, "out"), *["status"] * c.guards]):
         body.append(f"ssGetOutputPortRealSignal(S, {i})[0] = (real_T){place};")
     body += [f"ssGetRWork(S)[{i}] = (real_T){place};" for i, place in enumerate(states)]
-    count = len(block.states)
+    count, h = len(block.states), block.constants.get("h")
     later = [f"ssGetRealDiscStates(S)[{i}] = ssGetRWork(S)[{i}];" for i in range(count)]
     start = [
         f"ssGetRealDiscStates(S)[{i}] = (real_T){c.name}_start.{place};"
         for i, place in enumerate(block.places("state"))
     ]
+    ports = ", ".join(f"{v.name} [{v.unit}]" for v in block.inputs)
+    shown = [f"{n} [{o.unit}]" for n, o in block.outputs.items()] + ["status"] * c.guards
     return filled(
         TEMPLATES / "simulink.c",
-        about=block_comment(_about(c)),
+        head=head(block, f"{block.name}_sfun.c"),
+        fixed="" if h is None else f" It must be {h:g} s.",
+        order=", ".join(v.name for v in block.parameters) or "none",
+        ports=comment(ports or "none"),
+        shown=comment(", ".join(shown) or "none"),
         name=block.name,
         stem=c.name,
         parameters=len(block.parameters),
         states=count,
         inputs=len(block.inputs),
-        outputs=len(block.outputs) + c.guards,
+        outputs=len(shown),
         start=indented(start or ["(void)S;"]),
         declarations=indented(declarations(c) + ["const real_T *given;"] * bool(block.parameters)),
         outputs_body=indented(body),
         update=indented(later or ["(void)S;"]),
     )
-
-
-def _about(c: CBlock) -> list[str]:
-    """Return the head of the S-function: build instructions and ports."""
-    block = c.block
-    ports = [f"{v.name} [{v.unit}]" for v in block.inputs]
-    shown = [f"{n} [{o.unit}]" for n, o in block.outputs.items()] + ["status"] * c.guards
-    order = ", ".join(v.name for v in block.parameters) or "none"
-    h = block.constants.get("h")
-    said = "" if h is None else f" It must be {h:g} s."
-    return [
-        *banner(block, f"{block.name}_sfun.c"),
-        "",
-        "S-function of level 2 in plain C. In MATLAB:",
-        f"    mex {block.name}_sfun.c {c.name}.c",
-        f"and in the block S-Function the name {block.name}_sfun with the arguments h, []. For a",
-        f"build for a target (dSPACE, Speedgoat) add {c.name} to its S-function modules: sources "
-        "are",
-        "sufficient.",
-        f"Arguments: sample time [s].{said}",
-        f"    Parameters, [] for the defaults, tunable, in the order {order}.",
-        f"Inputs: {', '.join(ports) or 'none'}.",
-        f"Outputs: {', '.join(shown) or 'none'}. States are discrete states of the block.",
-    ]

@@ -117,6 +117,11 @@ def banner(block: Block, file: str) -> list[str]:
     ]
 
 
+def head(block: Block, file: str) -> str:
+    """Return the first lines of a C file, an open comment."""
+    return block_comment(banner(block, file)).removesuffix("\n */")
+
+
 def block_comment(lines: Sequence[str]) -> str:
     """Return lines of text as one comment."""
     return "/* " + "\n".join(f" * {comment(line)}".rstrip() for line in lines)[3:] + "\n */"

@@ -7,7 +7,7 @@ inputs, and with guards the status (`CBlock.signals`).
 import shutil
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -68,47 +68,28 @@ def needed_symbols(target: Path) -> frozenset[str] | None:
     return frozenset(names)
 
 
-@final
-@dataclass(frozen=True)
-class Footprint:
-    """Size of the object file of one source.
+def footprint(c: CBlock, folder: Path, compiler: Compiler) -> dict[str, Any]:
+    """Compile the source of a block in `folder` and measure the object file.
 
-    Attributes:
-        text: bytes of code and of constants; None without `size`.
+    Returns:
+        text: bytes of code and of constants; None without the program `size`.
         data: bytes of variables, always 0.
         stack: function -> bytes of its own frame, without functions of libm. Empty if the compiler
             does not report it.
-    """
-
-    text: int | None
-    data: int | None
-    stack: dict[str, int]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return all values by name."""
-        return asdict(self)
-
-
-def footprint(c: CBlock, folder: Path, compiler: Compiler, flags: Sequence[str] = ()) -> Footprint:
-    """Compile the source of a block in `folder` and measure the object file.
-
-    Args:
-        flags: in addition to -std=c99 -O2 -ffp-contract=off, such as -mcpu=cortex-m4 of a
-            cross-compiler.
 
     Raises:
         CompileError: the compiler rejects it.
     """
     with TemporaryDirectory(prefix="symfric-") as place:
         target = Path(place) / f"{c.name}.o"
-        command = [*FLAGS, *flags, "-c", str(folder / f"{c.name}.c"), "-o", str(target)]
+        command = [*FLAGS, "-c", str(folder / f"{c.name}.c"), "-o", str(target)]
         try:
             compiler.run("-fstack-usage", *command)
         except CompileError:  # clang before 11, and others, lack the option
             compiler.run(*command)
-        said = target.with_suffix(".su")
+        said, (text, data) = target.with_suffix(".su"), _sizes(compiler, target)
         stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
-        return Footprint(*_sizes(compiler, target), stack)
+        return {"text": text, "data": data, "stack": stack}
 
 
 def _stack(text: str) -> dict[str, int]:
