@@ -13,14 +13,13 @@ import casadi as ca
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.held_step import (
     LEAST_LOAD,
-    NO_LOAD,
     advanced,
     force_of_rate,
     forces_at,
     needs_unloaded_case,
     with_unloaded_case,
 )
-from symfric.codegen.blocks.texts import equations, of_law, texts
+from symfric.codegen.blocks.texts import SHEET, equations, of_law, texts
 from symfric.codegen.blocks.variables import (
     STEP_SIZE,
     Fold,
@@ -39,23 +38,6 @@ from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law, Population, law_name
 from symfric.laws.base.law import check_law
 from symfric.model import Output, Variables
-
-FORCE = "friction force, opposes the motion"
-SIGN = (
-    "Sign: F has the sign of v in steady sliding and opposes the motion: m dv/dt = F_applied - F. "
-    "v is the velocity of the moving side relative to the base side."
-)
-MEAN_VELOCITY = (
-    "v is the mean velocity over the step: the increment of an encoder over h, or the planned "
-    "one. With the velocity at one instant the error is of first order in h."
-)
-WHICH_FORCE = (
-    "F is the mean over the step: F h is its impulse. Use it for a force that is held over the "
-    "step, such as feed-forward from the velocity planned for the next step. F_end is the force at "
-    "the end of the step, half a step newer: compare it with a measured force, or use it "
-    "for feed-forward from the encoder increment of the last step."
-)
-SLIDING = "Initial state of long sliding at the given inputs, for a start while the machine moves."
 
 
 def law_block(
@@ -188,8 +170,9 @@ def _given(inputs: Variables) -> dict[str, ca.SX]:
 def _function(law: Law, runtime: Variables) -> Block:
     v, N, *_ = inputs = _inputs(law)
     force = law.force(v.symbol, N.symbol, ca.SX(0, 1), **_given(inputs))
-    outputs = {"F": Output(force, "N", FORCE)}
-    return Block("F", inputs=inputs, parameters=runtime, outputs=outputs, use=(SIGN,))
+    outputs = {"F": Output(force, "N", SHEET["law"]["force"])}
+    use = (SHEET["law"]["sign"],)
+    return Block("F", inputs=inputs, parameters=runtime, outputs=outputs, use=use)
 
 
 def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: str) -> Block:
@@ -203,7 +186,8 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
     at = {"F": ca.vertcat(step.mean, step.mean_rate)}
     if ca.depends_on(force, internal):
         at["F_end"] = ca.vertcat(step.end, step.end_rate)
-    following, forces, use = step.end, forces_at(force, internal, at), (SIGN, MEAN_VELOCITY)
+    following, forces, said = step.end, forces_at(force, internal, at), SHEET["law"]
+    use = (said["sign"], said["mean_velocity"])
     cases = with_unloaded_case(following, force, internal, at, N)
 
     def of_numbers(following: ca.SX, forces: dict[str, ca.SX]) -> ca.Function:
@@ -215,9 +199,9 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
 
     if needs_unloaded_case(numeric, of_numbers(following, forces), of_numbers(*cases)):
         following, forces = cases
-        use = (*use, NO_LOAD.format(least=LEAST_LOAD * N.nominal))
-    said = {"F": "mean over the step", "F_end": "at the end of the step"}
-    outputs = {n: Output(e, "N", f"{FORCE}, {said[n]}") for n, e in forces.items()}
+        use = (*use, said["no_load"].format(least=LEAST_LOAD * N.nominal))
+    when = {"F": "mean over the step", "F_end": "at the end of the step"}
+    outputs = {n: Output(e, "N", f"{said['force']}, {when[n]}") for n, e in forces.items()}
     return Block(
         "F",
         states=states,
@@ -225,10 +209,10 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
         parameters=runtime + size.parameters,
         next=following,
         outputs=outputs,
-        resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
+        resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), said["sliding"])},
         constants=size.constants,
         discretisation=of_law(step.kinds, "F_end" in outputs),
-        use=(*use, *[WHICH_FORCE] * ("F_end" in outputs)),
+        use=(*use, *[said["which_force"]] * ("F_end" in outputs)),
     )
 
 
@@ -255,13 +239,6 @@ def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
         "limits": tuple(x for x in limits if not any(search(rf"\b{n}\b", x) for n in idle)),
         "sources": tuple(text.source for text in found if text.source),
     }
-
-
-LOOP = (
-    "The friction force of the population is the sum of F over an array of states, all with the "
-    "same v and N, each with a random number r of its own, even in -1 to 1; {redrawn}."
-)
-STEP = "Keep |v| h below {step:g} m, over which a contact changes."
 
 
 def contact_block(law: Population, *, name: str | None = None, h: float | None = None) -> Block:
@@ -293,7 +270,11 @@ def contact_block(law: Population, *, name: str | None = None, h: float | None =
         doc="\n".join(text.title for text in about) + "\nOne contact of a population.",
         equations=equations(law),
         discretisation="One step of the contact with v, N and r held.",
-        use=(LOOP.format(redrawn=redrawn), SIGN, STEP.format(step=law.step)),
+        use=(
+            SHEET["population"]["loop"].format(redrawn=redrawn),
+            SHEET["law"]["sign"],
+            SHEET["population"]["step"].format(step=law.step),
+        ),
         limits=tuple(limit for text in about for limit in text.limits),
         sources=tuple(text.source for text in about),
         states=states,

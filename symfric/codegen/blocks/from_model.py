@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.texts import equations, of_method
+from symfric.codegen.blocks.texts import SHEET, equations, of_method
 from symfric.codegen.blocks.variables import (
     Fold,
     above_zero,
@@ -131,8 +131,8 @@ def plant_block(
         outputs=_outputs(model, whole, following, where),
         equations=equations(machine) if isinstance(machine, Parametric) else "",
         discretisation=of_method(formula, whole.n > whole.nx),
-        use=USE,
-        limits=LIMITS,
+        use=tuple(SHEET["plant"]["use"]),
+        limits=tuple(SHEET["plant"]["limits"]),
         sources=(formula.source,),
         **as_constants(folded, size.constants),
     )
@@ -148,20 +148,6 @@ def fixed_method(where: str, model: Model, method: str) -> str:
     if method != "auto":
         return method
     return "backward_euler" if model.holonomic and model.monitors else "rodas3"
-
-
-USE = (
-    "Inputs are held over the step: they are the mean over it. Outputs and states are those at the "
-    "end of the step.",
-    "Friction forces oppose the motion of the moving side relative to the base side.",
-    "Start values are consistent with the default parameters and inputs: they do not follow later "
-    "changes. Pass other values to the initialisation.",
-)
-LIMITS = (
-    "Fixed steps have no error control: if h does not resolve the transition of friction "
-    "between stick and slip, no method is accurate, and explicit ones may diverge.",
-    "Friction that jams (self-locking) is not detected.",
-)
 
 
 def _opened(

@@ -183,11 +183,6 @@ def force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
 LEAST_LOAD = 1e-9
 """Load, relative to the nominal load, below which a contact carries no force."""
 
-NO_LOAD = (
-    "Without load (N below {least:g} N) there is no dry friction, and the contact forgets its "
-    "deflection; when the load returns, it starts anew."
-)
-
 
 def forces_at(force: ca.SX, own: ca.SX, at: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
     """Return the force with the values `at`, by name, for the states and rates `own`, a column."""

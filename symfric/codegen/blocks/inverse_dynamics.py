@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.from_law import SLIDING
 from symfric.codegen.blocks.joints import ContactStep, contact_step, with_gravity, with_payload
+from symfric.codegen.blocks.texts import SHEET
 from symfric.codegen.blocks.variables import in_arrays, numbered, step_size
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
@@ -23,30 +23,7 @@ from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
 
-EQUATIONS = "tau = M(q) qdd + c(q, qd) + g(q) + T     by Newton and Euler, from body to body"
-
-RUBBING = """\
-T = R F(R qd, N)     turning, radius R; F(qd, N) for a law of the moment, and sliding
-N = |f_1| + |f_2| + |f_z|     of a hinge: reactions of its two stations and its face, which
-                              q, qd, qdd give; or the constant of a joint"""
-
-MEAN = "The friction of laws with states is the mean over the step (F below, not F_end)."
-
-USE = (
-    "tau moves a joint in its positive direction; friction is included.",
-    "Use the planned position, velocity and acceleration: a measured velocity that "
-    "fluctuates about zero gives fluctuating friction.",
-)
-
-LIMITS = (
-    "Rigid bodies and joints; external forces other than the payload are not in tau and "
-    "do not load the bearings.",
-)
-
-SOURCES = (
-    "Luh, Walker, Paul, J. Dyn. Sys. Meas. Control 102, 1980: recursion of Newton and Euler.",
-    "Haug, Mech. Based Des. Struct. Mach., 2018: bearings pressed by reactions.",
-)
+SAID = SHEET["mechanism"]
 
 
 def inverse_dynamics_block(
@@ -128,7 +105,7 @@ def inverse_dynamics_block(
         parameters=(*machine.parameters, *of_laws, *(size.parameters if states else ())),
         next=following,
         outputs=outputs,
-        resets={"init_sliding": (sliding, SLIDING)} if states else {},
+        resets={"init_sliding": (sliding, SHEET["law"]["sliding"])} if states else {},
         constants=size.constants,
     ))  # fmt: skip
 
@@ -226,16 +203,18 @@ class _Machine:
         every = [text for law in laws.values() for text in (law.doc, law.equations) if text]
         return {
             "doc": f"{what} of '{self.name}'.",
-            "equations": "\n\n".join([EQUATIONS, *[RUBBING] * bool(parts), *every]),
+            "equations": "\n\n".join(
+                [SAID["equations"], *[SAID["friction"]] * bool(parts), *every]
+            ),
             "discretisation": "\n\n".join(all_of("discretisation")),
             "use": (
                 f"Joints: {order}.",
                 *[f"Friction, numbered by joints: {'; '.join(where)}."] * bool(parts),
-                *USE,
-                *[MEAN] * any(law.states for law in laws.values()),
+                *SAID["use"],
+                *[SAID["mean"]] * any(law.states for law in laws.values()),
             ),
-            "limits": (*LIMITS, *all_of("limits")),
-            "sources": (*SOURCES, *all_of("sources")),
+            "limits": (*SAID["limits"], *all_of("limits")),
+            "sources": (*SAID["sources"], *all_of("sources")),
         }
 
 

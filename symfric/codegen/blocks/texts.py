@@ -1,17 +1,21 @@
 """Texts of a data sheet, from the docstring of a law and the method of its steps."""
 
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from inspect import getdoc
+from pathlib import Path
 from re import match, search, split
 from textwrap import dedent
 from typing import NamedTuple
 
-from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
 from symfric.foundation.parameters import Option, Parametric, options
 from symfric.integrator.methods.explicit import Exponential
 from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
+
+SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
+"""Fixed texts."""
 
 TELLING = (
     r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
@@ -100,42 +104,14 @@ def _limits(prose: str) -> Iterator[str]:
                 yield f"{text[0].upper() if capital else text[0]}{text[1:]}."
 
 
-HELD = "Inputs are held over the step h."
-
-KINDS = {
-    EXACT: """\
-Exact exponential step, for any length, for dz/dt = a - b z at held inputs:
-    x     = -b h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
-    z+    = z + h phi1 dz/dt            at the end of the step
-    zm    = z + h phi2 dz/dt            mean over the step
-    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end""",
-    EVENT: """\
-Event step, exact for any length: every element sticks up to its limit, which it reaches
-within the step, and slips from there on; it sticks again when v reverses.
-    z+, zm  at the end of the step, and mean over it
-    r       = (z+ - z) / h              mean rate,   r+ = dz/dt at z+""",
-    SECOND: """\
-Exponential step of second order, bounded for any length, linearised in each state:
-    J     = d(dz/dt)/dz,   x = J h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
-    z+    = z + s h phi1 dz/dt          at the end of the step
-    zm    = z + s h [(1 - s) phi1 + s phi2] dz/dt       mean over the step
-    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end
-s is 1, or the fraction of the step up to the equilibrium of z, where r+ = 0.""",
-}
-
-FORCES = """\
-    F     = F(v, N, zm, r)              mean over the step
-    F_end = F(v, N, z+, r+)             at its end"""
-
-
 def of_law(kinds: tuple[str, ...], ends: bool) -> str:
     """Return the text about the step of the states of a law, by the `kinds` of its `Step`.
 
     Args:
         ends: True if the block also has the force at the end of the step.
     """
-    forces = FORCES if ends else FORCES.splitlines()[0]
-    return "\n".join([HELD, *(KINDS[kind] for kind in kinds), forces])
+    names = ("held", *kinds, "mean", *("end",) * ends)
+    return "\n".join(SHEET["step"][name] for name in names)
 
 
 def of_method(method: Method, algebraic: bool) -> str:
@@ -146,7 +122,7 @@ def of_method(method: Method, algebraic: bool) -> str:
     """
     unknowns = "\n    x stands for states and algebraic unknowns" if algebraic else ""
     return (
-        f"Fixed steps by {method.name}, order {method.order}. {HELD}\n"
+        f"Fixed steps by {method.name}, order {method.order}. {SHEET['step']['held']}\n"
         f"{_formula(method)}{unknowns}\n"
         "Outputs are those at the end of the step. Steps have no error control."
     )
