@@ -129,11 +129,11 @@ def program(c: CBlock) -> str:
     """
     start = f"{c.name}_init({c.casts['state']}, &{c.name}_start);" if c.block.states else ""
     if c.block.parameters:
-        start += f" if (argc <= 2) {{ param = (const real *)&{c.name}_default; }}"
+        start += f" if (!own) {{ param = (const {c.real.name} *)&{c.name}_default; }}"
     given = [c.casts[group] for group in ("param", "in") if group in c.block.members]
-    other = f"({c.name}_state_t *)other"
+    write = f"fwrite(other, sizeof({c.real.name}), STATES, stdout);"
     resets = (
-        f"{c.name}_{reset}({', '.join([other, *given])}); shown(other, STATES);"
+        f"{c.name}_{reset}({', '.join([f'({c.name}_state_t *)other', *given])}); {write}"
         for reset in c.block.resets
     )
     steps = {"start": start, "resets": "\n        ".join(resets), "guards": int(c.guards)}

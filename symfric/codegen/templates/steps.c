@@ -3,30 +3,34 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-typedef @real real;
-enum { STATES = @states, PARAMS = @params, INPUTS = @inputs, OUTPUTS = @outputs };
-static real state[STATES + 1], given[PARAMS + 1], in[INPUTS + 1], out[OUTPUTS + 1];
-static real other[STATES + 1];
-
-static int taken(real *to, size_t n) { return fread(to, sizeof(real), n, stdin) == n; }
-static void shown(const real *from, size_t n) { fwrite(from, sizeof(real), n, stdout); }
-
-/* Makes as many steps as the first argument says; with a second one parameters precede inputs. */
-int main(int argc, char **argv)
+/* Makes steps on numbers of standard input; `own` says that parameters precede the inputs of each.
+   Returns 0 if it ends too early. */
+static int @{name}_run(long steps, int own)
 {
-    long steps = argc > 1 ? strtol(argv[1], NULL, 10) : 0;
-    const real *param = given;
+    enum { STATES = @states, PARAMS = @params, INPUTS = @inputs, OUTPUTS = @outputs };
+    @real state[STATES + 1] = {0}, other[STATES + 1], given[PARAMS + 1], in[INPUTS + 1];
+    @real out[OUTPUTS + 1] = {0}, said;
+    const @real *param = given;
     @start
+    (void)other;
     for (; steps > 0; steps--) {
         unsigned int bits = 0u, *status = &bits;
-        real said;
-        if ((argc > 2 && !taken(given, PARAMS)) || !taken(in, INPUTS)) { return 1; }
+        if (own && fread(given, sizeof(@real), PARAMS, stdin) != PARAMS) { return 0; }
+        if (fread(in, sizeof(@real), INPUTS, stdin) != INPUTS) { return 0; }
         @step
-        shown(state, STATES);
-        shown(out, OUTPUTS);
+        fwrite(state, sizeof(@real), STATES, stdout);
+        fwrite(out, sizeof(@real), OUTPUTS, stdout);
         @resets
-        said = (real)*status;
-        if (@guards) { shown(&said, 1); }
+        said = (@real)*status;
+        if (@guards) { fwrite(&said, sizeof said, 1, stdout); }
     }
-    return 0;
+    (void)param;
+    return 1;
 }
+
+#ifndef NO_MAIN
+int main(int argc, char **argv)
+{
+    return @{name}_run(argc > 1 ? strtol(argv[1], NULL, 10) : 0, argc > 2) ? 0 : 1;
+}
+#endif

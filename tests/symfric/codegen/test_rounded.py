@@ -5,10 +5,10 @@ import json
 import casadi as ca
 import numpy as np
 import pytest
+from symfric.codegen.rounding import in_type, modes, rounded
 
 from symfric import GMS, LuGre
 from symfric.codegen import Block, generate, law_block, verify
-from symfric.codegen.rounding import in_type, modes, rounded
 from symfric.codegen.runner import signals
 from symfric.compensation import compensator, gms_observer
 from symfric.foundation.parameters import Variable

@@ -6,11 +6,11 @@ import subprocess
 import casadi as ca
 import pytest
 from law_cases import NO_STEP, SYMMETRIC
+from symfric.codegen.header import header, interval
+from symfric.codegen.routines import routines, source
 
 from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous
 from symfric.codegen import Block, generate, law_block
-from symfric.codegen.header import header, interval
-from symfric.codegen.routines import routines, source
 from symfric.codegen.runner import FLAGS, WARNINGS, compile_object
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS
