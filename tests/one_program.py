@@ -18,6 +18,7 @@ from symfric.foundation.programs import Compiler, finished
 block_of = cache(law_block)
 """Blocks of laws with default options, made once for all tests."""
 
+
 def along(
     block: Block, inputs: np.ndarray, p: np.ndarray | None = None, state: object = None
 ) -> tuple[np.ndarray, np.ndarray]:

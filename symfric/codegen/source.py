@@ -1,6 +1,7 @@
 """C functions of a block, its source file, and its header file with the data sheet."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from math import isfinite
 from textwrap import wrap
 from types import MappingProxyType
@@ -61,6 +62,7 @@ class Routine(NamedTuple):
         return whole if len(whole) <= WIDTH else whole.replace(", ", ",\n" + " " * len(start))
 
 
+@lru_cache(maxsize=4)
 def routines(c: CBlock) -> tuple[Routine, ...]:
     """Return the C functions of a block: `_init`, `_reset`, its resets and `_step`, or a scalar
     one.

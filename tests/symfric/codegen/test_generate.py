@@ -146,8 +146,8 @@ def test_a_law_with_states_has_a_data_sheet_structs_and_a_step():
         assert part in text
     fixed = header(CBlock(law_block(LuGre(), h=2e-3), DOUBLE))
     assert "h = 0.002 s, a constant of this code: call it at exactly this interval." in fixed
-    for text in (text, source(CBlock(LUGRE, FLOAT))):
-        first = " ".join(text.splitlines()[:2])
+    for file in (text, source(CBlock(LUGRE, FLOAT))):
+        first = " ".join(file.splitlines()[:2])
         assert "symfric 0." in first
         assert f"CasADi {ca.__version__}" in first
         assert LUGRE.fingerprint in first
