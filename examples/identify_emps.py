@@ -19,7 +19,7 @@ from rich.console import Console
 
 from identification import ClosedLoop, Dataset, Fit, Fitted, Shooting, synthetic_drive_data
 from identification.residuals.initial import local, noise_of
-from identification.residuals.open_loop import sampled_motion
+from identification.residuals.shots import sampled_motion
 from symfric import Asymmetric, Coulomb, Sum, Viscous
 from symfric.foundation.panels import grid, save
 from symfric.foundation.style import line

@@ -109,15 +109,12 @@ class _Listening(ast.NodeTransformer):
 @contextmanager
 def nudged(factor: float) -> Generator[None]:
     """Every simulation at tolerances that are `factor` times those asked for."""
-    of, begin = Given.of, Given.begin
+    of = Given.of
 
-    def other_of(t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> NDArray[np.float64]:
+    def other(t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> NDArray[np.float64]:
         return of(t_end, rtol * factor, h_max, np.asarray(atol) * factor, d)
 
-    def other_begin(R: Any, rtol: float, h_max: float, atol: Any, p: Any) -> None:
-        begin(R, rtol * factor, h_max, atol * factor, p)
-
-    with patch.object(Given, "of", other_of), patch.object(Given, "begin", other_begin):
+    with patch.object(Given, "of", other):
         yield
 
 

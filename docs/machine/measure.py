@@ -27,8 +27,9 @@ from docs.machine import rst
 from docs.machine.made import MADE
 from docs.machine.pages import DOCS, ROOT
 from docs.machine.rst import sentence
+from symfric import bench
+from symfric.bench import SUBJECTS
 from symfric.cli import output
-from symfric.cli.campaigns import SUBJECTS
 from symfric.foundation.files import write_text
 
 STORED = DOCS / "benchmarks"
@@ -66,20 +67,17 @@ def commit() -> str:
 
 def measured(subject: str, quick: bool) -> dict[str, Any]:
     """The tables that `symfric bench SUBJECT` prints, with what they were measured on."""
-    from symfric import bench  # noqa: PLC0415  (not for pages)
-
     loads, began = [os.getloadavg()[0]], perf_counter()
-    result = getattr(bench, f"bench_{subject}")(quick=quick)
+    result = bench.measure(subject, quick)
     loads.append(os.getloadavg()[0])
     spent = perf_counter() - began
     tables = [
         {
             "title": one.title,
-            "columns": list(one.head),
-            "rows": [[c if isinstance(c, str) else output.number(c) for c in r] for r in one.rows],
+            "rows": [dict(zip(one.head, map(shown_cell, r), strict=True)) for r in one.rows],
         }
         for one in result.shown()
-        if not isinstance(one, str) and one.rows
+        if not isinstance(one, str)
     ]
     return {
         "title": subject.capitalize(),
@@ -92,6 +90,11 @@ def measured(subject: str, quick: bool) -> dict[str, Any]:
         "seconds": round(spent),
         "tables": tables,
     }
+
+
+def shown_cell(cell: str | float) -> str:
+    """Return a cell as the command prints it."""
+    return cell if isinstance(cell, str) else output.number(cell)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -162,8 +165,8 @@ def shown(tables: Iterable[Mapping[str, Any]]) -> Iterable[str]:
     for one in tables:
         if one["title"]:
             yield f"**{rst.plain(one['title'].replace('`', ''))}**\n\n"
-        rows = [[sentence(cell) for cell in row] for row in one["rows"]]
-        yield rst.table([sentence(c) for c in one["columns"]], rows)
+        rows = [[sentence(cell) for cell in row.values()] for row in one["rows"]]
+        yield rst.table([sentence(c) for c in one["rows"][0]], rows)
 
 
 def made_by(found: Mapping[str, Any]) -> str:
@@ -183,17 +186,12 @@ ROUTES = {"flow": "``flow``", "collocation": "collocation"}
 def tables() -> dict[str, str]:
     """Name of each table -> its text."""
     found = stored()["interop"]
-    by_first = {one["columns"][0]: rows(one) for one in found["tables"]}
+    by_first = {next(iter(one["rows"][0])): one["rows"] for one in found["tables"]}
     return {
         "interop_moves": moves(by_first["tool"]),
         "interop_integrators": integrators(by_first["integrator"]),
         "interop_by": f"*Measured by* {made_by(found)}.\n",
     }
-
-
-def rows(one: Mapping[str, Any]) -> list[Row]:
-    """The rows of a stored table by the names of its columns."""
-    return [dict(zip(one["columns"], row, strict=True)) for row in one["rows"]]
 
 
 def moves(lines: Sequence[Row]) -> str:

@@ -140,6 +140,10 @@ def with_symbols(words: str) -> str:
     return found + plain(words[end:])
 
 
+SENTENCES = re.compile(r"(Limits|Source|Checked|Defaults): (.*)")
+"""Sections of one paragraph that follow others without an empty line."""
+
+
 def _blocks(lines: list[str], linked: Linked, formulas: bool) -> Iterator[str]:
     """Paragraphs, indented blocks and sections, one after the other."""
     place = 0
@@ -158,7 +162,7 @@ def _blocks(lines: list[str], linked: Linked, formulas: bool) -> Iterator[str]:
             yield shown("\n".join(lines[place:end]), formulas)
         else:
             while end < len(lines) and lines[end].strip() and not lines[end].startswith(" "):
-                if SECTION.match(lines[end]) or re.match(r"(Limits|Source|Defaults): ", lines[end]):
+                if SECTION.match(lines[end]) or SENTENCES.match(lines[end]):
                     break
                 end += 1
             yield _paragraph(lines[place:end], linked)
@@ -169,7 +173,7 @@ def _paragraph(lines: list[str], linked: Linked) -> str:
     if sum(WIDE.search(line) is not None for line in lines) > 1:  # a table
         return literal("\n".join(lines))
     words = " ".join(lines)
-    head = re.match(r"(Limits|Source|Defaults|Sign|Stability): (.*)", words)
+    head = re.match(r"(Sign|Stability): (.*)", words) or SENTENCES.match(words)
     if head:
         return f"**{head[1]}.** {sentence(head[2], linked)}\n\n"
     return sentence(words, linked) + "\n\n"

@@ -1,18 +1,10 @@
-"""Complete check of a data set, and the checks of times, points, units and a measured velocity."""
+"""Complete check of a data set, and the checks of times, points, units, velocity and motion."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from identification.data.check_drive import (
-    of_dead_time,
-    of_direction,
-    of_drift,
-    of_excitation,
-    of_motion,
-    of_one_way,
-    of_residue,
-)
+from identification.data.check_drive import of_direction, of_excitation, of_residue
 from identification.data.check_signals import (
     of_clipping,
     of_frozen,
@@ -20,9 +12,9 @@ from identification.data.check_signals import (
     of_resolution,
     of_spikes,
 )
-from identification.data.findings import Finding, Findings, View
+from identification.data.findings import Array, Finding, Findings, View, count_of
 from identification.data.record import GAP, JITTER, Record
-from identification.data.rough import Rough, rough_model, smoothed
+from identification.data.rough import Rough, rough_model, smoothed, white_part
 
 FEWEST, FEW = 20, 50
 """Numbers of samples below which a record is an error, and a warning."""
@@ -32,13 +24,13 @@ SLOW = 0.5
 
 def of_times(view: View) -> Iterator[Finding]:
     """Find gaps, irregular intervals, too few samples, times that may be in another unit."""
-    record = view.record
+    record, t = view.record, view.record.time
     if record.size < FEW:
         text = f"The record has only {record.size} samples."
-        yield view.finding("short", "t", text, "error" if record.size < FEWEST else "warning")
-    if record.t is None or record.size < 3:
+        yield view.finding("error" if record.size < FEWEST else "warning", "short", "t", text)
+    if record.size < 3:
         return
-    intervals = np.diff(record.t)
+    intervals = np.diff(t)
     usual = float(np.median(intervals))
     gaps = np.flatnonzero(intervals > GAP * usual)
     if gaps.size:
@@ -58,10 +50,9 @@ def of_times(view: View) -> Iterator[Finding]:
             f"{2 * JITTER:.0%}, most {intervals[k]:.4g} s at {view.at(k)}: use data.resampled()."
         )
         yield view.warning("irregular", "t", text, k, k + 1)
-    whole = bool(np.all(np.abs(record.t - np.rint(record.t)) < 1e-9))
-    if usual >= SLOW and whole and record.size >= 200:
+    if usual >= SLOW and record.size >= 200 and np.all(np.abs(t - np.rint(t)) < 1e-9):
         text = (
-            f"The samples are {usual:g} s apart over {np.ptp(record.t) / 3600:.2g} hours, at whole "
+            f"The samples are {usual:g} s apart over {np.ptp(t) / 3600:.2g} hours, at whole "
             "seconds: are the times in ms, or row numbers?"
         )
         yield view.warning("units", "t", text)
@@ -79,13 +70,11 @@ def of_points(view: View) -> Iterator[Finding]:
         return
     v, force = record["v"], record["F"]
     if record.size < FEWEST_POINTS:
-        text = f"The data have only {record.size} points."
-        yield view.warning("short", "v", text)
-    if np.ptp(v) == 0 or np.ptp(force) == 0:
-        name = "v" if np.ptp(v) == 0 else "F"
-        text = f"{name} is {record[name][0]:g} throughout."
-        yield view.error("constant", name, text)
-        return
+        yield view.warning("short", "v", f"The data have only {record.size} points.")
+    for name in ("v", "F"):
+        if np.ptp(record[name]) == 0:
+            yield view.error("constant", name, f"{name} is {record[name][0]:g} throughout.")
+            return
     moving = np.abs(v) > 0.01 * np.abs(v).max()
     both = min(np.mean(v > 0), np.mean(v < 0)) > 0.1
     around = float(np.median(force)) if both else 0.0
@@ -117,33 +106,25 @@ TOGETHER = (("m", "N"), ("rad", "N m"))
 def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
     """Find units that do not belong together, and implausible ranges."""
     record = view.record
-    mixed = [record.units[view.roles[r]] for r in ("x", "force") if r in view.roles]
-    if len(mixed) == 2 and "" not in mixed and tuple(mixed) not in TOGETHER:
-        text = (
-            f"{view.name('x')} is in {mixed[0]} and {view.name('force')} in {mixed[1]}: a slide "
-            "needs m and N, a shaft rad and N m."
-        )
-        yield view.error("units", view.name("force"), text)
+    x, force = view.name("x"), view.name("force")
+    mixed = tuple(view.unit(r) for r in ("x", "force") if r in view.roles)
+    if len(mixed) == 2 and "" not in mixed and mixed not in TOGETHER:
+        text = f"{x} is in {mixed[0]} and {force} in {mixed[1]}: a slide "
+        yield view.error("units", force, f"{text}needs m and N, a shaft rad and N m.")
     for signal in view.roles.values():
         low, doubt, high = LIMITS.get(record.units[signal], (0.0, np.inf, np.inf))
         range_ = float(np.ptp(record.signals[signal]))
         if 0 < range_ < low or range_ > doubt:
             text = f"{signal} has a range of {range_:.3g} {record.units[signal]}: check its unit."
-            yield view.finding(
-                "units", signal, text, "error" if range_ < low or range_ > high else "warning"
-            )
+            severity = "error" if range_ < low or range_ > high else "warning"
+            yield view.finding(severity, "units", signal, text)
     if model is not None and model.clean:
-        unit = record.units[view.roles["x"]]
         fastest = float(np.quantile(np.abs(model.v), 0.99))
-        doubt, high = FASTEST.get(unit, (np.inf, np.inf))
+        doubt, high = FASTEST.get(view.unit("x"), (np.inf, np.inf))
         if fastest > doubt:
-            text = (
-                f"{view.roles['x']} moves at {fastest:.3g} {unit}/s: check its unit and that of "
-                "the times."
-            )
-            yield view.finding(
-                "units", view.roles["x"], text, "error" if fastest > high else "warning"
-            )
+            text = f"{x} moves at {fastest:.3g} {view.unit('x')}/s: check its unit and that of "
+            severity = "error" if fastest > high else "warning"
+            yield view.finding(severity, "units", x, f"{text}the times.")
 
 
 WIDTH = 12.0
@@ -172,41 +153,81 @@ def of_velocity(view: View) -> Iterator[Finding]:
     record = view.steady
     if record is None or record.size < 100:
         return
-    for of, rate in (("x", "v"), ("v", "a")):
-        if of not in view.roles or rate not in view.roles:
+    edge = int(3 * WIDTH)
+    for pair in (("x", "v"), ("v", "a")):
+        if not {*pair} <= view.roles.keys():
             continue
-        name, other = view.roles[rate], view.roles[of]
+        other, name = (view.roles[r] for r in pair)
         if np.ptp(record[name]) == 0 or np.ptp(record[other]) == 0:
             continue
-        edge = int(3 * WIDTH)
         derived = (smoothed(record[other], WIDTH, 1) / record.step)[edge:-edge]
         given = smoothed(record[name], WIDTH)[edge:-edge]
         if derived.std() == 0 or given.std() == 0:
             continue
         alike = float(np.corrcoef(derived, given)[0, 1])
         scale = float(given.std() / derived.std())
+        slope = f"the slope of {other}"
         if alike < -ALIKE:
-            text = (
-                f"{name} is opposite to the slope of {other} (correlation {alike:.2f}): the sign "
-                "of one is wrong."
-            )
-            yield view.error("sign", name, text)
+            text = f"{name} is opposite to {slope} (correlation {alike:.2f}): the sign "
+            yield view.error("sign", name, f"{text}of one is wrong.")
         elif alike < ALIKE:
-            text = f"{name} is not the slope of {other} (correlation {alike:.2f})."
+            text = f"{name} is not {slope} (correlation {alike:.2f})."
             yield view.warning("velocity", name, text)
         elif abs(scale - 1) > OFF:
             near = [text for known, text in KNOWN.items() if abs(scale / known - 1) < 0.1]
-            text = (
-                f"{name} is {scale:.4g} times the slope of {other}: "
-                f"{near[0] if near else 'a wrong unit or scale'}."
-            )
-            yield view.finding(
-                "units", name, text, "error" if near or scale > 5 or scale < 0.2 else "warning"
-            )
+            why = near[0] if near else "a wrong unit or scale"
+            severity = "warning" if not near and 0.2 <= scale <= 5 else "error"
+            text = f"{name} is {scale:.4g} times {slope}: {why}."
+            yield view.finding(severity, "units", name, text)
+
+
+MOVED = 6.0
+"""Range of the position over its noise (standard deviation) below which nothing moved."""
+COUNTS = 4
+"""Encoder counts below which nothing moved."""
+WHITE = 0.3
+"""Correlation of neighbours below which a position is noise."""
+
+
+def of_motion(view: View) -> Iterator[Finding]:
+    """Find signals without motion."""
+    x, force = view.signal("x"), view.signal("force")
+    if x is not None and x.size >= 20:
+        yield from _still(view, x)
+    if force is not None and force.size >= 20 and np.ptp(force) == 0:
+        name = view.name("force")
+        text = f"{name} is {force[0]:g} {view.unit('force')} throughout: "
+        if float(force[0]) == 0:
+            text += "motion without a drive determines only friction over mass."
+            yield view.warning("constant", name, text)
+        else:
+            yield view.error("constant", name, f"{text}nothing was measured.")
+
+
+def _still(view: View, x: Array) -> Iterator[Finding]:
+    name, unit = view.name("x"), view.unit("x")
+    if np.ptp(x) == 0 or np.ptp(x) < COUNTS * count_of(x):
+        text = f"{name} never changes by more than {np.ptp(x):.3g} {unit}: nothing moved."
+        yield view.error("standstill", name, text)
+        return
+    centred, middle = x - x.mean(), float(np.ptp(np.quantile(x, (0.02, 0.98))))
+    if float(centred[1:] @ centred[:-1] / (centred @ centred)) < WHITE:
+        text = (
+            f"{name} is noise of {float(np.std(np.diff(x))) / np.sqrt(2):.3g} {unit}: neighbouring "
+            "samples are uncorrelated, which is not the motion of a body."
+        )
+        yield view.error("noise", name, text)
+    elif middle < MOVED * white_part(x):
+        text = f"{name} moves by {middle:.3g} {unit}, no more than its noise."
+        yield view.error("standstill", name, text)
 
 
 HOPELESS = {"standstill", "noise", "constant", "short", "wrap", "swapped", "glitch", "frozen"}
 """Errors after which a rough model of the drive is meaningless."""
+ALONE = (of_times, of_jumps, of_spikes, of_frozen, of_velocity, of_motion)
+"""Checks that precede the rough model."""
+OF_MODEL = (of_direction, of_excitation, of_resolution, of_residue)
+"""Checks that need it."""
 
 
 def check(name: str, records: Sequence[Record], roles: Mapping[str, str]) -> Findings:
@@ -227,28 +248,14 @@ def _of_record(view: View) -> Iterator[Finding]:
     if view.record.t is None:
         yield from of_points(view)
         return
-    jumps = list(of_jumps(view))
-    wrapped = any(f.kind == "wrap" for f in jumps)
-    spikes = [f for f in of_spikes(view) if not (wrapped and f.kind == "glitch")]
-    alone = [
-        *of_times(view),
-        *jumps,
-        *spikes,
-        *of_frozen(view),
-        *of_velocity(view),
-        *of_motion(view),
-    ]
+    alone = [finding for of in ALONE for finding in of(view)]
+    if any(f.kind == "wrap" for f in alone):  # a wrap looks like glitches
+        alone = [f for f in alone if f.kind != "glitch"]
     yield from alone
     hopeless = any(f.severity == "error" and f.kind in HOPELESS for f in alone)
     model = None if hopeless else rough_model(view)
     yield from of_clipping(view)
     yield from of_units(view, model)
     if model is not None:
-        yield from of_direction(view, model)
-        yield from of_one_way(view, model)
-        yield from of_excitation(view, model)
-        yield from of_resolution(view, model)
-        free = rough_model(view, curve=True)
-        yield from of_drift(view, model, free)
-        yield from of_dead_time(view, model, free)
-        yield from of_residue(view, free)
+        for of in OF_MODEL:
+            yield from of(view, model)

@@ -22,29 +22,21 @@ HEAVY = 0.5
 
 def of_spikes(view: View) -> Iterator[Finding]:
     """Find spikes of every signal; those that outweigh the signal are an error."""
-    named = view.roles.values()
-    for signal, y in view.known():
-        if view.record.t is None:
-            continue
-        far, off = spike_samples(y, position=signal == view.name("x"))
+    for signal, y, unit in view.known():
+        position = signal == view.name("x")
+        far, off = spike_samples(y, position=position)
         if not far.size:
             continue
         k = int(far[np.argmax(off[far])])
         weight = float((off[far] ** 2).sum() / (((y - np.median(y)) ** 2).sum() + 1e-300))
-        position, heavy = signal == view.name("x"), weight > HEAVY and signal in named
-        unit = view.record.units[signal]
+        heavy = weight > HEAVY and signal in view.roles.values()
         text = (
             f"{signal} is far off its neighbours in {far.size} sample(s), most at {view.at(k)} by "
             f"{off[k]:.3g} {unit}: remove them with data.without_spikes()."
         )
-        yield view.finding(
-            "glitch" if position else "spikes",
-            signal,
-            text,
-            "error" if position or heavy else "warning",
-            int(far[0]),
-            int(far[-1]),
-        )
+        kind = "glitch" if position else "spikes"
+        severity = "error" if position or heavy else "warning"
+        yield view.finding(severity, kind, signal, text, int(far[0]), int(far[-1]))
 
 
 def spike_samples(y: Array, *, position: bool) -> tuple[NDArray[np.intp], Array]:
@@ -82,38 +74,33 @@ If the drive itself was at its limit, the motion needs no larger force.
 
 
 def of_clipping(view: View) -> Iterator[Finding]:
-    """Find signals held at their largest or smallest value."""
-    for signal, y in view.known():
-        if y.size < 50 or np.ptp(y) == 0:
+    """Find signals held at their largest or smallest value, except positions at rest."""
+    for signal, y, unit in view.known():
+        if signal == view.name("x"):
             continue
         first, length = constant_runs(y)
-        held = length >= RUN
-        levels = y[first]
-        sides: list[tuple[str, float]] = []
-        for side, top in (("largest", float(y.max())), ("smallest", float(y.min()))):
-            share = float(length[held & (levels == top)].sum()) / y.size
-            if share >= SHARE:
-                sides.append((side, top))
-        at_ends = held & np.isin(levels, [top for _, top in sides])
-        if not sides or length[at_ends].sum() < THERE * length[held].sum():
-            continue
-        if signal == view.name("x"):  # at rest at the end of its travel
+        held, levels = length >= RUN, y[first]
+        tops = {
+            side: top
+            for side, top in (("largest", float(y.max())), ("smallest", float(y.min())))
+            if float(length[held & (levels == top)].sum()) / y.size >= SHARE
+        }
+        at_ends = held & np.isin(levels, [*tops.values()])
+        samples = int(length[at_ends].sum())
+        if not tops or samples < THERE * length[held].sum():
             continue
         k = int(np.argmax(np.where(at_ends, length, 0)))
-        samples = int(length[at_ends].sum())
-        unit = view.record.units[signal]
-        where = " and ".join(f"its {side} value {top:.4g} {unit}" for side, top in sides)
-        severity, why = _verdict(view, signal, [top for _, top in sides])
+        where = " and ".join(f"its {side} value {top:.4g} {unit}" for side, top in tops.items())
+        severity, why = _limited(view, signal, [*tops.values()])
         text = (
             f"{signal} stays at {where} in {samples / y.size:.1%} of the samples, longest from "
             f"{view.at(int(first[k]))} on: {why}."
         )
-        yield view.finding(
-            "clipping", signal, text, severity, int(first[k]), int(first[k] + length[k] - 1)
-        )
+        end = int(first[k] + length[k] - 1)
+        yield view.finding(severity, "clipping", signal, text, int(first[k]), end)
 
 
-def _verdict(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
+def _limited(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
     """Return the severity: whether the force itself was limited, or only its measurement."""
     unsure = "the amplifier or the sensor was at its limit there"
     model = rough_model(view, curve=True) if signal == view.name("force") else None
@@ -127,15 +114,11 @@ def _verdict(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]
     values, *_ = np.linalg.lstsq(model.columns[free], model.force[free], rcond=1e-10)
     passed = (model.columns[clipped] @ values - model.force[clipped]) * np.sign(force[clipped])
     most = float(np.quantile(passed, 0.9))
-    if passed.mean() > MEAN * top and most > MOST * top:
-        return "error", (
-            f"the motion needs up to {most:.3g} {view.record.units[signal]} more, so its sensor "
-            "was at its limit, not the drive"
-        )
-    return "warning", unsure
+    if not (passed.mean() > MEAN * top and most > MOST * top):
+        return "warning", unsure
+    why = f"the motion needs up to {most:.3g} {view.unit('force')} more, so its sensor was at its "
+    return "error", f"{why}limit, not the drive"
 
-
-Counts = NDArray[np.intp]
 
 FROZEN = 8
 """Number of consecutive equal values that a noisy signal does not have."""
@@ -149,50 +132,32 @@ JUMP = 8.0
 
 def of_frozen(view: View) -> Iterator[Finding]:
     """Find intervals of equal values in signals that do not repeat elsewhere or jump afterwards."""
-    for signal, y in view.known():
-        if y.size < 50 or np.ptp(y) == 0:
-            continue
-        steps = np.abs(np.diff(y))
+    for signal, y, unit in view.known():
+        steps, position = np.abs(np.diff(y)), signal == view.name("x")
         first, length = constant_runs(y)
-        inner = (y[first] < y.max()) & (y[first] > y.min()) | (signal == view.name("x"))
-        long = (length >= FROZEN) & inner
+        long = (length >= FROZEN) & ((y[first] < y.max()) & (y[first] > y.min()) | position)
         if not long.any():
             continue
-        k, jumped = _longest_that_jumps(y, steps, first, length, long)
-        outside = np.ones(y.size, dtype=bool)
-        for f, n in zip(first[long].tolist(), length[long].tolist(), strict=True):
-            outside[f : f + n] = False
-        repeats = float(np.mean(steps[outside[1:]] == 0)) if outside[1:].any() else 1.0
+        inside = np.repeat(long, length)[1:]
+        repeats = float(np.mean(steps[~inside] == 0)) if not inside.all() else 1.0
         noisy = repeats < REPEATED and count_of(y) == 0
+        usual = max(float(np.quantile(steps, 0.995)), count_of(y))
+        after = np.append(steps, 0.0)[first + length - 1]
+        jumps = long & (after > JUMP * usual)
+        jumped = bool(jumps.any())
         if not jumped and not noisy:
             continue
-        if not jumped:
-            k = int(np.argmax(np.where(long, length, 0)))
+        k = int(np.argmax(np.where(jumps if jumped else long, length, 0)))
         begin, end = int(first[k]), int(first[k] + length[k] - 1)
-        after = f", then jumps by {steps[end]:.3g} {view.record.units[signal]}" if jumped else ""
-        lost = length[k] > LOST * y.size and noisy
-        fatal = (jumped and signal == view.name("x")) or (lost and signal in view.roles.values())
+        then = f", then jumps by {after[k]:.3g} {unit}" if jumped else ""
+        lost = length[k] > LOST * y.size and noisy and signal in view.roles.values()
         elsewhere = ", although it never repeats elsewhere" if noisy else ""
         text = (
             f"{signal} keeps the value {y[begin]:.6g} for {length[k]} samples from "
-            f"{view.at(begin)} on{after}{elsewhere}: the sensor or the recorder was stuck."
+            f"{view.at(begin)} on{then}{elsewhere}: the sensor or the recorder was stuck."
         )
-        yield view.finding("frozen", signal, text, "error" if fatal else "warning", begin, end)
-
-
-def _longest_that_jumps(
-    y: Array, steps: Array, first: Counts, length: Counts, long: NDArray[np.bool_]
-) -> tuple[int, bool]:
-    """Return the longest run of equal values that ends in a jump, and whether there is one."""
-    usual = float(np.quantile(steps, 0.995))
-    best, found = 0, False
-    for k in np.flatnonzero(long).tolist():
-        end = int(first[k] + length[k] - 1)
-        if end < steps.size and steps[end] > JUMP * max(usual, count_of(y)):
-            if not found or length[k] > length[best]:
-                best = k
-            found = True
-    return best, found
+        severity = "error" if (jumped and position) or lost else "warning"
+        yield view.finding(severity, "frozen", signal, text, begin, end)
 
 
 JUMPED = 15.0
@@ -214,49 +179,37 @@ OFTEN = 6
 def of_jumps(view: View) -> Iterator[Finding]:
     """Find wrapped positions and lost counts."""
     x = view.signal("x")
-    if x is None or view.record.t is None or x.size < 50 or np.ptp(x) <= LEAST * count_of(x):
+    if x is None or x.size < 50 or np.ptp(x) <= LEAST * count_of(x):
         return
-    lag = float(np.corrcoef(x[1:], x[:-1])[0, 1])
-    if lag < WHITE:  # noise always jumps
+    if np.corrcoef(x[1:], x[:-1])[0, 1] < WHITE:  # noise always jumps
         return
-    name, unit = view.name("x"), view.record.units[view.name("x")]
-    steady = median_of_five(x)
-    steps = np.diff(steady)
-    size = np.abs(steps)
+    name, unit = view.name("x"), view.unit("x")
+    size = np.abs(np.diff(median_of_five(x)))
     usual = max(float(np.quantile(size, 0.995)), count_of(x))
     nearby = np.maximum(np.roll(size, 2), np.roll(size, -2))
     far = np.flatnonzero((size > JUMPED * usual) & (size > NEAR * np.maximum(nearby, usual)))
     if not far.size:
-        raw = np.abs(np.diff(x))  # a wrap of a fast drive: many jumps raise the usual step
-        far = np.flatnonzero(raw > 0.5 * np.ptp(x))
-        if far.size > 0.2 * x.size:
+        size = np.abs(np.diff(x))  # a wrap of a fast drive: many jumps raise the usual step
+        far = np.flatnonzero(size > 0.5 * np.ptp(x))
+        if not 0 < far.size <= 0.2 * x.size:
             return
-        steps, size = np.diff(x), raw
-    if not far.size:
-        return
     heights, k = size[far], int(far[np.argmax(size[far])])
+    begin, end = int(far[0]), int(far[-1]) + 1
     period = _period(x, far)
     alike = float(np.quantile(heights, 0.9) - np.quantile(heights, 0.1)) <= ALIKE * heights.max()
     if alike and period > 0.8 * np.ptp(x):
         text = (
             f"{name} jumps {far.size} time(s) by {period:.4g} {unit}, its whole range, first at "
-            f"{view.at(int(far[0]))}: it is counted modulo a period; use "
+            f"{view.at(begin)}: it is counted modulo a period; use "
             f"data.unwrapped({{'{name}': {period:.5g}}})."
         )
-        yield view.error("wrap", name, text, int(far[0]), int(far[-1]) + 1)
+        yield view.error("wrap", name, text, begin, end)
         return
     pushed = _force_jumps(view, k)
-    text = f"{name} jumps {far.size} time(s), most by {size[k]:.3g} {unit} at {view.at(k)}: " + (
-        "a motion too fast for the sample rate." if pushed else "a sensor that lost its reference."
-    )
-    yield view.finding(
-        "jump",
-        name,
-        text,
-        "warning" if pushed or far.size >= OFTEN else "error",
-        int(far[0]),
-        int(far[-1]) + 1,
-    )
+    why = "a motion too fast for the sample rate" if pushed else "a sensor that lost its reference"
+    text = f"{name} jumps {far.size} time(s), most by {size[k]:.3g} {unit} at {view.at(k)}: {why}."
+    severity = "warning" if pushed or far.size >= OFTEN else "error"
+    yield view.finding(severity, "jump", name, text, begin, end)
 
 
 def _force_jumps(view: View, k: int) -> bool:
@@ -271,14 +224,11 @@ def _force_jumps(view: View, k: int) -> bool:
 
 def _period(x: Array, far: NDArray[np.intp]) -> float:
     """Return the jumps plus the regular motion meanwhile, estimated from adjacent steps."""
-    steps = np.diff(x)
-    inner = far[(far > 4) & (far < steps.size - 5)]
+    steps = np.abs(np.diff(x))
     found: list[float] = []
-    for k in inner.tolist():
-        near = np.arange(k - 2, k + 3)
-        at = int(near[np.argmax(np.abs(steps[near]))])
-        nearby = float(np.median(np.abs(steps[[at - 2, at - 1, at + 1, at + 2]])))
-        found.append(abs(float(steps[at])) + nearby)
+    for k in far[(far > 4) & (far < steps.size - 5)].tolist():
+        at = k - 2 + int(np.argmax(steps[k - 2 : k + 3]))
+        found.append(float(steps[at] + np.median(steps[[at - 2, at - 1, at + 1, at + 2]])))
     return float(np.median(found)) if found else float(np.ptp(x))
 
 
@@ -290,29 +240,26 @@ PER_SAMPLE = 0.5
 
 def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
     """Find forces of few levels, and positions of few counts at the speeds of the record."""
-    force = view.signal("force")
+    x, force = view.signal("x"), view.signal("force")
     if force is not None and np.ptp(force) > 0:
         usual = float(np.ptp(np.quantile(force, (0.01, 0.99))))
         step, spread = count_of(force), usual or float(np.ptp(force))
         if step > COARSE * spread:
             name = view.name("force")
             text = (
-                f"{name} has steps of {step:.3g} {view.record.units[name]}, {step / spread:.0%} of "
+                f"{name} has steps of {step:.3g} {view.unit('force')}, {step / spread:.0%} of "
                 "its range: finer differences of friction are not resolved."
             )
             yield view.warning("resolution", name, text)
-    x = view.signal("x")
-    if x is None or not model.clean:
-        return
-    count = count_of(x)
     moved = np.abs(model.v[model.moving])
-    if count > 0 and moved.size:
-        slow = float(np.quantile(moved, 0.25)) * model.step
-        if slow < PER_SAMPLE * count:
-            name = view.name("x")
-            text = (
-                f"{name} has counts of {count:.3g} {view.record.units[name]}, and a quarter of the "
-                f"motion is less than {slow / count:.2g} counts per sample: velocities there "
-                "are averages over several samples."
-            )
-            yield view.warning("resolution", name, text)
+    if x is None or not model.clean or not moved.size or not (count := count_of(x)) > 0:
+        return
+    slow = float(np.quantile(moved, 0.25)) * model.step
+    if slow < PER_SAMPLE * count:
+        name = view.name("x")
+        text = (
+            f"{name} has counts of {count:.3g} {view.unit('x')}, and a quarter of the "
+            f"motion is less than {slow / count:.2g} counts per sample: velocities there "
+            "are averages over several samples."
+        )
+        yield view.warning("resolution", name, text)

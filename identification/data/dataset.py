@@ -36,16 +36,16 @@ class Dataset:
     def __post_init__(self) -> None:
         records = checks.many("Dataset: records", self.records, "records")
         for one in records:
-            checks.kind(
-                "Dataset: records", one, Record, "a record, such as Dataset.of(t=t, x=x)[0]"
-            )
+            such = "a record, such as Dataset.of(t=t, x=x)[0]"
+            checks.kind("Dataset: records", one, Record, such)
         if not records:
             raise ValueError("Dataset: expected at least one record, got none")
         object.__setattr__(self, "records", records)
-        object.__setattr__(self, "name", self.name or _name([r.name for r in records]))
-        turning = {turns for turns in map(_turns, records) if turns is not None}
-        if len(turning) > 1:
-            names = {turns: r.name for r in reversed(records) for turns in [_turns(r)]}
+        first, *others = [record.name for record in records]
+        more = f" and {len(others)} more" if others else ""
+        object.__setattr__(self, "name", self.name or f"{first}{more}")
+        names = {_turns(r): r.name for r in reversed(records)}
+        if {True, False} <= names.keys():
             raise ValueError(
                 f"data '{self.name}': expected records that all slide or all turn, got "
                 f"'{names[False]}' in m and '{names[True]}' in rad"
@@ -91,7 +91,7 @@ class Dataset:
         Raises:
             ValueError: unusable data, with file, row and column; for several files, all errors.
         """
-        wanted = Wanted(columns, units, step, checks.flag("read: points", points), None, missing)
+        wanted = Wanted(columns, units, step, checks.flag("read: points", points), {}, missing)
         found = read_records(paths, wanted, variable)
         pattern = paths if isinstance(paths, str) and len(files(paths)) > 1 else ""
         return cls(found, pattern)
@@ -126,9 +126,8 @@ class Dataset:
         """
         checks.text("Dataset.of: name", name)
         raw, framed = columns_of(name, frame, arrays)
-        assumed = None if framed else ASSUMED
-        pairs = checks.flag("Dataset.of: points", points)
-        wanted = Wanted(columns, units, step, pairs, assumed, missing)
+        points = checks.flag("Dataset.of: points", points)
+        wanted = Wanted(columns, units, step, points, {} if framed else ASSUMED, missing)
         return cls((record(raw, wanted),), name)
 
     def __iter__(self) -> Iterator[Record]:
@@ -186,12 +185,8 @@ class Dataset:
             ValueError: no record has two samples in this interval.
         """
         begin, end = (checks.number("Dataset.between", at, unit="s") for at in (begin, end))
-        held = [
-            r for r in self.records if np.count_nonzero((r.time >= begin) & (r.time <= end)) > 1
-        ]
-        return Dataset(tuple(held or self.records), self.name).each(
-            lambda one: one.between(begin, end)
-        )
+        held = [r for r in self if np.count_nonzero((r.time >= begin) & (r.time <= end)) > 1]
+        return Dataset(tuple(r.between(begin, end) for r in held or self.records), self.name)
 
     def thinned(self, every: int) -> "Dataset":
         """Return every n-th sample of each record, n = `every`, without prior filtering."""
@@ -223,14 +218,13 @@ class Dataset:
         """
         where = f"data '{self.name}': split"
         share = checks.number(where, share, lower=0.0, upper=1.0)
-        cuts = [round(share * one.size) for one in self.records]
-        for one, cut in zip(self.records, cuts, strict=True):
+        pairs = [(one, round(share * one.size)) for one in self.records]
+        for one, cut in pairs:
             if not 2 <= cut <= one.size - 2:
                 raise ValueError(
                     f"{where}: expected a share that leaves two samples on each side, got {share:g}"
                     f" of {one.size}"
                 )
-        pairs = list(zip(self.records, cuts, strict=True))
         first = Dataset(tuple(one.at(slice(0, cut)) for one, cut in pairs), self.name)
         return first, Dataset(tuple(one.at(slice(cut, None)) for one, cut in pairs), self.name)
 
@@ -241,9 +235,8 @@ class Dataset:
 
         See `identification.data.resample.resampled`.
         """
-        return Dataset(
-            tuple(p for one in self.records for p in resampled(one, step, gap)), self.name
-        )
+        pieces = (p for one in self.records for p in resampled(one, step, gap))
+        return Dataset(tuple(pieces), self.name)
 
     def delayed(self, delays: Mapping[str, float]) -> "Dataset":
         """Return the data with signals shifted in time [s]: new(t) = old(t - delay), ends cut."""
@@ -270,11 +263,10 @@ class Dataset:
             ValueError: different numbers of records, no common time, an undetermined delay,
                 clocks that drift.
         """
-        other = checks.kind(f"data '{self.name}': merged", other, Dataset, "a Dataset")
+        where = f"data '{self.name}': merged"
+        other = checks.kind(where, other, Dataset, "a Dataset")
         if len(other) != len(self):
-            raise ValueError(
-                f"data '{self.name}': merged: expected {len(self)} records, got {len(other)}"
-            )
+            raise ValueError(f"{where}: expected {len(self)} records, got {len(other)}")
         pairs = zip(self.records, other.records, strict=True)
         return Dataset(tuple(r for a, b in pairs for r in merged(a, b, on, shift, drift)))
 
@@ -292,10 +284,6 @@ class Dataset:
             return (to_csv(self.records[0], target),)
         names = (target.with_stem(f"{target.stem}_{k}") for k in range(1, len(self) + 1))
         return tuple(to_csv(one, name) for one, name in zip(self.records, names, strict=True))
-
-
-def _name(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
 
 
 def _turns(one: Record) -> bool | None:

@@ -128,18 +128,6 @@ def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
     return np.convolve(slow, np.ones(2 * around + 1), mode="same") > 0.5
 
 
-def filter_of(record: Record, force: str = "force", x: str = "x", v: str | None = None) -> Filter:
-    """Choose the filter from force, position and velocity of a record; see `differentiate`."""
-    step, (position, velocity) = record.uniform().step, _measured(record, x, v)
-    mixer = Velocity.of(position, velocity, step)
-    return choose_filter(record[force], step, [mixer.band(position, velocity, step)])
-
-
-def _measured(record: Record, x: str, v: str | None) -> tuple[Array, Array | None]:
-    v = v or ("v" if "v" in record else None)
-    return record[x], None if v is None else record[v]
-
-
 def differentiate(
     record: Record,
     filter: Filter | None = None,
@@ -152,7 +140,7 @@ def differentiate(
 
     Args:
         record: equally spaced samples.
-        filter: cut-off and decimation; `filter_of(record)` if none is given.
+        filter: cut-off and decimation; by `choose_filter` if none is given.
         force, x: names of the channels.
         v: channel of a measured velocity, combined with that of the position by `Velocity`;
             None: "v" if the record has it.
@@ -161,24 +149,15 @@ def differentiate(
         ValueError: unequal intervals, a cut-off above the Nyquist frequency, too short a record.
     """
     step = record.uniform().step
-    chosen = filter or filter_of(record, force, x, v)
-    measured = _measured(record, x, v)
+    rate = v or ("v" if "v" in record else None)
+    measured = record[x], None if rate is None else record[rate]
     mixer = Velocity.of(*measured, step)
+    chosen = filter or choose_filter(record[force], step, [mixer.band(*measured, step)])
     motion = derivatives(*measured, step, chosen, mixer)
     slow = uncertain(motion[1], mixer.deviation(chosen, step), step, chosen)
-    cut = chosen.trim(step)
-    inside = slice(cut, max(cut, record.size - cut))
-    x_, v_, a_ = (signal[inside] for signal in motion)
-    signals = MotionSignals(
-        name=record.name,
-        t=record.time[inside],
-        x=x_,
-        v=v_,
-        a=a_,
-        force=record[force][inside],
-        filter=chosen,
-        slow=slow[inside],
-    )
+    inside = chosen.inside(record.size, step)
+    cut = (y[inside] for y in (record.time, *motion, record[force]))
+    signals = MotionSignals(record.name, *cut, filter=chosen, slow=slow[inside])
     if signals.decimation.rows == 0 or signals.kept.size < 10:
         limit = "by the data" if chosen.v_min is None else f"{chosen.v_min:g} m/s"
         raise ValueError(
@@ -233,36 +212,30 @@ def plateaus(
     settle = checks.number("plateaus: settle", settle, lower=0.0, upper=0.9)
     found: list[Record] = []
     for record in data:
-        speed = v or ("v" if "v" in record else None)
-        name = x if speed is None else speed
-        velocity = record[name] if speed is not None else _slope(record, x)
-        begins = _stretches(velocity, record.uniform().step, shortest, change)
+        name = v or ("v" if "v" in record else x)
+        step, F = record.uniform().step, record[force]
+        velocity = record[name] if v or name != x else central_difference(record[x], step)
+        begins = _stretches(velocity, step, shortest, change)
         cut = [slice(b + ceil(settle * (e - b)), e) for b, e in begins]
-        if not cut:
+        if len(cut) < 2:
             continue
-        rotary = record.unit(name).startswith("rad")
-        units = {"v": "rad/s" if rotary else "m/s", "F": record.unit(force) or "N"}
+        unit = record.unit(force) or "N"
         columns = {
-            "v": [velocity[s].mean() for s in cut],
-            "F": [record[force][s].mean() for s in cut],
-            "n": [float(s.stop - s.start) for s in cut],
-            "spread": [record[force][s].std() for s in cut],
-            "t_mean": [record.time[s].mean() for s in cut],
+            "v": ("rad/s" if record.unit(name).startswith("rad") else "m/s", velocity, np.mean),
+            "F": (unit, F, np.mean),
+            "n": ("1", F, np.size),
+            "spread": (unit, F, np.std),
+            "t_mean": ("s", record.time, np.mean),
         }
-        units |= {"n": "1", "spread": units["F"], "t_mean": "s"}
-        signals = {key: np.array(values, float) for key, values in columns.items()}
-        if len(cut) > 1:
-            found.append(Record(f"plateaus of {record.name}", None, signals, units))
+        signals = {n: np.array([of(y[s]) for s in cut], float) for n, (_, y, of) in columns.items()}
+        units = {n: unit for n, (unit, *_) in columns.items()}
+        found.append(Record(f"plateaus of {record.name}", None, signals, units))
     if not found:
         raise ValueError(
             f"data '{data.name}': plateaus: expected at least two stretches of {shortest:g} s with "
             f"a velocity constant to {change:.0%}, got none; lower shortest= or raise change="
         )
     return Dataset(tuple(found), f"plateaus of {data.name}")
-
-
-def _slope(record: Record, x: str) -> Array:
-    return central_difference(record[x], record.uniform().step)
 
 
 def _stretches(v: Array, step: float, shortest: float, change: float) -> list[tuple[int, int]]:

@@ -56,9 +56,10 @@ class Filter:
             v_min = checks.number("Filter: v_min", self.v_min, unit="m/s", lower=0.0)
             object.__setattr__(self, "v_min", v_min)
 
-    def trim(self, step: float) -> int:
-        """Return the number of samples to omit at each end, where reflection affects the result."""
-        return ceil(5.0 / (self.cutoff * step) - 1e-9)
+    def inside(self, size: int, step: float) -> slice:
+        """Return the samples away from both ends, where reflection affects the result."""
+        cut = ceil(5.0 / (self.cutoff * step) - 1e-9)
+        return slice(cut, max(cut, size - cut))
 
     def gain(self, frequency: Array, step: float) -> Array:
         """Return |H|^2 at frequencies below 1/2, cycles per sample; see `lowpass`."""
@@ -196,9 +197,8 @@ def position_band(x: Array, step: float) -> float:
 
 def band_above(power: Array, noise: Array, step: float) -> float:
     """Return the highest frequency [Hz] at which the 1 Hz mean exceeds `ABOVE` times the noise."""
-    samples = 2 * (power.size - 1)
     frequency = np.linspace(0.0, 0.5 / step, power.size)
-    width = min(max(9, 2 * round(0.5 * samples * step) + 1), power.size)
+    width = _width(power, step, 9)
     smooth = np.convolve(power, np.ones(width) / width, mode="same")
     known = np.flatnonzero(smooth > ABOVE * noise)
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])
@@ -317,8 +317,11 @@ class Velocity:
 
 def _averaged(power: Array, step: float) -> Array:
     """Return a spectrum averaged over 1 Hz or `WIDTH` neighbours, whichever is wider."""
-    samples = 2 * (power.size - 1)
-    width = min(max(WIDTH, 2 * round(0.5 * samples * step) + 1), power.size)
-    ones = np.ones(width)
+    ones = np.ones(_width(power, step, WIDTH))
     count = np.convolve(np.ones(power.size), ones, mode="same")
     return np.convolve(power, ones, mode="same") / count
+
+
+def _width(power: Array, step: float, least: int) -> int:
+    """Return the number of entries of a spectrum in 1 Hz, at least `least`."""
+    return min(max(least, 2 * round((power.size - 1) * step) + 1), power.size)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partialmethod
 from typing import Any, Literal, final
 
 import numpy as np
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from identification.data.record import Record
 from symfric.foundation import checks
 
+Array = NDArray[np.float64]
 Severity = Literal["error", "warning"]
+ROLES = ("x", "v", "a", "force")
 
 
 @final
@@ -80,26 +82,12 @@ class Findings:
         """Types of the findings, each once."""
         return tuple(dict.fromkeys(f.kind for f in self.items))
 
-    @property
-    def text(self) -> str:
-        """Text with one line per finding, errors first."""
+    def __str__(self) -> str:
         if not self.items:
             return f"{self.name}: no problems found"
-        lines = [f"  {f.severity}: {self._record(f)}{f.sentence}" for f in self.items]
+        of = [f"{name}: " if len(self.records) > 1 else "" for name in self.records]
+        lines = [f"  {f.severity}: {of[f.record]}{f.sentence}" for f in self.items]
         return "\n".join([f"{self.name}:", *lines])
-
-    def _record(self, finding: Finding) -> str:
-        """Return the record of a finding, if there are several."""
-        several = len(self.records) > 1
-        return f"{self.records[finding.record]}: " if several else ""
-
-    def __str__(self) -> str:
-        return self.text
-
-
-Array = NDArray[np.float64]
-
-ROLES = ("x", "v", "a", "force")
 
 
 @final
@@ -123,22 +111,29 @@ class View:
         named = checks.named("check", roles, ROLES)
         given = {role: name for role, name in named.items() if role != name or name in record}
         found = {role: role for role in ROLES if role in record.signals}
-        found |= {role: record.channel(name) for role, name in given.items()}
-        return cls(record, number, found)
+        return cls(record, number, found | {r: record.channel(n) for r, n in given.items()})
 
     def signal(self, role: str) -> Array | None:
         """Return the signal of a part, if there is one."""
         return self.record.signals[self.roles[role]] if role in self.roles else None
 
-    def known(self) -> Iterator[tuple[str, Array]]:
-        """Yield the signals with a part or a unit; others may be predictions of a model."""
-        for name, values in self.record.signals.items():
-            if self.record.units[name] or name in self.roles.values():
-                yield name, values
+    def known(self) -> Iterator[tuple[str, Array, str]]:
+        """Yield name, values and unit of the long signals that vary and have a part or a unit.
+
+        Others may be predictions of a model.
+        """
+        for name, y in self.record.signals.items():
+            unit = self.record.units[name]
+            if (unit or name in self.roles.values()) and y.size >= 50 and np.ptp(y) != 0:
+                yield name, y, unit
 
     def name(self, role: str) -> str:
         """Return the name of the signal of a part."""
         return self.roles.get(role, role)
+
+    def unit(self, role: str) -> str:
+        """Return the unit of the signal of a part."""
+        return self.record.units[self.name(role)]
 
     @cached_property
     def steady(self) -> Record | None:
@@ -157,42 +152,17 @@ class View:
         return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
 
     def finding(
-        self,
-        kind: str,
-        signal: str,
-        sentence: str,
-        severity: Severity,
-        begin: int | None = None,
-        end: int | None = None,
-    ) -> Finding:
+        self, severity: Severity, kind: str, signal: str, sentence: str,
+        begin: int | None = None, end: int | None = None,
+    ) -> Finding:  # fmt: skip
         """Return a finding at the samples `begin` to `end`, by default the whole record."""
-        first = 0 if begin is None else begin
-        last = (self.record.size - 1 if begin is None else begin) if end is None else end
-        t = self.record.t
-        times = (float(first), float(last)) if t is None else (float(t[first]), float(t[last]))
-        return Finding(kind, self.number, signal, sentence, *times, severity)
+        last = self.record.size - 1 if begin is None else begin
+        samples = (begin or 0, last if end is None else end)
+        first, last = samples if self.record.t is None else self.record.t[[*samples]]
+        return Finding(kind, self.number, signal, sentence, float(first), float(last), severity)
 
-    def error(
-        self,
-        kind: str,
-        signal: str,
-        sentence: str,
-        begin: int | None = None,
-        end: int | None = None,
-    ) -> Finding:
-        """Return a finding that makes a physically meaningful fit impossible."""
-        return self.finding(kind, signal, sentence, "error", begin, end)
-
-    def warning(
-        self,
-        kind: str,
-        signal: str,
-        sentence: str,
-        begin: int | None = None,
-        end: int | None = None,
-    ) -> Finding:
-        """Return a finding that makes numbers doubtful."""
-        return self.finding(kind, signal, sentence, "warning", begin, end)
+    error = partialmethod(finding, "error")
+    warning = partialmethod(finding, "warning")
 
     def at(self, sample: int) -> str:
         """Return a place as text: its time and its row."""

@@ -1,9 +1,15 @@
 """Reader of MATLAB files up to version 7 and NumPy files: variables, structs, matrices as columns.
 
-The files of the EMPS benchmark are recognised with their controller.
-Source: A. Janot, M. Gautier, M. Brunot: Data set and reference models of EMPS, 2019.
+A level 5 file is a header and elements, each a tag (type, bytes) with its data; a matrix is an
+element of elements: flags, dimensions, name, numbers; of a struct its fields, of a cell array its
+cells are matrices again. A level 4 file is a row of matrices, each with a header of five integers.
+`scipy.io.loadmat` reads the same but ends the process by a segmentation fault on damaged files. The
+files of the EMPS benchmark are recognised with their controller.
+Sources: The MathWorks, MAT-File Format, 2023; A. Janot, M. Gautier, M. Brunot: Data set and
+reference models of EMPS, 2019.
 """
 
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from io import BytesIO
@@ -12,78 +18,227 @@ from typing import Any
 
 import numpy as np
 
-from identification.data.mat_bytes import variables
 from identification.data.raw import Array, Column, Raw, label
 from identification.data.record import PositionLoop, Record
 
-EMPS = ("t", "qm", "vir", "gtau")
-"""Variables that identify an EMPS file."""
-
 Node = Any
-"""An array, a text, a dict of nodes (struct), or a list of nodes (struct array, cell)."""
+"""An array of floats, a text or a description, a dict of nodes (struct), or a list of nodes
+(struct array, cells).
+"""
+
+NUMBERS = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
+"""NumPy types by the type of an element."""
+OLD_NUMBERS = ("f8", "f4", "i4", "i2", "u2", "u1")
+"""The same by the P of level 4."""
+TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+"""Encodings by the type of an element of text."""
+MATRIX, COMPRESSED = 14, 15
+CELL, STRUCT, TEXT, OPAQUE = 1, 2, 4, 17
+CLASSES = {
+    3: "an object",
+    5: "a sparse matrix",
+    16: "a function",
+    OPAQUE: "an object (a table or time series): save its columns as vectors",
+}
+"""Names of matrix types that are not read as numbers."""
+COMPLEX = 0x800
+HEADER, OLD_HEADER = 128, 20
+HDF5 = b"\x89HDF"
+"""First bytes of a file of version 7.3 without a MATLAB header."""
+LARGEST = 2**29
+"""Largest size of an uncompressed element [bytes]."""
 
 
-def read_mat(file: Path, variable: str | None) -> Record | list[Raw]:
-    """Return the columns of each record in a MATLAB file; for an EMPS file the record itself.
+def variables(content: bytes) -> dict[str, Node]:
+    """Return the variables by name.
+
+    Raises:
+        NotImplementedError: a file of version 7.3, which is HDF5.
+        ValueError, IndexError, ...: not a MATLAB file, or a damaged one.
+    """
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:HEADER])
+    version = content[125 if order == "<" else 124 : 126][:1]
+    if content.startswith(HDF5) or (order is not None and version == b"\x02"):
+        raise NotImplementedError
+    if order is not None:
+        return dict(_level_5(content[HEADER:], order))
+    if 0 not in content[:4]:
+        raise ValueError("the first bytes are not those of such a file")
+    return dict(_level_4(content))
+
+
+def node(value: Any) -> Node:
+    """Return an array as floats, fields of structured arrays as a dict, others as a description."""
+    if value.dtype.names:
+        return {name: node(value[name]) for name in value.dtype.names}
+    if value.dtype.kind not in "iufb":
+        return f"values of type {value.dtype}"
+    numbers = value.astype(float)
+    return np.squeeze(numbers) if numbers.ndim > 2 else numbers
+
+
+def _level_5(data: bytes, order: str) -> Iterator[tuple[str, Node]]:
+    for kind, body in _elements(data, order):
+        inner = ((kind, body),)
+        if kind == COMPRESSED:
+            inner = _elements(zlib.decompressobj().decompress(body, LARGEST), order)
+        yield from (_matrix(part, order) for what, part in inner if what == MATRIX)
+
+
+def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Yield type and data of the elements."""
+    at = 0
+    while at < len(data):
+        kind, size = np.frombuffer(data, f"{order}u4", 2, at).tolist()
+        short = kind >> 16
+        start = at + (4 if short else 8)
+        kind, size = (kind & 0xFFFF, short) if short else (kind, size)
+        if start + size > len(data) or short > 4:
+            raise ValueError("an element is longer than the rest of the file")
+        yield kind, data[start : start + size]
+        at = at + 8 if short else start + size
+        if kind != COMPRESSED:
+            at = -(-at // 8) * 8
+
+
+def _matrix(data: bytes, order: str) -> tuple[str, Node]:
+    """Return name and content of a matrix."""
+    parts = list(_elements(data, order))
+    if not parts:
+        return "", np.zeros((0, 0))
+    flags = int(_numbers(*parts[0], order)[0])
+    kind = flags & 0xFF
+    if kind == OPAQUE:  # names come first, dimensions never
+        return (parts[1][1].decode("latin-1") if len(parts) > 1 else ""), CLASSES[kind]
+    shape, name = _numbers(*parts[1], order).tolist(), parts[2][1].decode("latin-1")
+    if kind in CLASSES or len(parts) < 4:
+        return name, CLASSES.get(kind, "nothing")
+    if kind in (CELL, STRUCT):
+        return name, _nested(name, parts[3:], kind, order)
+    if kind == TEXT:
+        return name, _text(*parts[3], order)
+    if flags & COMPLEX:
+        return name, "a matrix of complex numbers"
+    return name, node(_numbers(*parts[3], order).reshape(shape, order="F"))
+
+
+def _nested(name: str, parts: list[tuple[int, bytes]], kind: int, order: str) -> Node:
+    """Return a struct as a dict, a vector of structs as a list of them, cells as a list."""
+    fields = [""]
+    if kind == STRUCT:
+        size, letters = int(_numbers(*parts[0], order)[0]), parts[1][1]
+        cuts = range(0, len(letters), size)
+        fields = [letters[k : k + size].split(b"\0")[0].decode("latin-1") for k in cuts]
+        parts = parts[2:]
+    if len(parts) % len(fields) or any(what != MATRIX for what, _ in parts):
+        raise ValueError(f"variable {name!r} is cut off")
+    found: list[Node] = [_matrix(body, order)[1] for _, body in parts]
+    if kind == STRUCT:
+        rows = range(0, len(found), len(fields))
+        found = [dict(zip(fields, found[k : k + len(fields)], strict=True)) for k in rows]
+    return found[0] if len(found) == 1 else found
+
+
+def _text(kind: int, data: bytes, order: str) -> str:
+    """Return text of one row; several rows in their storage order."""
+    code = TEXTS.get(kind, "latin-1")
+    code += {"<": "-le", ">": "-be"}[order] if kind == 4 else ""
+    return data.decode(code, errors="replace").strip("\0 ")
+
+
+def _numbers(kind: int, data: bytes, order: str) -> Any:
+    if kind not in NUMBERS:
+        raise ValueError(f"an element of numbers is of type {kind}")
+    return np.frombuffer(data, order + NUMBERS[kind])
+
+
+def _level_4(data: bytes) -> Iterator[tuple[str, Node]]:
+    at = 0
+    while at < len(data):
+        order = "<" if 0 <= int(np.frombuffer(data, "<i4", 1, at)[0]) < 5000 else ">"
+        kind, rows, columns, imaginary, length = np.frombuffer(data, f"{order}i4", 5, at).tolist()
+        machine, rest = divmod(kind, 1000)
+        known = machine == (order == ">") and 0 <= rest // 10 < len(OLD_NUMBERS)
+        if not known or min(rows, columns) < 0 or imaginary not in (0, 1) or length < 2:
+            raise ValueError("the header of a variable is not that of such a file")
+        code, start = order + OLD_NUMBERS[rest // 10], at + OLD_HEADER + length
+        name = data[at + OLD_HEADER : start - 1].decode("latin-1")
+        size = rows * columns * int(code[2])
+        if start + size * (1 + imaginary) > len(data):
+            raise ValueError(f"variable {name!r} is longer than the rest of the file")
+        content: Node = "text, sparse or complex"
+        if not (rest % 10 or imaginary):
+            numbers = np.frombuffer(data, code, rows * columns, start)
+            content = node(numbers.reshape(rows, columns, order="F"))
+        yield name, content
+        at = start + size * (1 + imaginary)
+
+
+def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
+    """Return the columns of each record in a file; for an EMPS file the record itself.
 
     Args:
-        file: the file.
+        file: a MATLAB file, a `.npy` matrix or structured array, or an `.npz` archive.
         variable: a struct or matrix in it, with points for nested ones: "run.log"; a vector
             of structs takes an index: "run(2)".
 
     Raises:
-        ValueError: not a MATLAB file, version 7.3, a damaged file, no such variable.
+        ValueError: another file, version 7.3, a damaged file, no such variable.
     """
-    content = _load(file)
-    where = f"read '{file.name}'"
-    if variable is None and all(name in content for name in EMPS):
-        return _emps(where, file.name, content)
-    return raws(where, file.name, content, variable)
-
-
-def read_npy(file: Path, variable: str | None) -> list[Raw]:
-    """Return the columns of a `.npy` matrix or structured array, or of an `.npz` archive."""
-    where = f"read '{file.name}'"
+    where, data = f"read '{file.name}'", file.read_bytes()
+    such = "MATLAB file" if file.suffix.lower() == ".mat" else "NumPy file of numbers"
     try:
-        loaded = np.load(BytesIO(file.read_bytes()), allow_pickle=False)
-        archive = not isinstance(loaded, np.ndarray)
-        content = {name: loaded[name] for name in loaded.files} if archive else {"array": loaded}
+        content = variables(data) if such == "MATLAB file" else _numpy(data)
+    except NotImplementedError:
+        raise ValueError(
+            f"{where}: expected a MATLAB file of version 7 or older, got version 7.3 "
+            "(HDF5); save it with save(name, '-v7')"
+        ) from None
     except Exception as error:  # noqa: BLE001 (damaged bytes raise various errors)
         raise ValueError(
-            f"{where}: expected a NumPy file of numbers, got a damaged or another file: {error}"
+            f"{where}: expected a {such}, got a damaged or another file: {error}"
         ) from None
-    return raws(where, file.name, {k: _node(v) for k, v in content.items()}, variable)
-
-
-def raws(where: str, name: str, content: Mapping[str, Node], variable: str | None) -> list[Raw]:
-    """Return the records in named variables."""
+    content = {key: value for key, value in content.items() if key and key[:2] != "__"}
+    if variable is None and all(name in content for name in EMPS):
+        return _emps(where, file.name, content)
     if variable is not None:
-        return list(_records(where, name, _found(where, content, variable), variable))
-    vectors = {key: value for key, value in content.items() if _is_vector(value)}
-    if len(vectors) > 1:
-        return [_raw(where, name, dict(content))]
+        return list(_records(where, file.name, _found(where, content, variable), variable))
+    return _raws(where, file.name, content)
+
+
+def _numpy(data: bytes) -> dict[str, Node]:
+    loaded: Any = np.load(BytesIO(data), allow_pickle=False)
+    held = {"array": loaded} if isinstance(loaded, np.ndarray) else loaded
+    return {name: node(held[name]) for name in held}
+
+
+def _raws(where: str, name: str, content: Mapping[str, Node]) -> list[Raw]:
+    """Return the records in all variables of a file."""
+    if sum(map(_is_vector, content.values())) > 1:
+        return [_raw(where, name, content)]
     tables = {k: v for k, v in content.items() if _is_matrix(v) or isinstance(v, dict | list)}
-    structs = [v for v in tables.values() if isinstance(v, dict)]
-    same = len(structs) > 1 and all(v.keys() == structs[0].keys() for v in structs)
-    if same and len(structs) == len(tables):
+    fields = {frozenset(v) if isinstance(v, dict) else None for v in tables.values()}
+    if len(tables) > 1 and len(fields) == 1 and None not in fields:
         return [r for k, v in tables.items() for r in _records(where, f"{name}: {k}", v, k)]
     if len(tables) != 1:
         raise ValueError(
             f"{where}: expected one struct or matrix, or vectors of one length, got "
-            f"{described(content) or 'no variables'}; name one with variable="
+            f"{_described(content) or 'no variables'}; name one with variable="
         )
-    key, value = next(iter(tables.items()))
+    ((key, value),) = tables.items()
     return list(_records(where, name, value, key))
 
 
-def described(content: Mapping[str, Node]) -> str:
+def _described(content: Mapping[str, Node]) -> str:
     """Return a description of the variables."""
     return ", ".join(f"{key} ({_kind(value)})" for key, value in content.items())
 
 
 def _kind(value: Node) -> str:
     if isinstance(value, dict):
-        return f"a struct of {', '.join(map(str, value))}"  # pyright: ignore[reportUnknownArgumentType]
+        return f"a struct of {', '.join(value)}"  # pyright: ignore[reportUnknownArgumentType]
     if isinstance(value, list):
         return f"{len(value)} structs"  # pyright: ignore[reportUnknownArgumentType]
     return f"numbers {value.shape}" if isinstance(value, np.ndarray) else str(value)
@@ -92,21 +247,17 @@ def _kind(value: Node) -> str:
 def _records(where: str, name: str, value: Node, path: str) -> Iterator[Raw]:
     """Yield the records of one variable: several for a vector of structs, else one."""
     if isinstance(value, list):
-        for k, one in enumerate(value, start=1):
+        for k, one in enumerate(value, start=1):  # pyright: ignore[reportUnknownVariableType]
             yield from _records(where, f"{name}({k})", one, f"{path}({k})")
     elif isinstance(value, dict):
-        inner = {k: v for k, v in value.items() if isinstance(v, dict | list) or _is_matrix(v)}
-        vectors = [k for k, v in value.items() if _is_vector(v)]
-        logged = _simulink(value)
-        if logged is not None:
-            yield _raw(where, name, logged)
-        elif not vectors and len(inner) == 1:
-            key, deeper = next(iter(inner.items()))
-            yield from _records(where, name, deeper, f"{path}.{key}")
+        struct: dict[str, Node] = _simulink(value) or value  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        inner = [k for k, v in struct.items() if isinstance(v, dict | list) or _is_matrix(v)]
+        if len(inner) == 1 and not any(map(_is_vector, struct.values())):
+            yield from _records(where, name, struct[inner[0]], f"{path}.{inner[0]}")
         else:
-            yield _raw(where, name, value)
+            yield _raw(where, name, struct)
     elif _is_matrix(value):
-        yield _matrix(name, value)
+        yield Raw(name, tuple(Column.of("", "", c) for c in _upright(value).T))
     else:
         raise ValueError(
             f"{where}: variable {path}: expected a struct or a matrix of numbers, got "
@@ -120,67 +271,53 @@ def _simulink(struct: Mapping[str, Node]) -> dict[str, Node] | None:
         return None
     signals = struct["signals"]
     found: dict[str, Node] = {"time": struct["time"]}
-    for k, signal in enumerate(signals if isinstance(signals, list) else [signals], start=1):
+    for k, signal in enumerate(signals if isinstance(signals, list) else [signals], start=1):  # pyright: ignore[reportUnknownVariableType]
         if not isinstance(signal, dict) or "values" not in signal:
             return None
-        text = signal.get("label", "")
+        text: Any = signal.get("label", "")  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
         found[text if isinstance(text, str) and text else f"signal_{k}"] = signal["values"]
     return found
 
 
-def _matrix(name: str, value: Array) -> Raw:
-    """Return the columns of a matrix; a wide one is transposed."""
-    if value.shape[0] < value.shape[1]:
-        value = value.T
-    columns = (Column.of("", "", c) for c in value.T)
-    return Raw(name, tuple(columns))
-
-
-def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
+def _raw(where: str, name: str, content: Mapping[str, Node]) -> Raw:
     """Return the vectors of the most frequent length as columns; others are marked as unusable."""
-    flat = _shortened(dict(_flat(variables)))
+    flat = dict(_flat(content))
     lengths = [v.size for v in flat.values() if isinstance(v, np.ndarray)]
     if not lengths:
-        raise ValueError(
-            f"{where}: expected vectors of numbers, got {described(variables) or 'nothing'}"
-        )
+        got = _described(content) or "nothing"
+        raise ValueError(f"{where}: expected vectors of numbers, got {got}")
     usual = max(set(lengths), key=lambda n: (lengths.count(n), n))
+    last = [key.rpartition(".")[2] for key in flat]
     columns: list[Column] = []
-    for key, value in flat.items():
-        text, said = label(key)
-        if not isinstance(value, np.ndarray):
-            problem = f"expected a vector of numbers, got {value}"
-            columns.append(Column(text, said, np.full(usual, np.nan), problem))
-        elif value.size != usual:
+    for (key, value), short in zip(flat.items(), last, strict=True):
+        text, unit = label(key if last.count(short) > 1 else short)
+        if isinstance(value, np.ndarray) and value.size == usual:
+            columns.append(Column.of(text, unit, value))
+            continue
+        problem = f"expected a vector of numbers, got {value}"
+        if isinstance(value, np.ndarray):
             problem = f"expected {usual} numbers as in the others, got {value.size}"
-            columns.append(Column(text, said, np.full(usual, np.nan), problem))
-        else:
-            columns.append(Column.of(text, said, value))
+        columns.append(Column(text, unit, np.full(usual, np.nan), problem))
     return Raw(name, tuple(columns))
 
 
-def _shortened(flat: Mapping[str, Node]) -> dict[str, Node]:
-    """Return leaves by the last part of their names if it is unique."""
-    last = [key.rpartition(".")[2] for key in flat]
-    return {
-        key if last.count(short) > 1 else short: value
-        for (key, value), short in zip(flat.items(), last, strict=True)
-    }
-
-
-def _flat(variables: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str, Node]]:
+def _flat(content: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str, Node]]:
     """Yield leaves by name; fields of a struct are prefixed by its name."""
-    for key, value in variables.items():
+    for key, value in content.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
+            yield from _flat(value, f"{prefix}{key}.")  # pyright: ignore[reportUnknownArgumentType]
         elif _is_vector(value):
-            yield f"{prefix}{key}", np.asarray(value, dtype=float).ravel()
+            yield f"{prefix}{key}", value.ravel()
         elif _is_matrix(value):
-            turned = value if value.shape[0] >= value.shape[1] else value.T
-            for k, column in enumerate(turned.T, start=1):
+            for k, column in enumerate(_upright(value).T, start=1):
                 yield f"{prefix}{key}_{k}", column
         else:
             yield f"{prefix}{key}", _kind(value)
+
+
+def _upright(matrix: Array) -> Array:
+    """Return a matrix with at least as many rows as columns."""
+    return matrix if matrix.shape[0] >= matrix.shape[1] else matrix.T
 
 
 def _is_vector(value: Node) -> bool:
@@ -191,89 +328,46 @@ def _is_matrix(value: Node) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 2 and min(value.shape) > 1
 
 
-def _load(file: Path) -> dict[str, Node]:
-    try:
-        loaded = variables(file.read_bytes())
-    except NotImplementedError:
-        raise ValueError(
-            f"read '{file.name}': expected a MATLAB file of version 7 or older, got version 7.3 "
-            "(HDF5); save it with save(name, '-v7')"
-        ) from None
-    except ValueError as error:
-        raise ValueError(
-            f"read '{file.name}': expected a MATLAB file, got a damaged or another file: {error}"
-        ) from None
-    return {key: _node(value) for key, value in loaded.items() if key and key[:2] != "__"}
-
-
-def _node(value: Any) -> Node:
-    """Return the node with arrays of floats, and fields of structured arrays as a dict."""
-    if isinstance(value, dict):
-        return {str(key): _node(one) for key, one in value.items()}  # pyright: ignore[reportUnknownArgumentType]
-    if isinstance(value, list):
-        items = [_node(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
-        return items[0] if len(items) == 1 else items
-    if not isinstance(value, np.ndarray):
-        return str(value)
-    if value.dtype.names:
-        return {name: _node(value[name]) for name in value.dtype.names}
-    if value.dtype.kind in "iufb":
-        numbers = value.astype(float)
-        return np.squeeze(numbers) if numbers.ndim > 2 else numbers
-    return f"values of type {value.dtype}"
-
-
-def _vector(where: str, found: Mapping[str, Node], name: str) -> Array:
-    value = found[name]
-    if not _is_vector(value):
-        raise ValueError(
-            f"{where}: variable {name}: expected a vector of numbers, got {_kind(value)}"
-        )
-    return value.ravel()
-
-
-def _number(where: str, found: Mapping[str, Node], name: str) -> float:
-    value = found[name]
-    if not isinstance(value, np.ndarray) or value.size != 1:
-        raise ValueError(f"{where}: variable {name}: expected one number, got {_kind(value)}")
-    return float(value.ravel()[0])
-
-
-def _emps(where: str, name: str, found: Mapping[str, Node]) -> Record:
-    """Return the record of an EMPS file: force gtau*vir; pulses_N (volts, uint8) are in vir."""
-    t, x, command = (_vector(where, found, key) for key in ("t", "qm", "vir"))
-    gain = _number(where, found, "gtau")
-    signals, units = {"x": x, "force": gain * command}, {"x": "m", "force": "N"}
-    record = Record(name, t, signals, units, columns={"x": "qm"})
-    if not all(key in found for key in ("kp", "kv", "qg")):
-        return record
-    pulses = "pulses_N" in found
-    loop = PositionLoop(
-        kp=_number(where, found, "kp"),
-        kv=_number(where, found, "kv"),
-        gain=gain,
-        limit=10.0,
-        reference=_vector(where, found, "qg"),
-        disturbance=_vector(where, found, "pulses_N") if pulses else np.zeros(t.size),
-    )
-    return replace(record, loop=loop)
-
-
 def _found(where: str, content: Mapping[str, Node], path: str) -> Node:
     """Return the node at a path such as "run(2).log"."""
-    node: Node = dict(content)
+    at: Node = dict(content)
     for part in path.split("."):
         name, _, index = part.partition("(")
-        if not isinstance(node, dict) or name not in node:
-            have = described(node) if isinstance(node, dict) else _kind(node)  # pyright: ignore[reportUnknownArgumentType]
+        if not isinstance(at, dict) or name not in at:
+            have = _described(at) if isinstance(at, dict) else _kind(at)  # pyright: ignore[reportUnknownArgumentType]
             raise ValueError(f"{where}: expected a variable '{path}', got {have or 'none'}")
-        node = node[name]
+        at = at[name]  # pyright: ignore[reportUnknownVariableType]
         if index:
+            several: list[Node] = at if isinstance(at, list) else [at]
             number = index.rstrip(")")
-            most = len(node) if isinstance(node, list) else 1  # pyright: ignore[reportUnknownArgumentType]
-            if not number.isdigit() or not 1 <= int(number) <= most:
+            if not number.isdigit() or not 1 <= int(number) <= len(several):
                 raise ValueError(
-                    f"{where}: variable {path}: expected an index from 1 to {most}, got '{number}'"
+                    f"{where}: variable {path}: expected an index from 1 to {len(several)}, got "
+                    f"'{number}'"
                 )
-            node = node[int(number) - 1] if isinstance(node, list) else node
-    return node
+            at = several[int(number) - 1]
+    return at
+
+
+EMPS = ("t", "qm", "vir", "gtau")
+"""Variables that identify an EMPS file."""
+
+
+def _emps(where: str, name: str, content: Mapping[str, Node]) -> Record:
+    """Return the record of an EMPS file: force gtau*vir; pulses_N (volts, uint8) are in vir."""
+
+    def read(key: str, number: bool = False) -> Any:
+        value = content[key]
+        if not (isinstance(value, np.ndarray) and value.size == 1 if number else _is_vector(value)):
+            such = "one number" if number else "a vector of numbers"
+            raise ValueError(f"{where}: variable {key}: expected {such}, got {_kind(value)}")
+        return float(value.ravel()[0]) if number else value.ravel()
+
+    x, gain = read("qm"), read("gtau", number=True)
+    signals, units = {"x": x, "force": gain * read("vir")}, {"x": "m", "force": "N"}
+    record = Record(name, read("t"), signals, units, columns={"x": "qm"})
+    if not all(key in content for key in ("kp", "kv", "qg")):
+        return record
+    pulses = read("pulses_N") if "pulses_N" in content else np.zeros(x.size)
+    kp, kv = read("kp", number=True), read("kv", number=True)
+    return replace(record, loop=PositionLoop(kp, kv, gain, 10.0, read("qg"), pulses))

@@ -7,8 +7,8 @@ the shift to a sample; Gauss-Newton on smoothed signals gives it to a fraction o
 standard error and the drift of the clocks.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal, final
+from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,29 +36,20 @@ FLATTEST = 50
 ITERATIONS = 30
 
 
-@final
-@dataclass(frozen=True)
-class Delay:
+class Delay(NamedTuple):
     """Offset and drift between the clocks of two records.
 
     Attributes:
         shift: offset added to the times of the second [s], at the middle of the overlap.
         drift: relative excess speed of the first clock.
         middle: time of the first at which `shift` holds [s].
-        shift_error, drift_error: standard errors.
-        correlation: of both signals at this delay.
+        shift_error: standard error.
     """
 
     shift: float
     drift: float
     middle: float
-    shift_error: float
-    drift_error: float
-    correlation: float
-
-    def second(self, t: Array) -> Array:
-        """Return the times of the second record at times of the first."""
-        return t - self.shift - self.drift * (t - self.middle)
+    shift_error: float = 0.0
 
 
 def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: bool) -> Delay:
@@ -75,14 +66,13 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
     """
     where = f"data '{first.name}': merged with '{second.name}'"
     step = max(first.median_step, second.median_step)
-    one, two = _Even.of(first, on[0], step), _Even.of(second, on[1], step)
-    lag, correlation = _coarse(where, one, two)
-    rigid, left = _refined(where, one, two, lag, correlation, with_drift=False)
-    free, least = _refined(where, one, two, lag, correlation, with_drift=True)
+    one, two = _Even(first, on[0], step), _Even(second, on[1], step)
+    lag = _coarse(where, one, two)
+    rigid, left = _refined(where, one, two, lag, drifting=False)
+    free, least = _refined(where, one, two, lag, drifting=True)
     gained = one.values.size / NEIGHBOURS * (left / least - 1)
     total = abs(free.drift) * one.values.size * step
-    drifts = gained > SURE**2 and total > 0.5 * step
-    if drifts and not drift:
+    if gained > SURE**2 and total > 0.5 * step and not drift:
         raise ValueError(
             f"{where}: expected clocks of one speed, got a drift of {1e6 * free.drift:.0f} "
             f"ppm, {total:.3g} s over the record; pass drift='estimate'"
@@ -90,39 +80,40 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
     return free if drift else rigid
 
 
-@final
-@dataclass(frozen=True, eq=False)
 class _Even:
-    """A signal at equal intervals; `there` is False inside gaps."""
+    """A signal at equal intervals from `start`; `there` is False inside gaps."""
 
-    start: float
-    step: float
-    values: Array
-    there: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, record: Record, signal: str, step: float) -> "_Even":
+    def __init__(self, record: Record, signal: str, step: float) -> None:
         t, y = record.time, record[signal]
+        self.start, self.step = float(t[0]), step
         grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
         k = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, t.size - 2)
-        there = (t[k + 1] - t[k]) <= GAP * record.median_step
+        self.there: NDArray[np.bool_] = (t[k + 1] - t[k]) <= GAP * record.median_step
         if step > 1.5 * record.median_step:  # the mean over a step, not a sample of it
             area = np.concatenate([[0.0], np.cumsum(np.diff(t) * (y[1:] + y[:-1]) / 2)])
             low, high = np.clip(grid - step / 2, t[0], t[-1]), np.clip(grid + step / 2, t[0], t[-1])
             values = (np.interp(high, t, area) - np.interp(low, t, area)) / (high - low)
         else:
             values = np.interp(grid, t, y)
-        scale = float(np.std(values[there])) if there.any() else 0.0
+        scale = float(np.std(values[self.there])) if self.there.any() else 0.0
         if scale == 0:
             raise ValueError(
                 f"data '{record.name}': merged: expected a signal '{signal}' that changes, "
                 f"got {y[0]:g} throughout"
             )
-        return cls(float(grid[0]), step, (values - values[there].mean()) / scale, there)
+        self.values: Array = (values - values[self.there].mean()) / scale
+
+    def smoothed(self) -> tuple[Array, Array]:
+        """Return times and smoothed values."""
+        reach = int(4 * SMOOTHING)
+        window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING) ** 2)
+        padded = np.pad(self.values, reach, mode="edge")
+        y: Array = np.convolve(padded, window / window.sum(), mode="valid").astype(np.float64)
+        return self.start + self.step * np.arange(y.size, dtype=np.float64), y
 
 
-def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
-    """Return the lag in steps of the best correlation, and that correlation."""
+def _coarse(where: str, one: _Even, two: _Even) -> int:
+    """Return the lag in steps of the best correlation."""
     size = 1 << int(np.ceil(np.log2(one.values.size + two.values.size)))
 
     def product(a: Array, b: Array) -> Array:
@@ -139,17 +130,16 @@ def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
     found = np.where(lively, (product(y1, y2) - s1 * s2 / n) / np.sqrt(var1 * var2 + 1e-30), 0.0)
     found = np.clip(found, -1.0, 1 - 1e-9)
     best = int(np.argmax(found))
-    lags = np.where(np.arange(size) < one.values.size, np.arange(size), np.arange(size) - size)
     if found[best] < ALIKE:
-        low = float(found.min())
-        hint = "; one of them has the opposite sign" if low < -ALIKE else ""
+        hint = "; one of them has the opposite sign" if found.min() < -ALIKE else ""
         raise ValueError(
             f"{where}: expected two recordings of one quantity, got a correlation of at most "
             f"{found[best]:.2f} at any shift{hint}"
         )
+    lags = np.where(np.arange(size) < one.values.size, np.arange(size), np.arange(size) - size)
     order = np.argsort(lags, kind="stable")
-    values, at = found[order], int(np.flatnonzero(order == best)[0])
-    _check_single(where, values, at, one.step)
+    at = int(np.flatnonzero(order == best)[0])
+    _check_single(where, found[order], at, one.step)
     rest = ((1 - found**2) * var1 / n)[order]  # unexplained variance, whatever the overlap
     likely = lively[order] & (rest < rest[at] * (1 + 9 * NEIGHBOURS / n[best] + 9 / n[best] ** 0.5))
     if np.count_nonzero(likely) > FLATTEST:
@@ -157,77 +147,64 @@ def _coarse(where: str, one: _Even, two: _Even) -> tuple[int, float]:
             f"{where}: expected signals that determine their delay, got {np.count_nonzero(likely)} "
             f"shifts of {one.step:.2g} s that fit equally well; pass shift= [s]"
         )
-    return int(lags[best]), float(found[best])
+    return int(lags[best])
 
 
 def _check_single(where: str, values: Array, at: int, step: float) -> None:
     """Raise ValueError if another shift, outside the peak of the best one, fits equally well."""
     peak = values[at]
-    low = peak - max(0.02, 2 * RIVAL * (1 - peak))
-    left, right = at, at
-    while left > 0 and values[left - 1] >= low:
-        left -= 1
-    while right < values.size - 1 and values[right + 1] >= low:
-        right += 1
-    others = np.concatenate([values[:left], values[right + 1 :]])
-    places = np.concatenate([np.arange(left), np.arange(right + 1, values.size)])
-    if others.size and 1 - others.max() ** 2 < RIVAL * (1 - peak**2) + 1e-4:
-        away = (int(places[int(np.argmax(others))]) - at) * step
+    below = np.flatnonzero(values < peak - max(0.02, 2 * RIVAL * (1 - peak)))
+    left, right = below[below < at], below[below > at]
+    outside = np.ones(values.size, dtype=bool)
+    inner = slice(left[-1] + 1 if left.size else 0, right[0] if right.size else None)
+    outside[inner] = False
+    places = np.flatnonzero(outside)
+    if not places.size:
+        return
+    rival = int(places[np.argmax(values[places])])
+    if 1 - values[rival] ** 2 < RIVAL * (1 - peak**2) + 1e-4:
         raise ValueError(
-            f"{where}: expected one delay, got a second one {abs(away):.4g} s away that fits "
-            f"equally well (correlation {others.max():.4f} against {peak:.4f}); pass shift= [s]"
+            f"{where}: expected one delay, got a second one {abs((rival - at) * step):.4g} s away "
+            f"that fits equally well (correlation {values[rival]:.4f} against {peak:.4f}); pass "
+            "shift= [s]"
         )
 
 
-def _smoothed(signal: _Even) -> Array:
-    reach = int(4 * SMOOTHING)
-    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING) ** 2)
-    padded = np.pad(signal.values, reach, mode="edge")
-    kernel = (window / window.sum()).astype(np.float64)
-    return np.asarray(np.convolve(padded, kernel, mode="valid"), dtype=np.float64)
-
-
 def _refined(
-    where: str, one: _Even, two: _Even, lag: int, correlation: float, *, with_drift: bool
+    where: str, one: _Even, two: _Even, lag: int, *, drifting: bool
 ) -> tuple[Delay, float]:
     """Return the delay by Gauss-Newton on shift, drift, gain and offset, and its residual."""
-    y1, y2 = _smoothed(one), _smoothed(two)
-    t1 = one.start + one.step * np.arange(y1.size, dtype=np.float64)
-    t2 = two.start + two.step * np.arange(y2.size, dtype=np.float64)
+    (t1, y1), (t2, y2) = one.smoothed(), two.smoothed()
     slope = np.gradient(y2, two.step)
     begin = one.start - two.start + lag * one.step
-    shift, drift = begin, 0.0
-    middle = float(t1.mean())
-    covariance, rest = np.eye(4), 1.0
+    shift, drift, middle = begin, 0.0, float(t1.mean())
+    rows, residual, scale = np.eye(4), np.ones(4), np.ones(4)
     for _ in range(ITERATIONS):
         at = t1 - shift - drift * (t1 - middle)
         k = np.clip(np.rint((at - two.start) / two.step).astype(int), 0, y2.size - 1)
         use = (at >= t2[0]) & (at <= t2[-1]) & one.there & two.there[k]
         base, inner = hermite(at[use], t2, y2), np.interp(at[use], t2, slope)
         gain, offset = np.polyfit(base, y1[use], 1)
-        columns = [-gain * inner, -gain * inner * (t1[use] - middle), base, np.ones_like(base)]
-        jacobian = np.column_stack(columns if with_drift else [columns[0], *columns[2:]])
-        residual = y1[use] - gain * base - offset
-        scale = np.linalg.norm(jacobian, axis=0) + 1e-300
-        step, *_ = np.linalg.lstsq(jacobian / scale, residual, rcond=1e-9)
-        step = step / scale
-        inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12)
-        rest = float(residual @ residual) * NEIGHBOURS / max(residual.size - 4, 1) + 1e-30
-        covariance = rest * inverse / np.outer(scale, scale)
-        limit = 2 * one.step
-        shift += float(np.clip(step[0], -limit, limit))
-        if with_drift:
-            drift += float(np.clip(step[1], -1e-3, 1e-3))
-        if abs(step[0]) < 1e-6 * one.step and (not with_drift or abs(step[1]) < 1e-9):
+        columns = [-gain * inner, base, np.ones_like(base)]
+        if drifting:
+            columns.insert(1, -gain * inner * (t1[use] - middle))
+        scale = np.linalg.norm(np.column_stack(columns), axis=0) + 1e-300
+        rows, residual = np.column_stack(columns) / scale, y1[use] - gain * base - offset
+        step = np.linalg.lstsq(rows, residual, rcond=1e-9)[0] / scale
+        shift += float(np.clip(step[0], -2 * one.step, 2 * one.step))
+        turn = float(np.clip(step[1], -1e-3, 1e-3)) if drifting else 0.0
+        drift += turn
+        if abs(step[0]) < 1e-6 * one.step and abs(turn) < 1e-9:
             break
-    error = float(np.sqrt(covariance[0, 0]))
+    rest = float(residual @ residual) * NEIGHBOURS / max(residual.size - 4, 1) + 1e-30
+    inverse = np.linalg.pinv(rows.T @ rows, rcond=1e-12)
+    error = float(np.sqrt(rest * inverse[0, 0] / (scale[0] * scale[0])))
     if not error < one.step or abs(shift - begin) > 20 * one.step:
         raise ValueError(
             f"{where}: expected signals that determine their delay, got an error of {error:.2g} s "
             f"at samples of {one.step:.2g} s; pass shift= [s]"
         )
-    drift_error = float(np.sqrt(covariance[1, 1])) if with_drift else 0.0
-    return Delay(shift, drift, middle, error, drift_error, correlation), rest
+    return Delay(shift, drift, middle, error), rest
 
 
 def merged(
@@ -261,8 +238,7 @@ def merged(
             raise ValueError(f"{where}: expected drift='estimate' with an estimated shift")
     else:
         moved = checks.number(f"{where}: shift", shift, unit="s")
-        rate = checks.number(f"{where}: drift", drift)
-        delay = Delay(moved, rate, float(first.time.mean()), 0.0, 0.0, 1.0)
+        delay = Delay(moved, checks.number(f"{where}: drift", drift), float(first.time.mean()))
     taken = [key for key in second.signals if key != pair[1] or key not in first.signals]
     twice = [key for key in taken if key in first.signals]
     if twice:
@@ -270,27 +246,22 @@ def merged(
             f"{where}: expected signals of different names, got {', '.join(twice)} in both; "
             "use renamed()"
         )
-    return _joined(where, first, second, taken, delay)
-
-
-def _joined(
-    where: str, first: Record, second: Record, taken: list[str], delay: Delay
-) -> list[Record]:
-    t, at = second.time, delay.second(first.time)
+    t, mine = second.time, first.time
+    at = mine - delay.shift - delay.drift * (mine - delay.middle)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     there = (at >= t[0]) & (at <= t[-1]) & (t[k + 1] - t[k] <= GAP * second.median_step)
     kept = [slice(a, b) for a, b in runs(there) if b - a >= SHORTEST]
     if not kept:
         raise ValueError(
-            f"{where}: expected a common time of both, got {first.time[0]:g} ... "
-            f"{first.time[-1]:g} s and {t[0] + delay.shift:g} ... {t[-1] + delay.shift:g} s"
+            f"{where}: expected a common time of both, got {mine[0]:g} ... {mine[-1]:g} s and "
+            f"{t[0] + delay.shift:g} ... {t[-1] + delay.shift:g} s"
         )
     error = f" +- {delay.shift_error:.1g}" if delay.shift_error else ""
     name = f"{first.name} + {second.name} (shifted by {delay.shift:.6g}{error} s)"
+    units = {**first.units, **{key: second.units[key] for key in taken}}
     found: list[Record] = []
     for part in kept:
         cut = first.at(part)
         signals = {**cut.signals, **{key: interpolated(second, key, at[part]) for key in taken}}
-        units = {**first.units, **{key: second.units[key] for key in taken}}
         found.append(replace(cut, name=name, signals=signals, units=units))
     return found

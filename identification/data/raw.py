@@ -28,10 +28,9 @@ POINTS: Mapping[str, tuple[str, ...]] = {
     "v": ALIASES["v"],
     "F": ("F", "f", "force", "friction", "torque", "tau"),
     "N": ("N", "normal", "normal_force"),
+    "t": ALIASES["t"],
 }
 """Aliases of columns of points."""
-OF_GAPS = "missing='drop' (--missing drop) leaves out rows without a number"
-"""Remedy for empty cells."""
 SKIPPED = ("", "-", "_")
 """Names in `columns` for ignored columns."""
 
@@ -60,11 +59,12 @@ class Column:
         """Return a column of numbers, some of which may be NaN or infinite."""
         bad, problem = np.flatnonzero(~np.isfinite(values)), ""
         if bad.size:
-            problem = (
-                f"sample {bad[0]}: expected a finite number, got {values[bad[0]]} ({bad.size} such)"
-            )
-        gaps = bool(np.isnan(values).any()) and not bool(np.isinf(values).any())
-        return cls(label, unit, values, problem, gaps)
+            got = f"{values[bad[0]]} ({bad.size} such)"
+            problem = f"sample {bad[0]}: expected a finite number, got {got}"
+        return cls(label, unit, values, problem, bool(bad.size and not np.isinf(values).any()))
+
+    def __str__(self) -> str:
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
 @final
@@ -100,12 +100,12 @@ class Wanted:
             previous row, "refuse" or "drop".
     """
 
-    columns: Mapping[str, str] | Sequence[str] | None = None
-    units: Mapping[str, str] | str | None = None
-    step: float | None = None
-    points: bool = False
-    assumed: Mapping[str, str] | None = None
-    missing: Missing = "refuse"
+    columns: Mapping[str, str] | Sequence[str] | None
+    units: Mapping[str, str] | str | None
+    step: float | None
+    points: bool
+    assumed: Mapping[str, str]
+    missing: Missing
 
     def __post_init__(self) -> None:
         checks.choice("read: missing", self.missing, ("refuse", "drop"))
@@ -122,13 +122,9 @@ def label(cell: str) -> tuple[str, str]:
         if match and match[1] and is_common(match[2]):
             return match[1], match[2].strip()
     match = fullmatch(r"(.+)_([A-Za-z]+)", cell)
-    if match and is_common(match[2]) and _alias(match[1]):
+    if match and is_common(match[2]) and any(_matches(match[1], n) for n in ALIASES.values()):
         return match[1], match[2]
     return cell, ""
-
-
-def _alias(name: str) -> bool:
-    return any(_matches(name, names) for names in ALIASES.values())
 
 
 def _matches(name: str, names: Sequence[str]) -> bool:
@@ -143,35 +139,34 @@ def record(raw: Raw, wanted: Wanted) -> Record:
             time; all problems at once.
     """
     where = f"{raw.verb} '{raw.name}'"
-    raw = _labelled(where, raw, wanted)
-    places = _places(where, raw, wanted)
-    named = {key: raw.columns[k] for key, k in places.items()}
-    asked = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
-    needed = {*asked, *({"v", "F"} if wanted.points else KINDS)}
+    columns = _labelled(where, raw, wanted)
+    have = ", ".join(map(str, columns))
+    named = _channels(where, columns, wanted, have)
+    requested = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
+    needed = named.keys() & {*requested, *({"v", "F"} if wanted.points else KINDS)}
     given = _units(where, named, wanted)
-    rows = _rows(where, raw, {key: c for key, c in named.items() if key in needed}, wanted)
+    rows = _rows(where, columns, {key: named[key] for key in named if key in needed}, wanted)
     problems: list[str] = []
     signals, units, left_out = dict[str, Array](), dict[str, str](), dict[str, str]()
     for key, column in named.items():
         values = column.values[rows]
         if column.problem and not (column.gaps and np.isfinite(values).all()):
-            if key in needed:
-                problems.append(f"column '{_shown(column)}', {column.problem}")
             left_out[column.label] = column.problem
+            if key in needed:
+                problems.append(f"column '{column}', {column.problem}")
             continue
         try:
             factor, units[key] = _scale(key, column, given.get(key, ""), wanted)
+            signals[key] = factor * values
         except ValueError as error:
             problems.append(str(error))
-            continue
-        signals[key] = factor * values
     if problems:
         silent = any(problem.endswith("got none") for problem in problems)
         hint = "; pass units='m, N', units='rad, N m' or units={'x': 'mm'}" * silent
-        empty = any(named[key].gaps for key in named if key in needed)
-        hint += f"; {OF_GAPS}" * (empty and wanted.missing == "refuse")
+        if wanted.missing == "refuse" and any(named[key].gaps for key in needed):
+            hint += "; missing='drop' (--missing drop) leaves out rows without a number"
         raise ValueError(f"{where}: " + "; ".join(problems) + hint)
-    t = _time(where, raw, signals, wanted, rows)
+    t = None if wanted.points else _time(where, columns, signals, wanted, rows, have)
     signals.pop("t", None)
     if not signals and left_out:
         why = "; ".join(f"column '{name}', {bad}" for name, bad in left_out.items())
@@ -187,100 +182,99 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     )
 
 
-def _rows(where: str, raw: Raw, needed: Mapping[str, Column], wanted: Wanted) -> NDArray[np.bool_]:
+def _labelled(where: str, raw: Raw, wanted: Wanted) -> tuple[Column, ...]:
+    """Return the columns, with the names of the call if it names all of them in their order."""
+    columns = raw.columns
+    if isinstance(wanted.columns, Mapping) or wanted.columns is None:
+        if any(c.label == "" for c in columns):
+            raise ValueError(
+                f"{where}: expected names of {len(columns)} columns, got a file without a header; "
+                "write columns=['t', 'x', 'force'], with '-' for a column to ignore"
+            )
+        return columns
+    names = checks.many(f"{where}: columns", wanted.columns, "names")
+    if len(names) != len(columns):
+        have = f" ({', '.join(map(str, columns))})" if any(c.label for c in columns) else ""
+        raise ValueError(
+            f"{where}: columns: expected {len(columns)} names, one for each column{have}, got "
+            f"{len(names)}; write '-' for a column to ignore"
+        )
+    kept: list[Column] = []
+    for name, column in zip(names, columns, strict=True):
+        text = "" if name is None else str(name).strip()
+        if text not in SKIPPED:
+            new, given = label(text)
+            kept.append(replace(column, label=new, unit=given or column.unit))
+    return tuple(kept)
+
+
+def _channels(
+    where: str, columns: Sequence[Column], wanted: Wanted, have: str
+) -> dict[str, Column]:
+    """Return channel -> column. Names of the call come first, then canonical ones."""
+    left, found = [*columns], dict[str, Column]()
+
+    def take(key: str, column: Column) -> None:
+        found[key] = column
+        if column in left:
+            left.remove(column)
+
+    if isinstance(wanted.columns, Mapping):
+        for key, name in checks.named(f"{where}: columns", wanted.columns).items():
+            name = checks.text(f"{where}: columns: {key}", name, "the name of a column")
+            hits = [c for c in columns if name in (c.label, str(c))]
+            if len(hits) != 1:
+                got = f"{len(hits)} of them" if hits else have
+                raise ValueError(f"{where}: expected one column '{name}' for {key}, got {got}")
+            take(key, hits[0])
+    for key, names in (POINTS if wanted.points else ALIASES).items():
+        if key in found:
+            continue
+        exact = [c for c in left if c.label == key]
+        near = [c for c in left if _matches(c.label, names)]
+        if len(exact) > 1:
+            got = ", ".join(f"'{c}'" for c in exact)
+            raise ValueError(f"{where}: expected one column for {key}, got {got}")
+        if exact or len(near) == 1:  # the caller has to choose among several near ones
+            take(key, (exact or near)[0])
+    for column in left:
+        name = column.label
+        found[name if name not in found else f"{name}_{columns.index(column) + 1}"] = column
+    return found
+
+
+def _rows(
+    where: str, columns: Sequence[Column], needed: Mapping[str, Column], wanted: Wanted
+) -> NDArray[np.bool_]:
     """Return the mask of used rows: all, or new ones with a number in every needed channel."""
-    taken = np.ones(max((c.values.size for c in raw.columns), default=0), dtype=np.bool_)
+    taken = np.ones(max((c.values.size for c in columns), default=0), dtype=np.bool_)
     if wanted.missing == "refuse":
         return taken
     if "t" in needed and taken.size:
         alike = [c.values[1:] == c.values[:-1] for c in needed.values()]
         taken[1:] &= ~np.logical_and.reduce(alike)
-    columns = [c for c in needed.values() if c.gaps]
-    for column in columns:
+    holed = [c for c in needed.values() if c.gaps]
+    for column in holed:
         taken &= np.isfinite(column.values)
     if not taken.any():
-        names = ", ".join(f"'{_shown(c)}'" for c in columns)
+        names = ", ".join(f"'{c}'" for c in holed)
         raise ValueError(f"{where}: expected a row with numbers in {names}, got none")
     return taken
 
 
-def _shown(column: Column) -> str:
-    return f"{column.label} [{column.unit}]" if column.unit else column.label
-
-
-def _labelled(where: str, raw: Raw, wanted: Wanted) -> Raw:
-    """Return the columns, with the names of the call if it names all of them in their order."""
-    have = ", ".join(_shown(c) for c in raw.columns)
-    if isinstance(wanted.columns, Mapping) or wanted.columns is None:
-        if any(c.label == "" for c in raw.columns):
-            hint = "write columns=['t', 'x', 'force'], with '-' for a column to ignore"
-            raise ValueError(
-                f"{where}: expected names of {len(raw.columns)} columns, got a file without a "
-                f"header; {hint}"
-            )
-        return raw
-    names = checks.many(f"{where}: columns", wanted.columns, "names")
-    if len(names) != len(raw.columns):
-        raise ValueError(
-            f"{where}: columns: expected {len(raw.columns)} names, one for each column"
-            f"{f' ({have})' if any(c.label for c in raw.columns) else ''}, got {len(names)}; "
-            "write '-' for a column to ignore"
-        )
-    kept: list[Column] = []
-    for name, column in zip(names, raw.columns, strict=True):
-        text = "" if name is None else str(name).strip()
-        if text not in SKIPPED:
-            new, given = label(text)
-            kept.append(replace(column, label=new, unit=given or column.unit))
-    return replace(raw, columns=tuple(kept))
-
-
-def _places(where: str, raw: Raw, wanted: Wanted) -> dict[str, int]:
-    """Return channel -> index of its column. Names of the call come first, then canonical ones."""
-    labels = [c.label for c in raw.columns]
-    found: dict[str, int] = {}
-    if isinstance(wanted.columns, Mapping):
-        for key, name in checks.named(f"{where}: columns", wanted.columns).items():
-            name = checks.text(f"{where}: columns: {key}", name, "the name of a column")
-            hits = [k for k, c in enumerate(raw.columns) if name in (c.label, _shown(c))]
-            if len(hits) != 1:
-                got = f"{len(hits)} of them" if hits else ", ".join(map(_shown, raw.columns))
-                raise ValueError(f"{where}: expected one column '{name}' for {key}, got {got}")
-            found[key] = hits[0]
-    for key, names in ({**POINTS, "t": ALIASES["t"]} if wanted.points else ALIASES).items():
-        if key in found:
-            continue
-        free = [k for k in range(len(labels)) if k not in found.values()]
-        exact = [k for k in free if labels[k] == key]
-        near = [k for k in free if _matches(labels[k], names)]
-        if len(exact) > 1:
-            shown = ", ".join(f"'{_shown(raw.columns[k])}'" for k in exact)
-            raise ValueError(f"{where}: expected one column for {key}, got {shown}")
-        if exact or len(near) == 1:  # the caller has to choose among several near ones
-            found[key] = (exact or near)[0]
-    for k, name in enumerate(labels):
-        if k not in found.values():
-            if name in found:
-                name = f"{name}_{k + 1}"
-            found[name] = k
-    return found
-
-
 def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str, str]:
     """Return the units of the call by channel."""
-    if wanted.units is None:
-        return {}
     if isinstance(wanted.units, str):
         given = by_channel(f"{where}: units", wanted.units)
-        for key, said in given.items():
+        for key, text in given.items():
             own = named[key].unit if key in named else ""
-            if own and unit(own) != unit(said) and said in wanted.units:
+            if own and unit(own) != unit(text) and text in wanted.units:
                 raise ValueError(
-                    f"{where}: column '{_shown(named[key])}': expected its unit once, got "
-                    f"'{own}' in the file and '{said}' in the call; units={{'{key}': '{said}'}} "
-                    "overrides the file"
+                    f"{where}: column '{named[key]}': expected its unit once, got '{own}' in "
+                    f"the file and '{text}' in the call; units={{'{key}': '{text}'}} overrides the "
+                    "file"
                 )
-        return {key: said for key, said in given.items() if key in named and not named[key].unit}
+        return {key: text for key, text in given.items() if key in named and not named[key].unit}
     given = checks.named(f"{where}: units", wanted.units)
     known = {**{c.label: key for key, c in named.items()}, **{key: key for key in named}}
     checks.check_names(f"{where}: units", given, known)
@@ -289,25 +283,21 @@ def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str,
 
 def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float, str]:
     """Return the factor to SI and the SI unit of a column."""
-    said = given or column.unit or (wanted.assumed or {}).get(key, "")
+    text = given or column.unit or wanted.assumed.get(key, "")
+    if key == "t" and not text and wanted.units is not None:
+        text = "s"
+    meant = unit(text) if text else None
     kinds = KINDS.get(key, ()) if not wanted.points or key in ("v", "F", "N") else ()
-    if key == "t" and not said and wanted.units is not None:
-        said = "s"
-    meant = unit(said) if said else None
     if kinds and (meant is None or meant.si not in kinds):
-        raise ValueError(
-            f"column '{_shown(column)}': expected a unit of {EXAMPLES[key]}, got {said or 'none'}"
-        )
-    if meant is None:
-        return 1.0, said
-    return meant.factor, meant.si
+        such = EXAMPLES[key]
+        raise ValueError(f"column '{column}': expected a unit of {such}, got {text or 'none'}")
+    return (1.0, text) if meant is None else (meant.factor, meant.si)
 
 
 def _time(
-    where: str, raw: Raw, signals: Mapping[str, Array], wanted: Wanted, rows: NDArray[np.bool_]
-) -> Array | None:
-    if wanted.points:
-        return None
+    where: str, columns: Sequence[Column], signals: Mapping[str, Array], wanted: Wanted,
+    rows: NDArray[np.bool_], have: str,
+) -> Array:  # fmt: skip
     if wanted.step is not None:
         if "t" in signals:
             raise ValueError(
@@ -317,8 +307,7 @@ def _time(
         step = checks.number(f"{where}: step", wanted.step, unit="s", above=0.0)
         return step * np.flatnonzero(rows).astype(np.float64)
     if "t" not in signals:
-        have = ", ".join(_shown(c) for c in raw.columns)
-        timed = [c.label for c in raw.columns if c.unit and getattr(unit(c.unit), "si", "") == "s"]
+        timed = [c.label for c in columns if c.unit and getattr(unit(c.unit), "si", "") == "s"]
         name = timed[0] if len(timed) == 1 else "..."
         raise ValueError(
             f"{where}: expected a column of time 't [s]', got {have}; name it with "
@@ -326,11 +315,6 @@ def _time(
             "spaced samples, or points=True"
         )
     return signals["t"]
-
-
-def each(raws: Sequence[Raw], wanted: Wanted) -> tuple[Record, ...]:
-    """Return the records of all, with the problems of all in one error."""
-    return tuple(gathered([lambda raw=raw: record(raw, wanted) for raw in raws]))
 
 
 def gathered(works: Sequence[Callable[[], T]]) -> list[T]:

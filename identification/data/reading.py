@@ -1,18 +1,17 @@
 """Columns from text files (dialects of CSV), other files and Python objects."""
 
 import csv
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
 from glob import glob, has_magic
 from os import PathLike
 from pathlib import Path
-from re import fullmatch
-from typing import Any, final
+from re import compile as pattern
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.data.mat_file import read_mat, read_npy
+from identification.data.mat_file import read_variables
 from identification.data.raw import Array, Column, Raw, Wanted, gathered, label, record
 from identification.data.record import Record
 from identification.data.units import is_common, unit
@@ -37,30 +36,26 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
     framed = hasattr(frame, "columns") and hasattr(frame, "__getitem__")
     if framed:
         held: Any = frame
-        given = {str(key): held[key] for key in held.columns}
         index = getattr(held, "index", None)
         if getattr(index, "name", None) is not None:
-            given = {str(getattr(index, "name", "")): index, **given}
+            given[str(getattr(index, "name", ""))] = index
+        given |= {str(key): held[key] for key in held.columns}
     elif isinstance(frame, Mapping):
         given = dict(checks.named(where, frame))
     elif frame is not None:
-        raise checks.refused(
-            where, "arrays by name or a frame", frame, "write Dataset.of(t=t, x=x, force=force)"
-        )
-    twice = [key for key in arrays if key in given]
-    if twice:
-        raise ValueError(f"{where}: expected every column once, got {', '.join(twice)} twice")
-    columns = tuple(_held(where, key, v) for key, v in (given | dict(arrays)).items())
+        such = "arrays by name or a frame"
+        raise checks.refused(where, such, frame, "write Dataset.of(t=t, x=x, force=force)")
+    columns = [_held(where, key, v) for key, v in [*given.items(), *arrays.items()]]
     if not columns:
         raise ValueError(f"{where}: expected columns such as t=..., x=..., force=..., got none")
-    labels = [c.label for c in columns]
-    if len(set(labels)) < len(labels):
+    names = [*given, *arrays]
+    labels = names if len({*names}) < len(names) else [c.label for c in columns]
+    if len({*labels}) < len(labels):
         raise ValueError(f"{where}: expected every column once, got {', '.join(labels)}")
-    sizes = {c.label: c.values.size for c in columns}
-    if len(set(sizes.values())) > 1:
-        got = ", ".join(f"{key}: {size}" for key, size in sizes.items())
+    if len({c.values.size for c in columns}) > 1:
+        got = ", ".join(f"{c.label}: {c.values.size}" for c in columns)
         raise ValueError(f"{where}: expected columns of one length, got {got}")
-    return Raw(name, columns, verb="data"), framed
+    return Raw(name, tuple(columns), verb="data"), framed
 
 
 def _held(where: str, key: str, values: object) -> Column:
@@ -68,30 +63,28 @@ def _held(where: str, key: str, values: object) -> Column:
     if isinstance(values, np.ma.MaskedArray):  # masked values were not measured
         masked: Any = values  # pyright: ignore[reportUnknownVariableType]
         values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
+    wrong = checks.refused(f"{where}: {key}", "a vector of numbers", values)
     try:
         found = np.asarray(values)
     except (ValueError, TypeError):
-        raise checks.refused(f"{where}: {key}", "a vector of numbers", values) from None
+        raise wrong from None
     if found.ndim == 2 and min(found.shape) == 1:  # a vector as MATLAB has them
         found = found.ravel()
-    if found.dtype.kind in "mM" and found.ndim == 1 and found.size:
+    if found.ndim != 1:
+        raise wrong
+    if found.dtype.kind in "mM" and found.size:
         seconds = (found - found[0]).astype("timedelta64[ns]").astype(np.int64) * 1e-9
         return Column.of(name, "s", seconds)
-    if found.ndim != 1:
-        raise checks.refused(f"{where}: {key}", "a vector of numbers", values)
-    numbers, problem = np.full(found.size, np.nan), ""
     if found.dtype.kind in "iufb":
-        numbers = found.astype(float)
-    elif found.dtype.kind == "O":
-        for k, item in enumerate(found):
-            number = checks.as_number(item)
-            if number is None:
-                problem = f"sample {k}: expected a number, got {checks.shown(item)}"
-                break
-            numbers[k] = number
-    else:
-        problem = f"sample 0: expected a number, got {checks.shown(found[0])}" if found.size else ""
-    return Column(name, said, numbers, problem) if problem else Column.of(name, said, numbers)
+        return Column.of(name, said, found.astype(float))
+    numbers = np.full(found.size, np.nan)
+    for k, item in enumerate(found):
+        number = checks.as_number(item) if found.dtype.kind == "O" else None
+        if number is None:
+            problem = f"sample {k}: expected a number, got {checks.shown(item)}"
+            return Column(name, said, numbers, problem)
+        numbers[k] = number
+    return Column.of(name, said, numbers)
 
 
 COMMENTS = ("#", "%", "//")
@@ -101,11 +94,10 @@ EMPTY = ("", "-", "na", "n/a", "null")
 """Cells without a number, in addition to NaN."""
 LOOKED_AT = 40
 """Lines at the end of the file from which the delimiter is deduced."""
+WITH_COMMA, WITH_POINT = (pattern(rf"[-+]?\d*{mark}\d+([eE][-+]?\d+)?") for mark in (",", r"\."))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Rows:
+class Rows(NamedTuple):
     """Lines split into cells.
 
     Attributes:
@@ -134,18 +126,20 @@ def read_text(file: Path) -> Raw:
     """
     rows = _rows(file)
     where = f"read '{file.name}'"
-    comma = rows.delimiter != "," and _decimal_comma(rows)
+    last = [cell for row in rows.cells[-LOOKED_AT:] for cell in row]
+    with_comma, with_point = (sum(p.fullmatch(c) is not None for c in last)
+                              for p in (WITH_COMMA, WITH_POINT))  # fmt: skip
+    comma = rows.delimiter != "," and with_comma > with_point
     first = _first(rows, comma)
-    header, names, units = _header(rows, first)
+    names, units = _header(rows, first)
     if first is None:
-        got = "an empty file" if not rows.cells else f"{len(rows.cells)} rows of text only"
-        if header is not None:
-            got = "a header alone"
+        got = f"{len(rows.cells)} rows of text only" if rows.cells else "an empty file"
+        got = "a header alone" if names else got
         raise ValueError(f"{where}: expected rows of numbers, got {got}")
-    width = len(names) if names else len(rows.cells[first])
+    width = len(names or rows.cells[first])
     body, numbers = rows.cells[first:], rows.numbers[first:]
     for number, row in zip(numbers, body, strict=True):
-        if len(row) > width and any(cell for cell in row[width:]):
+        if any(row[width:]):
             hint = "; write numbers with a decimal point" if rows.delimiter == "," else ""
             raise ValueError(
                 f"{where}: row {number}: expected {width} cells as in the "
@@ -153,51 +147,47 @@ def read_text(file: Path) -> Raw:
             )
     columns: list[Column] = []
     for k in range(width):
-        values, problem, gaps = _column(body, numbers, k, comma)
+        cells = [row[k] if k < len(row) else "" for row in body]
+        if comma:
+            cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
         name, said = label(names[k]) if names else ("", "")
+        values, problem, gaps = _numbers(cells, numbers)
         columns.append(Column(name, said or (units[k] if units else ""), values, problem, gaps))
     return Raw(file.name, tuple(columns), numbers[0])
 
 
 def _rows(file: Path) -> Rows:
     """Return the lines that are not empty, split into cells."""
+    raw, where = file.read_bytes(), f"read '{file.name}'"
+    wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        text = raw.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
-        raw = file.read_bytes()
-        if not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-            text = raw.decode("latin-1")  # degree and micro signs of older recorders
-        else:
-            try:
-                text = raw.decode("utf-16")
-            except UnicodeDecodeError:
-                raise ValueError(
-                    f"read '{file.name}': expected text in UTF-8 or UTF-16, got other bytes"
-                ) from None
+        if wide:
+            raise ValueError(
+                f"{where}: expected text in UTF-8 or UTF-16, got other bytes"
+            ) from None
+        text = raw.decode("latin-1")  # degree and micro signs of older recorders
     if "\0" in text:
-        raise ValueError(f"read '{file.name}': expected a text file, got one with binary numbers")
-    lines = [(n, line.strip("\ufeff \r")) for n, line in enumerate(text.split("\n"), start=1)]
-    comments: list[str] = []
-    plain: list[tuple[int, str]] = []
-    for number, line in lines:
+        raise ValueError(f"{where}: expected a text file, got one with binary numbers")
+    comments, plain, numbers = list[str](), list[str](), list[int]()
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    for number, line in enumerate((line.strip("\ufeff ") for line in lines), start=1):
         if line.lstrip('" \t').startswith(COMMENTS):
             if not plain:
                 comments.append(line.lstrip('" \t#%/').strip())
         elif line.strip(" \t,;"):
-            plain.append((number, line))
-    if not plain:
-        return Rows(",", [], [], comments)
-    delimiter = _delimiter([line for _, line in plain])
-    cells = [split_line(line, delimiter) for _, line in plain]
-    return Rows(delimiter, [n for n, _ in plain], cells, comments)
+            plain.append(line)
+            numbers.append(number)
+    delimiter = _delimiter(plain) if plain else ","
+    return Rows(delimiter, numbers, [_cells(line, delimiter) for line in plain], comments)
 
 
 def _delimiter(lines: Sequence[str]) -> str:
     """Return the delimiter with which most of the last lines have the same number of numbers."""
-    last = lines[-LOOKED_AT:]
 
     def score(delimiter: str) -> tuple[float, int]:
-        rows = [split_line(line, delimiter) for line in last]
+        rows = [_cells(line, delimiter) for line in lines[-LOOKED_AT:]]
         widths = [len(row) for row in rows]
         usual = max(set(widths), key=widths.count)
         numbers = sum(sum(map(_is_number, row)) for row in rows if len(row) == usual)
@@ -209,7 +199,7 @@ def _delimiter(lines: Sequence[str]) -> str:
     return max(",;\t", key=lines[0].count) if any(d in lines[0] for d in ",;\t") else " "
 
 
-def split_line(line: str, delimiter: str) -> list[str]:
+def _cells(line: str, delimiter: str) -> list[str]:
     """Return the cells of one line."""
     if delimiter == " ":
         return line.split()
@@ -231,16 +221,8 @@ def _is_number(cell: str) -> bool:
     try:
         _number(cell)
     except ValueError:
-        return fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell) is not None
+        return WITH_COMMA.fullmatch(cell) is not None
     return True
-
-
-def _decimal_comma(rows: Rows) -> bool:
-    """Return True if more cells are numbers with a decimal comma than with a point."""
-    cells = [cell for row in rows.cells[-LOOKED_AT:] for cell in row]
-    with_comma = sum(fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", c) is not None for c in cells)
-    with_point = sum(fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", c) is not None for c in cells)
-    return with_comma > with_point
 
 
 def _numeric(row: Sequence[str], comma: bool) -> bool:
@@ -252,46 +234,34 @@ def _numeric(row: Sequence[str], comma: bool) -> bool:
 
 def _first(rows: Rows, comma: bool) -> int | None:
     """Return the first row of numbers, at least as wide as most of the last ones."""
-    widths = [_trimmed(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
+    widths = [_width(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
     usual = max(set(widths), key=widths.count, default=0)
-    return next(
-        (k for k, r in enumerate(rows.cells) if _trimmed(r) >= usual and _numeric(r, comma)), None
-    )
+    found = (k for k, r in enumerate(rows.cells) if _width(r) >= usual and _numeric(r, comma))
+    return next(found, None)
 
 
-def _header(rows: Rows, first: int | None) -> tuple[int | None, list[str] | None, list[str] | None]:
-    """Return the index of the header row, names and units of the columns, if there are any."""
-    end = len(rows.cells) if first is None else first
-    width = 0 if first is None else _trimmed(rows.cells[first])
-    above = [k for k in range(end) if first is None or len(rows.cells[k]) >= width]
+def _header(rows: Rows, first: int | None) -> tuple[list[str] | None, list[str] | None]:
+    """Return names and units of the columns, if there are any."""
+    width = 0 if first is None else _width(rows.cells[first])
+    above = [row for row in rows.cells[:first] if first is None or len(row) >= width]
     if not above:
-        spoken = [split_line(c, rows.delimiter) for c in rows.comments[-1:]]
-        spoken += [c.split() for c in rows.comments[-1:]]
-        names = next((s for s in spoken if len(s) == width and width), None)
-        return None, names, None
-    last = above[-1]
-    cells = rows.cells[last]
+        spoken = [s for c in rows.comments[-1:] for s in (_cells(c, rows.delimiter), c.split())]
+        return next((s for s in spoken if len(s) == width and width), None), None
+    cells = above[-1]
     if len(above) > 1 and all(unit(c.strip("[]()")) is not None for c in cells):
-        names = rows.cells[above[-2]]
+        names = above[-2]
         if len(names) == len(cells) and not all(is_common(c) for c in names if c):
-            return above[-2], names, [c.strip("[]()") for c in cells]
-    while cells and not cells[-1]:
-        cells = cells[:-1]
-    return last, cells, None
+            return names, [c.strip("[]()") for c in cells]
+    return cells[: _width(cells)], None
 
 
-def _trimmed(row: Sequence[str]) -> int:
+def _width(row: Sequence[str]) -> int:
     """Return the number of cells up to the last that is not empty."""
     return max((k + 1 for k, cell in enumerate(row) if cell), default=0)
 
 
-def _column(
-    body: Sequence[Sequence[str]], numbers: Sequence[int], index: int, comma: bool
-) -> tuple[Array, str, bool]:
-    """Return a column as numbers, a message on its first bad cell, True if all such are empty."""
-    cells = [row[index] if index < len(row) else "" for row in body]
-    if comma:
-        cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
+def _numbers(cells: Sequence[str], numbers: Sequence[int]) -> tuple[Array, str, bool]:
+    """Return cells as numbers, a message on the first bad one, True if all such are empty."""
     values = np.full(len(cells), np.nan)
     problem = ""
     for k, cell in enumerate(cells):
@@ -301,19 +271,11 @@ def _column(
             problem = problem or f"row {numbers[k]}: expected a number, got '{cell[:40]}'"
             if cell.lower() not in EMPTY:
                 return values, problem, False
-    gaps = not bool(np.isinf(values).any())
-    if problem:
-        return values, problem, gaps
     bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        place = f"row {numbers[int(bad[0])]}"
-        return (
-            values,
-            f"{place}: expected a finite number, got {cells[int(bad[0])][:40]}"
-            + (f" ({bad.size} such cells)" if bad.size > 1 else ""),
-            gaps,
-        )
-    return values, "", False
+    if bad.size and not problem:
+        k, more = int(bad[0]), f" ({bad.size} such cells)" if bad.size > 1 else ""
+        problem = f"row {numbers[k]}: expected a finite number, got {cells[k][:40]}{more}"
+    return values, problem, bool(bad.size) and not np.isinf(values).any()
 
 
 def to_csv(record: Record, path: Path) -> Path:
@@ -326,7 +288,7 @@ def to_csv(record: Record, path: Path) -> Path:
 
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".data", "")
-NUMPY = (".npy", ".npz")
+VARIABLES = (".mat", ".npy", ".npz")
 Paths = str | PathLike[str] | Sequence[str | PathLike[str]]
 
 
@@ -340,17 +302,16 @@ def files(paths: Paths) -> tuple[Path, ...]:
     found: list[Path] = []
     for given in checks.many("read", several, "paths"):
         path = checks.path("read", given)
+        hits = [Path(hit) for hit in sorted(glob(str(path))) if Path(hit).is_file()]
         if path.is_file():
-            found.append(path)
+            hits = [path]
         elif path.is_dir():
             raise ValueError(f"read '{path}': expected a file, got a folder; pass '{path}/*.csv'")
-        elif has_magic(str(path)):
-            hits = [Path(hit) for hit in sorted(glob(str(path))) if Path(hit).is_file()]
-            if not hits:
-                raise ValueError(f"read '{path}': expected files, got none that match the pattern")
-            found.extend(hits)
-        else:
+        elif not has_magic(str(path)):
             raise ValueError(f"read '{path}': expected a file, got nothing there; check the path")
+        elif not hits:
+            raise ValueError(f"read '{path}': expected files, got none that match the pattern")
+        found += hits
     if not found:
         raise ValueError("read: expected paths of files, got none")
     return tuple(found)
@@ -364,29 +325,18 @@ def read_records(paths: Paths, wanted: Wanted, variable: str | None) -> tuple[Re
     return tuple(record for found in gathered(works) for record in found)
 
 
-def _read(file: Path, wanted: Wanted, variable: str | None) -> tuple[Record, ...]:
-    suffix = file.suffix.lower()
+def _read(file: Path, wanted: Wanted, variable: str | None) -> list[Record]:
+    suffix, where = file.suffix.lower(), f"read '{file.name}'"
+    if suffix not in (*TEXT, *VARIABLES):
+        such = f"a text file ({', '.join(filter(None, TEXT))}), .mat, .npz or .npy"
+        raise ValueError(f"{where}: expected {such}, got '{file.suffix}'")
+    if suffix in TEXT and variable is not None:
+        raise ValueError(f"{where}: expected variable= only of .mat, .npz and .npy files")
     try:
-        if suffix == ".mat":
-            found = read_mat(file, variable)
-        elif suffix in NUMPY:
-            found = read_npy(file, variable)
-        elif suffix in TEXT:
-            if variable is not None:
-                raise ValueError(
-                    f"read '{file.name}': expected variable= only of .mat, .npz and .npy files"
-                )
-            found = [read_text(file)]
-        else:
-            raise ValueError(
-                f"read '{file.name}': expected a text file ({', '.join(filter(None, TEXT))}), "
-                f".mat, .npz or .npy, got '{file.suffix}'"
-            )
+        found = read_variables(file, variable) if suffix in VARIABLES else [read_text(file)]
     except OSError as error:
-        raise ValueError(
-            f"read '{file}': expected a readable file, got {error.strerror or error}"
-        ) from None
+        got = error.strerror or error
+        raise ValueError(f"read '{file}': expected a readable file, got {got}") from None
     if isinstance(found, Record):
-        return (found,)
-    works: list[Callable[[], Record]] = [partial(record, raw, wanted) for raw in found]
-    return tuple(gathered(works))
+        return [found]
+    return gathered([partial(record, raw, wanted) for raw in found])

@@ -46,12 +46,13 @@ class PositionLoop:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for key in ("kp", "kv", "gain"):
-            object.__setattr__(self, key, checks.number(f"PositionLoop: {key}", getattr(self, key)))
-        limit = checks.number("PositionLoop: limit", self.limit, above=0.0)
-        object.__setattr__(self, "limit", limit)
-        for key in ("reference", "disturbance"):
-            object.__setattr__(self, key, checks.array(f"PositionLoop: {key}", getattr(self, key)))
+        for key, value in vars(self).items():
+            where = f"PositionLoop: {key}"
+            if key in ("reference", "disturbance"):
+                object.__setattr__(self, key, checks.array(where, value))
+            else:
+                above = 0.0 if key == "limit" else None
+                object.__setattr__(self, key, checks.number(where, value, above=above))
         if self.reference.shape != self.disturbance.shape:
             raise ValueError(
                 "PositionLoop: expected reference and disturbance of one length, got "
@@ -60,10 +61,8 @@ class PositionLoop:
 
     def between(self, first: int, end: int) -> "PositionLoop":
         """Return the controller over the samples `first` to `end` (not included)."""
-        cut = slice(first, end)
-        return PositionLoop(
-            self.kp, self.kv, self.gain, self.limit, self.reference[cut], self.disturbance[cut]
-        )
+        reference, disturbance = self.reference[first:end], self.disturbance[first:end]
+        return replace(self, reference=reference, disturbance=disturbance)
 
 
 GAP = 5.0
@@ -115,9 +114,8 @@ class Record:
 
     def __post_init__(self) -> None:
         where = f"data '{self.name}'"
-        signals: dict[str, Array] = {}
-        for key, values in checks.named(f"{where}: signals", self.signals).items():
-            signals[key] = self._column(key, values)
+        given = checks.named(f"{where}: signals", self.signals)
+        signals = {key: self._column(key, values) for key, values in given.items()}
         units = checks.named(f"{where}: units", self.units, signals)
         for unit in units.values():
             checks.kind(f"{where}: units", unit, str, "SI units, such as 'm'")
@@ -125,68 +123,54 @@ class Record:
         object.__setattr__(self, "units", {key: units.get(key, "") for key in signals})
         if self.t is not None:
             object.__setattr__(self, "t", self._column("t", self.t))
-        problems = self._shape_problems() or self._value_problems()
-        if problems:
+        if problems := self._problems():
             raise ValueError(f"{where}: " + "; ".join(problems))
 
     def _column(self, key: str, values: object) -> Array:
         where = f"data '{self.name}': {key}"
-        column = checks.array(where, values, ndim=None, what="a column of numbers", nan=True)
-        column = column.copy()
+        column = checks.array(where, values, ndim=None, what="a column of numbers", nan=True).copy()
         column.setflags(write=False)
         return column
 
-    def _everything(self) -> dict[str, Array]:
-        return dict(self.signals) if self.t is None else {"t": self.t, **self.signals}
-
-    def _shape_problems(self) -> list[str]:
-        shapes = {key: values.shape for key, values in self._everything().items()}
+    def _problems(self) -> list[str]:
+        """Return the problems of shapes, else those of values, else that of times."""
         if not self.signals:
             return ["expected at least one signal, got none"]
+        every = {**({} if self.t is None else {"t": self.t}), **self.signals}
+        shapes = {key: values.shape for key, values in every.items()}
         if any(len(shape) != 1 for shape in shapes.values()) or len(set(shapes.values())) > 1:
             found = ", ".join(f"{key}: {shape}" for key, shape in shapes.items())
             return [f"expected columns of one length, got {found}"]
-        if self.size < 2:
-            return [f"expected at least two samples, got {self.size}"]
-        if self.loop is not None and self.loop.reference.size != self.size:
-            return [
-                f"expected a controller with a reference of {self.size} samples, "
-                f"got {self.loop.reference.size}"
-            ]
-        return []
+        n, size = self.size, 0 if self.loop is None else self.loop.reference.size
+        if n < 2:
+            return [f"expected at least two samples, got {n}"]
+        if self.loop is not None and size != n:
+            return [f"expected a controller with a reference of {n} samples, got {size}"]
+        bad = {key: np.flatnonzero(~np.isfinite(values)) for key, values in every.items()}
+        problems = [
+            f"column {key}, {self.place(int(at[0]))}: expected a finite number, got "
+            f"{every[key][at[0]]} ({at.size} such cells)"
+            for key, at in bad.items()
+            if at.size
+        ]
+        return problems or ([] if self.t is None else self._time_problems(self.t))
 
-    def _value_problems(self) -> list[str]:
-        problems: list[str] = []
-        for key, values in self._everything().items():
-            bad = np.flatnonzero(~np.isfinite(values))
-            if bad.size:
-                problems.append(
-                    f"column {key}, {self.place(int(bad[0]))}: expected a finite number, "
-                    f"got {values[bad[0]]} ({bad.size} such cells)"
-                )
-        if self.t is None or problems:
-            return problems
-        back = np.flatnonzero(np.diff(self.t) <= 0)
-        if back.size:
-            k = int(back[0])
-            later = self._repeats(back)
-            if back.size <= self.size // 20 and self.t[k + 1] <= self.t[0] + self.step:
-                later = "; the time restarts: use one file for each record"
-            problems.append(
-                f"column t, {self.place(k + 1)}: expected increasing times, "
-                f"got {self.t[k + 1]:.12g} s after {self.t[k]:.12g} s "
-                f"({back.size} such rows){later}"
-            )
-        return problems
-
-    def _repeats(self, back: NDArray[np.intp]) -> str:
-        """Return a hint if the times of samples `back + 1` equal those of the samples before."""
-        if self.t is None or np.any(np.diff(self.t)[back] < 0):
-            return ""
-        alike = [values[back + 1] == values[back] for values in self.signals.values()]
-        if alike and np.all(alike):
-            return "; missing='drop' (--missing drop) leaves out rows that repeat the one before"
-        return "; several values at one time: if its clock is too coarse, pass step= (--step)"
+    def _time_problems(self, t: Array) -> list[str]:
+        back = np.flatnonzero(np.diff(t) <= 0)
+        if not back.size:
+            return []
+        k, hint = int(back[0]), ""
+        if back.size <= self.size // 20 and t[k + 1] <= t[0] + self.step:
+            hint = "; the time restarts: use one file for each record"
+        elif not np.any(np.diff(t)[back] < 0):
+            alike = [values[back + 1] == values[back] for values in self.signals.values()]
+            hint = "; several values at one time: if its clock is too coarse, pass step= (--step)"
+            if np.all(alike):
+                hint = "; missing='drop' (--missing drop) leaves out repeated rows"
+        return [
+            f"column t, {self.place(k + 1)}: expected increasing times, got {t[k + 1]:.12g} s "
+            f"after {t[k]:.12g} s ({back.size} such rows){hint}"
+        ]
 
     def place(self, sample: int) -> str:
         """Return the place of a sample for messages: its row in the file, else its index."""
@@ -199,9 +183,8 @@ class Record:
         return self.signals[self.channel(name)]
 
     def __contains__(self, name: object) -> bool:
-        return (name == "t" and self.t is not None) or (
-            name in self.signals or name in self.columns.values()
-        )
+        timed = name == "t" and self.t is not None
+        return timed or name in self.signals or name in self.columns.values()
 
     def channel(self, name: str) -> str:
         """Return the name of a signal, given it or the name of its column.
@@ -300,8 +283,7 @@ class Record:
             ValueError: fewer than two samples in this interval.
         """
         where = f"data '{self.name}': between"
-        begin = checks.number(where, begin, unit="s")
-        end = checks.number(where, end, unit="s")
+        begin, end = (checks.number(where, at, unit="s") for at in (begin, end))
         t = self.time
         first, last = np.searchsorted(t, begin, "left"), np.searchsorted(t, end, "right")
         if last - first < 2:

@@ -23,11 +23,10 @@ MOST = 1e8
 """Largest number of samples of a record."""
 
 
-def check_no_gap(record: Record, where: str) -> None:
-    """Raise ValueError for a record with gaps."""
-    parts = record.pieces
+def _check_no_gap(record: Record, where: str) -> None:
+    parts, t = record.pieces, record.time
     if len(parts) > 1:
-        t, k = record.time, parts[0].stop
+        k = parts[0].stop
         raise ValueError(
             f"{where}: expected intervals of at most {GAP:g} times the median one, got a gap of "
             f"{t[k] - t[k - 1]:.4g} s at t = {t[k - 1]:.6g} s ({len(parts) - 1} gaps); "
@@ -63,7 +62,7 @@ def resampled(
             f"{step:g} s over {span:g} s"
         )
     if gap == "refuse":
-        check_no_gap(record, where)
+        _check_no_gap(record, where)
     parts = [record.at(part) for part in record.pieces if part.stop - part.start >= SHORTEST]
     kept = [_at_step(part, step) for part in parts if part.time[-1] - part.time[0] >= 9 * step]
     if not kept:
@@ -79,13 +78,8 @@ def resampled(
 def _at_step(record: Record, step: float) -> Record:
     t = record.time
     new = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
-    return replace(
-        record,
-        t=new,
-        signals={key: interpolated(record, key, new) for key in record.signals},
-        loop=None,
-        first_row=0,
-    )
+    signals = {key: interpolated(record, key, new) for key in record.signals}
+    return replace(record, t=new, signals=signals, loop=None, first_row=0)
 
 
 def interpolated(record: Record, signal: str, at: Array) -> Array:
@@ -105,11 +99,9 @@ def delayed(record: Record, delays: Mapping[str, float]) -> Record:
         ValueError: an unknown signal, a delay as long as the record, a record with gaps.
     """
     where = f"data '{record.name}': delayed"
-    given = {
-        record.channel(name): checks.number(f"{where}: {name}", value, unit="s")
-        for name, value in checks.named(where, delays).items()
-    }
-    check_no_gap(record, where)
+    given = {record.channel(name): checks.number(f"{where}: {name}", value, unit="s")
+             for name, value in checks.named(where, delays).items()}  # fmt: skip
+    _check_no_gap(record, where)
     t = record.time
     late, early = max([0.0, *given.values()]), min([0.0, *given.values()])
     inside = (t >= t[0] + late) & (t <= t[-1] + early)
@@ -120,9 +112,8 @@ def delayed(record: Record, delays: Mapping[str, float]) -> Record:
         )
     rows = np.flatnonzero(inside)
     cut = record.at(slice(int(rows[0]), int(rows[-1]) + 1))
-    signals = dict(cut.signals)
-    for name, delay in given.items():
-        signals[name] = interpolated(record, name, cut.time - delay)
+    shifted = {n: interpolated(record, n, cut.time - delay) for n, delay in given.items()}
+    signals = {**cut.signals, **shifted}
     loop = None if {"x", "force"} & given.keys() else cut.loop
     return replace(cut, signals=signals, loop=loop)
 

@@ -7,7 +7,7 @@ window, whose width depends on the noise of the position. Its signs and its expl
 reveal wrong signs, exchanged columns, dead time and drift; its values are not estimates.
 """
 
-from dataclasses import dataclass
+from functools import cached_property
 from typing import final
 
 import numpy as np
@@ -32,47 +32,66 @@ MOVING = 0.02
 
 
 @final
-@dataclass(frozen=True, eq=False)
 class Rough:
     """The rough model of one record.
 
     Attributes:
-        t: times of the rows [s].
-        x, v, a, force: smoothed by the window.
-        width: of the window, in samples.
+        t, v, a, force: times [s] and smoothed signals of the rows.
         step: sample interval [s].
+        columns: regressors of the values.
+        clean: True if the acceleration exceeds its noise.
         values, errors: m, level, viscous, stiffness, offset (and coefficients of sin x, cos x),
             and their standard errors.
-        columns: regressors of the values.
         explained: share of the variance of the force that the model explains, robust.
-        residual: force minus model.
-        independent: number of independent rows.
-        clean: whether the acceleration exceeds its noise.
     """
 
-    t: Array
-    x: Array
-    v: Array
-    a: Array
-    force: Array
-    width: float
-    step: float
-    values: Array
-    errors: Array
-    columns: Array
-    explained: float
-    residual: Array
-    independent: float
-    clean: bool
+    def __init__(
+        self, t: Array, v: Array, a: Array, force: Array, columns: Array, width: float,
+        step: float, clean: bool,
+    ) -> None:  # fmt: skip
+        self.t, self.v, self.a, self.force, self.columns = t, v, a, force, columns
+        self.step, self.clean = step, clean
+        self.every = max(1, int(2 * width))
+        self.values, self.errors, self.explained = self.fit(columns, force)
+
+    def fit(self, columns: Array, force: Array) -> tuple[Array, Array, float]:
+        """Regress a force on columns; return values, standard errors and explained share."""
+        A, b = columns[:: self.every], force[:: self.every]
+        values, errors = _robust(A, b)
+        return values, errors, _explained(A, b, values)
+
+    def unexplained_when_late(self, late: float) -> float:
+        """Return the unexplained share of the force if it were late by a time [s]."""
+        return 1 - self.fit(self.columns, np.interp(self.t + late, self.t, self.force))[2]
+
+    def with_column(self, column: Array) -> tuple[float, float]:
+        """Return value and standard error of an additional column, shape (rows,)."""
+        values, errors, _ = self.fit(np.column_stack([self.columns, column]), self.force)
+        return float(values[-1]), float(errors[-1])
+
+    @cached_property
+    def residual(self) -> Array:
+        """Force minus model."""
+        return self.force - self.columns @ self.values
 
     @property
     def moving(self) -> NDArray[np.bool_]:
         """Mask of rows in which the drive moves."""
         return np.abs(self.v) > MOVING * np.abs(self.v).max()
 
+    @property
+    def spread(self) -> float:
+        """Range of the middle half of the forces."""
+        return float(np.ptp(np.quantile(self.force, (0.25, 0.75))))
+
     def sure(self, k: int) -> float:
         """Return a value over its standard error."""
         return float(self.values[k] / self.errors[k]) if self.errors[k] > 0 else 0.0
+
+    def one_way(self, share: float = 0.1) -> bool:
+        """Return True if the drive moves back by less than a share of its path."""
+        path = [float(np.sum(np.maximum(side * self.v, 0.0))) for side in (1, -1)]
+        return min(path) <= share * max(path)
 
 
 def smoothed(y: Array, width: float, order: int = 0) -> Array:
@@ -94,12 +113,10 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
         curve: use any function of the velocity as friction, piecewise linear in each
             direction, instead of level and viscous part, and a drift with time as the last column.
     """
-    record, x, force = view.steady, view.roles.get("x"), view.roles.get("force")
-    if record is None or x is None or force is None or record.size < 50:
+    record = view.steady
+    if record is None or not {"x", "force"} <= view.roles.keys() or record.size < 50:
         return None
-    position, push = record[x], record[force]
-    if exchanged:
-        position, push = push, position
+    position, push = (record[view.roles[r]] for r in ("x", "force")[:: -1 if exchanged else 1])
     if np.ptp(position) == 0 or np.ptp(push) == 0:
         return None
     step = record.step
@@ -113,54 +130,13 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
     still = MOVING * float(np.abs(v[rows]).max())
     sign = smoothed(np.sign(v) * (np.abs(v) > still), width)
     columns = [a, sign, v, xs - xs.mean(), np.ones_like(v)]
-    if record.units[x] == "rad" and np.ptp(position) > TURNED:
+    if view.unit("x") == "rad" and np.ptp(position) > TURNED:
         columns += [np.sin(xs), np.cos(xs)]
     if curve:
         columns[1:3] = _curve(v, still, rows)
         columns.append(np.linspace(-0.5, 0.5, v.size))
     A, b = np.column_stack(columns)[rows], smoothed(push, width)[rows]
-    every = max(1, int(2 * width))
-    values, errors = _robust(A[::every], b[::every])
-    explained = _explained(A[::every], b[::every], values)
-    return Rough(
-        t=record.time[rows],
-        x=xs[rows],
-        v=v[rows],
-        a=a[rows],
-        force=b,
-        width=width,
-        step=step,
-        values=values,
-        errors=errors,
-        columns=A,
-        explained=explained,
-        residual=b - A @ values,
-        independent=b.size / every,
-        clean=clean,
-    )
-
-
-def explained_when_late(model: Rough, late: float) -> float:
-    """Return the explained share of the force if it were late by a time [s]."""
-    every = max(1, int(2 * model.width))
-    A = model.columns[::every]
-    b = np.interp(model.t[::every] + late, model.t, model.force)
-    values, _ = _robust(A, b)
-    return _explained(A, b, values)
-
-
-def with_column(model: Rough, column: Array) -> tuple[float, float]:
-    """Return value and standard error of an additional column, shape (rows,)."""
-    every = max(1, int(2 * model.width))
-    A = np.column_stack([model.columns, column])[::every]
-    values, errors = _robust(A, model.force[::every])
-    return float(values[-1]), float(errors[-1])
-
-
-def one_way(model: Rough, share: float = 0.1) -> bool:
-    """Return True if the drive moves back by less than a share of its path."""
-    path = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
-    return min(path) <= share * max(path)
+    return Rough(record.time[rows], v[rows], a[rows], b, A, width, step, clean)
 
 
 def _explained(A: Array, b: Array, values: Array) -> float:
@@ -179,29 +155,29 @@ def _curve(v: Array, still: float, rows: slice) -> list[Array]:
     for side in (1.0, -1.0):
         speed = np.maximum(side * v, 0.0)
         there = speed[rows][speed[rows] > still]
-        if there.size < KNOTS.size * 10:
-            continue
-        knots = np.unique(np.quantile(there, KNOTS))
-        rest = np.concatenate([[0.0], knots])
-        hats = np.eye(rest.size)[1:]
-        found += [np.interp(speed, rest, hat) * (speed > 0) for hat in hats]
+        if there.size >= KNOTS.size * 10:
+            knots = np.concatenate([[0.0], np.unique(np.quantile(there, KNOTS))])
+            found += [np.interp(speed, knots, hat) * (speed > 0) for hat in np.eye(knots.size)[1:]]
     return found or [np.sign(v), v]
 
 
 def _width(x: Array) -> tuple[float, bool]:
     """Return the narrowest window that lets the acceleration exceed its noise; False if none."""
-    third = np.diff(x, 3)
-    noise = max(float(np.std(third)) / np.sqrt(20), count_of(x) / np.sqrt(12))
-    widest = x.size / 40
+    noise = max(white_part(x), count_of(x) / np.sqrt(12))
     best = WIDTHS[0]
     for width in WIDTHS:
-        if width > max(widest, WIDTHS[0]):
+        if width > max(x.size / 40, WIDTHS[0]):
             break
         best = width
         of_noise = noise * np.sqrt(3 / (8 * np.sqrt(np.pi))) * width**-2.5
         if of_noise < CLEAN * float(np.std(smoothed(x, width, 2))):
             return width, True
     return best, False
+
+
+def white_part(x: Array) -> float:
+    """Return the standard deviation of the white part of a position."""
+    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
 def _robust(A: Array, b: Array) -> tuple[Array, Array]:
@@ -218,10 +194,10 @@ def _robust(A: Array, b: Array) -> tuple[Array, Array]:
         least = 1e-12 * float(np.abs(b).max()) + 1e-200
         sigma = max(1.4826 * float(np.median(np.abs(residual))), least)
         weight = 1 / np.maximum(1.0, np.abs(residual) / (HUBER * sigma))
-    root = np.sqrt(weight)
-    inverse = np.linalg.pinv((B * root[:, None]).T @ (B * root[:, None]), rcond=1e-10)
+    X = B * np.sqrt(weight)[:, None]
+    inverse = np.linalg.pinv(X.T @ X, rcond=1e-10)
     rest = b - B @ values
     lag = float(np.corrcoef(rest[1:], rest[:-1])[0, 1]) if rest.size > 3 and rest.std() > 0 else 0.0
-    inflation = (1 + min(max(lag, 0.0), 0.98)) / (1 - min(max(lag, 0.0), 0.98))
-    variance = inflation * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
+    lag = min(max(lag, 0.0), 0.98)
+    variance = (1 + lag) / (1 - lag) * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
     return values / scale, np.sqrt(np.maximum(variance * np.diag(inverse), 0.0)) / scale

@@ -1,14 +1,13 @@
 """Balance of forces of any model, with the measured motion inserted."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import cast, final
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, cast
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.sampled import Equations, imposed_step
+from identification.residuals.sampled import Sampled, imposed_step
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
@@ -18,14 +17,14 @@ from symfric.model import Model
 from symfric.model.contact import Contact
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Put = Callable[[ca.SX], ca.SX]
 
 ALIKE = 1e-6
 """Share of a direction of force below which other directions reproduce it."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Coordinate:
+class Coordinate(NamedTuple):
     """A degree of freedom and its measured quantities.
 
     Attributes:
@@ -39,9 +38,7 @@ class Coordinate:
     a: ca.SX
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Row:
+class Row(NamedTuple):
     """A balance of forces: for the input it is solved for, or for a coordinate without an input.
 
     Attributes:
@@ -59,20 +56,20 @@ class Row:
     slips: tuple[int, ...]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Balance:
-    """Equations of the inverse dynamics.
+class Balance(NamedTuple):
+    """Equations of the inverse dynamics, with w = (positions, rates, accelerations, inputs, time).
 
     Attributes:
         rows: descriptions of the rows of `equations`.
-        slips: sliding velocities of the contacts, SX (contacts, 1) in w, y and p.
-        equations: with w = (positions, rates, accelerations, inputs, time).
+        equations: of w and the unknown parameters p.
+        slips: (w, p) -> sliding velocities of the contacts, and their derivatives by the rates.
+        loaded: True if laws depend on the applied force.
     """
 
     rows: tuple[Row, ...]
-    slips: ca.SX
-    equations: Equations
+    equations: Sampled
+    slips: ca.Function
+    loaded: bool
 
 
 def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
@@ -87,16 +84,18 @@ def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
         n, x = model.holonomic.n, model.x
         return tuple(Coordinate(x[i], x[n + i], model.holonomic.a[i]) for i in range(n))
     own = {v.name for c in model.contacts for v in c.states}
-    motion = [(k, v) for k, v in enumerate(model.x) if v.name not in own]
-    pairs = {
-        i: j for i, _ in motion for j, v in motion if i != j and ca.is_equal(model.ode[i], v.symbol)
+    motion = [k for k, v in enumerate(model.x) if v.name not in own]
+    rate = {
+        i: j
+        for i in motion
+        for j in motion
+        if i != j and ca.is_equal(model.ode[i], model.x[j].symbol)
     }
-    rates = dict.fromkeys(j for j in pairs.values())
-    position = {j: model.x[i] for i, j in pairs.items()}
+    position = {j: model.x[i] for i, j in rate.items()}
     return tuple(
-        Coordinate(position.get(k), v, model.xdot[k])
-        for k, v in motion
-        if k in rates or k not in pairs
+        Coordinate(position.get(k), model.x[k], model.xdot[k])
+        for k in motion
+        if k in position or k not in rate
     )
 
 
@@ -131,121 +130,110 @@ def balance(
         ValueError: more inputs than coordinates; law states with modes that only a simulation
             can follow.
     """
-    put = _Closed(model, [v for v in model.p if v.name not in names])
-    w, z = measured(model, found), stacked(v.symbol for c in model.contacts for v in c.states)
+    put = _closing(model, [v for v in model.p if v.name not in names])
+    w, u = measured(model, found), model.vector("u")
+    z = stacked(v.symbol for c in model.contacts for v in c.states)
     p = stacked(v.symbol for v in model.p if v.name in names)
     e, e_open, g, units = _balances(model, found)
     e = put(e)
-    gains = -ca.jacobian(e_open, model.vector("u"))
-    forces = stacked(c.force for c in model.contacts)
-    rubs, drives = _pattern(ca.jacobian(e_open, forces)), _pattern(gains)
+    gains = -ca.jacobian(e_open, u)
+    rubs = _pattern(ca.jacobian(e_open, stacked(c.force for c in model.contacts)))
+    drives = _pattern(gains)
     phi = None if model.holonomic is None else model.holonomic.phi
     y, guess = model.vector("z"), [_number(v.start, v.nominal) for v in model.z]
     simple = (drives.sum(0) == 1).all() and (drives.sum(1) <= 1).all()
     if simple and (phi is None or phi.is_empty()):
-        r = [e[i] / gains[i, int(k[0])] if (k := np.flatnonzero(on)).size else e[i]
-             for i, on in enumerate(drives)]  # fmt: skip
-        bearing = [i for i, on in enumerate(drives) if not on.any()]
         driven = {int(np.flatnonzero(on)[0]): i for i, on in enumerate(drives) if on.any()}
-        order = [*driven.values(), *bearing]
-        rows = put(stacked(r[i] for i in order))
-        inputs: list[int] = list(driven)
+        bearing = [i for i, on in enumerate(drives) if not on.any()]
+        balanced = [e[i] / gains[i, k] for k, i in driven.items()]
+        rows = put(stacked([*balanced, *(e[i] for i in bearing)]))
     else:
-        start = np.array([_number(v.start, 1.0) for v in model.p])
-        bearing = _bearing(model, put(gains), w, typical, start, where)
+        bearing = _bearing(model, put(gains), w, typical, where)
         needed = ca.SX.sym("needed", len(model.u))
         rest = ca.SX.sym("rest", len(bearing))
         selected = ca.DM.eye(len(found))[:, bearing]
-        free = ca.substitute(ca.vertcat(e, put(g)), model.vector("u"), needed)
+        free = ca.substitute(ca.vertcat(e, put(g)), u, needed)
         g = free - ca.vertcat(ca.mtimes(selected, rest), ca.SX.zeros(g.numel()))
         y, guess = ca.vertcat(needed, rest, y), [*[0.0] * (len(model.u) + len(bearing)), *guess]
-        rows = ca.vertcat(needed - model.vector("u"), rest)
-        inputs = list(range(len(model.u)))
-        on = [int(np.flatnonzero(drives[:, k])[0]) if drives[:, k].any() else 0 for k in inputs]
-        order = [*on, *bearing]
+        rows = ca.vertcat(needed - u, rest)
+        driven = {k: int(np.argmax(drives[:, k])) for k in range(len(model.u))}
         rubs = np.ones_like(rubs)
-    known = [
-        Row(model.u[k].name, model.u[k].unit, k, i, _true(rubs[i]))
-        for k, i in zip(inputs, order, strict=False)
-    ]
-    rest_of = [
-        Row(f"balance of {found[i].rate.name}", units[i], None, i, _true(rubs[i])) for i in bearing
-    ]
-    steps = _states(model.contacts, w, y, put, where)
-    equations = Equations(w, p, rows, z, y, put(g), *steps, guess=tuple(guess))
-    slips = put(stacked(c.slip for c in model.contacts))
-    return Balance((*known, *rest_of), slips, equations)
+    slips = [tuple(np.flatnonzero(on).tolist()) for on in rubs]
+    known = [Row(model.u[k].name, model.u[k].unit, k, i, slips[i]) for k, i in driven.items()]
+    known += [Row(f"balance of {found[i].rate.name}", units[i], None, i, slips[i]) for i in bearing]
+    start, step, later, h = _states(model.contacts, w, y, put, where)
+    g, count = put(g), len(found)
+    slip = put(stacked(c.slip for c in model.contacts))
+    by_rate = ca.vec(ca.jacobian(slip, w[count : 2 * count, 0]))
+    slipping = ca.Function("slips", [w, p], [ca.densify(slip), ca.densify(by_rate)])
+    equations = Sampled.of(
+        w, p, rows, z=z, start=start, step=step, later=later, h=h, y=y, g=g, guess=guess
+    )
+    return Balance(tuple(known), equations, slipping, ca.depends_on(ca.vertcat(g, step), u))
 
 
 def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
     """Return balances of the coordinates, the same with open contacts, other equations, units."""
     mechanics, opened = model.holonomic, model.open.holonomic
     if mechanics is None or opened is None:
-        rates, open_rates = cast(ca.SX, model.ode), cast(ca.SX, model.open.ode)
-        place = {v.name: k for k, v in enumerate(model.x)}
-        at = [place[c.rate.name] for c in found]
-        there = {v.name: k for k, v in enumerate(model.open.x)}
         a = stacked(c.a for c in found)
-        closed = a - stacked(rates[k] for k in at)
-        bare = a - stacked(open_rates[there[c.rate.name]] for c in found)
+
+        def left(of: Model) -> ca.SX:
+            place = {v.name: k for k, v in enumerate(of.x)}
+            return a - stacked(cast(ca.SX, of.ode)[place[c.rate.name]] for c in found)
+
         units = [f"{c.rate.unit}^2" if c.rate.unit.endswith("/s") else "" for c in found]
-        return closed, bare, ca.SX(model.alg), units
+        return left(model), left(model.open), ca.SX(model.alg), units
     n, m = mechanics.n, mechanics.phi.numel()
     units = ["N m" if c.rate.unit.startswith("rad") else "N" for c in found]
     return mechanics.implicit[:n, 0], opened.implicit[:n, 0], mechanics.implicit[n + m :, 0], units
 
 
 def _states(
-    contacts: Sequence[Contact], w: ca.SX, y: ca.SX, put: "_Closed", where: str
+    contacts: Sequence[Contact], w: ca.SX, y: ca.SX, put: Put, where: str
 ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Start, step, later symbols and sample interval of the states of all laws."""
     later, h = ca.SX.sym("later", w.numel() + y.numel()), ca.SX.sym("h")
     now, start, step = ca.vertcat(w, y), list[ca.SX](), list[ca.SX]()
-
     for c in contacts:
         if not c.states:
             continue
-        point = [put(x) for x in (c.slip, c.N, *c.given.values())]
-        then = [ca.substitute(x, now, later) for x in point]
-        names = list(c.given)
-        before, after = ((x[0], x[1], dict(zip(names, x[2:], strict=True))) for x in (point, then))
-        check_law(f"{where}: contact '{c.name}'", c.law)
-        law, symbols = cast(Law, c.law), symbols_of(c.states)
+        at = f"{where}: contact '{c.name}'"
+        check_law(at, c.law)
+        law = cast(Law, c.law)
+        here = [put(x) for x in (c.slip, c.N, *c.given.values())]
+        then = [ca.substitute(x, now, later) for x in here]
+        before, after = ((x[0], x[1], dict(zip(c.given, x[2:], strict=True))) for x in (here, then))
         start.append(put(ca.SX(law.steady_state(c.slip, c.N))))
-        made = imposed_step(law, symbols, before, after, h, f"{where}: contact '{c.name}'")
-        step.append(put(made))
+        step.append(put(imposed_step(law, symbols_of(c.states), before, after, h, at)))
     return stacked(start), stacked(step), later, h
 
 
-@final
-class _Closed:
-    """Substitution of laws for friction forces, and of numbers for held parameters."""
+def _closing(model: Model, held: Sequence[Variable]) -> Put:
+    """Return the substitution of laws for friction forces, and of numbers for held parameters."""
+    force = stacked(c.force for c in model.contacts)
+    friction = stacked(c.friction for c in model.contacts)
+    symbols, numbers = symbols_of(held), ca.SX(starts_of(held))
 
-    def __init__(self, model: Model, held: Sequence[Variable]) -> None:
-        self.force = stacked(c.force for c in model.contacts)
-        self.friction = stacked(c.friction for c in model.contacts)
-        self.held, self.numbers = symbols_of(held), ca.SX(starts_of(held))
-        self.depth = len(model.contacts)
-
-    def __call__(self, expression: ca.SX) -> ca.SX:
+    def put(expression: ca.SX) -> ca.SX:
         found = ca.SX(expression)
-        for _ in range(self.depth):
-            if not ca.depends_on(found, self.force):
+        for _ in model.contacts:
+            if not ca.depends_on(found, force):
                 break
-            found = ca.substitute(found, self.force, self.friction)
-        return ca.substitute(found, self.held, self.numbers) if self.held.numel() else found
+            found = ca.substitute(found, force, friction)
+        return ca.substitute(found, symbols, numbers) if symbols.numel() else found
+
+    return put
 
 
-def _bearing(
-    model: Model, gains: ca.SX, w: ca.SX, typical: Array, p: Array, where: str
-) -> list[int]:
+def _bearing(model: Model, gains: ca.SX, w: ca.SX, typical: Array, where: str) -> list[int]:
     """Return the coordinates that carry the forces which neither inputs nor constraints balance."""
     directions = gains
     if model.holonomic is not None:
         q = model.vector("x")[: model.holonomic.n, 0]
         directions = ca.horzcat(directions, ca.jacobian(model.holonomic.phi, q).T)
     at = ca.Function("directions", [w, model.vector("p")], [ca.densify(directions)])
-    pushes = at(typical, p).full()
+    pushes = at(typical, np.array([_number(v.start, 1.0) for v in model.p])).full()
     pushes /= np.maximum(np.linalg.norm(pushes, axis=0), 1e-300)
     n, count = pushes.shape
     if count > n or (count and np.linalg.svd(pushes, compute_uv=False)[-1] < ALIKE):
@@ -263,13 +251,9 @@ def _bearing(
     return chosen
 
 
-def _pattern(slopes: ca.SX) -> NDArray[np.bool_]:
+def _pattern(slopes: ca.SX) -> Mask:
     """Return a mask of the structural nonzeros of a matrix."""
     return np.array(ca.DM(slopes.sparsity(), 1).full() != 0).reshape(slopes.shape)
-
-
-def _true(row: NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(k) for k in np.flatnonzero(row))
 
 
 def _number(start: object, otherwise: float) -> float:

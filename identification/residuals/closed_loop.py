@@ -11,24 +11,22 @@ reference, so errors do not drift as they do without it, and the force contains 
 Source of the measure: Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks 2019.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.dataset import Dataset
 from identification.data.record import PositionLoop, Record
-from identification.residuals.evaluation import Channel, Evaluation
+from identification.residuals.evaluation import Blocks, Channel
 from identification.residuals.initial import local, noise_of
-from identification.residuals.stepper import Chain, Feedback, Mass, Motion, Tangent, why_no_motion
+from identification.residuals.stepper import Chain, Feedback, Mass, Tangent, why_no_motion
 from identification.unknowns.spec import Unknown
+from identification.unknowns.subject import Subject
 from symfric.foundation import checks
-
-if TYPE_CHECKING:
-    from identification.data.dataset import Dataset
-    from identification.unknowns.subject import Subject
 
 Array = NDArray[np.float64]
 SIGNALS = ("x", "force")
@@ -75,11 +73,11 @@ class Controller:
                 f"-> (state, command of 1), got arguments of {sizes} and results of {out}"
             )
         if isinstance(self.start, ca.Function):
-            fits = (self.start.n_in(), self.start.numel_in(0), self.start.numel_out(0))
-            if fits != (1, 2, n):
+            into, out = self.start.numel_in(0), self.start.numel_out(0)
+            if (self.start.n_in(), into, out) != (1, 2, n):
                 raise ValueError(
                     f"{where}: start: expected a Function of (x, v), 2 numbers, returning {n}, "
-                    f"got one of {fits[1]} returning {fits[2]}"
+                    f"got one of {into} returning {out}"
                 )
         elif self.start is not None:
             start = checks.array(f"{where}: start", self.start)
@@ -92,37 +90,31 @@ class Controller:
         """Number of its states."""
         return self.step.numel_in(0)
 
-    @property
-    def seen(self) -> int:
-        """Number of measured quantities."""
-        return self.step.numel_in(1)
-
     def feedback(self) -> Feedback:
         """Return the controller with its derivatives; rows hold references and the disturbance."""
         s, y, r = self.step.sx_in()
         after, command = self.step(s, y, r)
         both = ca.vertcat(after, command)
-        known = ca.Function(
-            "controller", [s, y, r], [both, ca.jacobian(both, s), ca.jacobian(both, y)]
-        )
+        results = [both, ca.jacobian(both, s), ca.jacobian(both, y)]
+        known = ca.Function("controller", [s, y, r], results)
+        count = len(self.reference)
 
-        def act(state: Sequence[Tangent], row: ca.SX, _: ca.SX) -> tuple[list[Tangent], Any]:
-            seen, memory = state[: self.seen], state[2:]
+        def act(state: Sequence[Tangent], row: ca.SX) -> tuple[list[Tangent], list[Tangent]]:
+            memory, seen = state[2:], state[: y.numel()]
             at = [ca.vertcat(*(q.value for q in part)) for part in (memory, seen)]
-            value, by_s, by_y = known(*at, row[: len(self.reference)])
+            value, by_s, by_y = known(*at, row[:count])
             slope = _times(by_s, memory) + _times(by_y, seen)
-            new = [Tangent(value[i], slope[i, :]) for i in range(self.memory + 1)]
-            force = self.gain * (new[-1].value + row[len(self.reference)])
-            return [Tangent(force, self.gain * new[-1].slope)], new[:-1]
+            *new, command = (Tangent(value[i], slope[i, :]) for i in range(self.memory + 1))
+            force = self.gain * (command.value + row[count])
+            return [Tangent(force, self.gain * command.slope)], new
 
         return act
 
     def rows(self, record: Record) -> Array:
         """Return references and disturbance at the samples."""
-        columns = [record[name] for name in self.reference]
-        none = np.zeros(record.size)
-        columns.append(none if self.disturbance is None else record[self.disturbance])
-        return np.column_stack(columns)
+        name = self.disturbance
+        disturbance = np.zeros(record.size) if name is None else record[name]
+        return np.column_stack([*(record[name] for name in self.reference), disturbance])
 
     def begin(self) -> ca.Function:
         """Return a Function (x, v) -> state at the first sample, and its derivative."""
@@ -196,32 +188,45 @@ class ClosedLoop:
         checks.count(f"{WHERE}: substeps", self.substeps)
 
     def prepare(
-        self, subject: "Subject", data: "Dataset", start: Mapping[str, float] | None = None
+        self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
     ) -> "LoopRows":
         """Return the residuals of `data`.
 
         Raises:
-                ValueError: a model other than one mass with friction without states, a record with
+            ValueError: a model other than one mass with friction without states, a record with
                 an unknown controller, missing channels, unequal intervals.
         """
         del start
-        mass = Mass.of(subject.model)
+        mass = Mass(subject.model)
         if len(mass.inputs) != 1:
             raise ValueError(
                 f"{WHERE}: model '{subject.model.name}': expected one input, the force, got "
                 f"{', '.join(mass.inputs) or 'none'}"
             )
-        return LoopRows(
-            subject.names,
-            tuple(self._run(mass, record, k) for k, record in enumerate(data)),
-            self.x0 == "estimate",
-        )
+        runs, own, channels, first = list[Run](), list[Unknown](), list[Channel](), 0
+        for number, record in enumerate(data):
+            run, given = self._run(mass, record)
+            runs.append(run)
+            units = {name: record.unit(name) for name in self.signals}
+            regressors = _regressors(record, given, self.signals)
+            for name, y in run.measured.items():
+                rows = slice(first, first := first + y.size)
+                channels.append(
+                    Channel(number, name, units[name], rows, record.time, y, regressors)
+                )
+            unit = units.get("x", "m")
+            for name, value, of in zip("xv", run.first.tolist(), (unit, f"{unit}/s"), strict=True):
+                scale, start_value = max(abs(value), 1e-3), f"x0.{name}[{number}]"
+                own.append(Unknown(start_value, of, value, scale=scale, nuisance=True))
+        free = tuple(own) if self.x0 == "estimate" else ()
+        return LoopRows(subject.names, free, tuple(channels), tuple(runs))
 
-    def _run(self, mass: Mass, record: Record, number: int) -> "Run":
-        loop = record.loop if self.loop is None else self.loop
+    def _run(self, mass: Mass, record: Record) -> tuple["Run", Array]:
+        """Return a record with its drive and controller, and references and disturbance."""
+        loop, where = record.loop if self.loop is None else self.loop, f"data '{record.name}'"
         if loop is None:
             raise ValueError(
-                f"{WHERE}: data '{record.name}': expected a known controller, got none; give "
+                f"{WHERE}: {where}: expected a known controller, got none; give "
                 "ClosedLoop(loop=...) or fit Shooting()"
             )
         record = record.uniform()
@@ -229,36 +234,19 @@ class ClosedLoop:
             controller = position_controller(loop, record.step)
             if loop.reference.size != record.size:
                 raise ValueError(
-                    f"{WHERE}: data '{record.name}': expected a reference of {record.size} "
-                    f"samples, got {loop.reference.size}"
+                    f"{WHERE}: {where}: expected a reference of {record.size} samples, got "
+                    f"{loop.reference.size}"
                 )
             given = np.column_stack([loop.reference, loop.disturbance])
         else:
             controller, given = loop, loop.rows(record)
-        chain = Chain.of(
-            mass,
-            controller.feedback(),
-            row=given.shape[1],
-            memory=controller.memory,
-            substeps=self.substeps,
-        )
+        feedback, memory = controller.feedback(), controller.memory
+        chain = Chain.of(mass, feedback, row=given.shape[1], memory=memory, substeps=self.substeps)
         rows = np.column_stack([np.full(record.size, record.step), given])
-        measured = {name: record[name] for name in self.signals}
-        units = {name: record.unit(name) for name in self.signals}
-        first = np.array([record["x"][0], _first_velocity(record)])
-        return Run(
-            number=number, name=record.name, chain=chain, begin=controller.begin(), rows=rows,
-            t=record.time, first=first, measured=measured, units=units,
-            regressors=_regressors(record, given, self.signals),
-        )  # fmt: skip
-
-
-def _first_velocity(record: Record) -> float:
-    """Return the first measured velocity, or that of a cubic through the first positions."""
-    if "v" in record:
-        return float(record["v"][0])
-    x = record["x"]
-    return local(record.time, x, 0, noise_of(x)).rate
+        x, measured = record["x"], {name: record[name] for name in self.signals}
+        v = record["v"][0] if "v" in record else local(record.time, x, 0, noise_of(x)).rate
+        first = np.array([x[0], float(v)])
+        return Run(record.name, chain, controller.begin(), rows, first, measured), given
 
 
 def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[str, Array]:
@@ -272,117 +260,69 @@ def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[st
         v = record["v"] if "v" in record else np.gradient(record["x"], record.step)
         rest = np.abs(v) < 0.01 * np.abs(v).max()
         found |= {"v": v, "sign(v)": np.where(rest, 0.0, np.sign(v))}
-    for i in range(given.shape[1]):
+    for i, column in enumerate(given.T):
         name = "disturbance" if i == given.shape[1] - 1 else "reference"
-        column = given[:, i]
         if np.ptp(column) > 0:
             found[name if name not in found else f"{name} {i + 1}"] = column
     return found
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Run:
+class Run(NamedTuple):
     """A record with its drive and controller.
 
     Attributes:
-        number, name: of the record.
+        name: of the record.
         chain: drive and controller, sample by sample.
         begin: (x, v) -> all states at the first sample, and their slopes.
         rows: inputs of the chain, shape (n, ...).
-        t: sample times [s].
         first: measured position and velocity at the first sample.
         measured: signal -> samples.
-        units: signal -> unit.
-        regressors: for the tests of the residuals.
     """
 
-    number: int
     name: str
     chain: Chain
     begin: ca.Function
     rows: Array
-    t: Array
     first: Array
     measured: Mapping[str, Array]
-    units: Mapping[str, str]
-    regressors: Mapping[str, Array]
 
-    def motion(self, p: Array, first: Array) -> Motion | str:
-        """Return the motion from position and velocity `first`."""
+    def signals(self, p: Array, first: Array) -> dict[str, tuple[Array, Array]] | str:
+        """Return signal -> values (n,) and derivatives (n, parameters + 2), or a message.
+
+        The motion starts at position and velocity `first`.
+        """
         state, slope = (np.asarray(a.full()) for a in self.begin(first))
         slopes = np.hstack([np.zeros((len(state), p.size)), slope])
         motion = self.chain(self.rows, p, state.ravel(), slopes)
-        why = why_no_motion(motion)
-        return f"data '{self.name}': {why}" if why else motion
-
-    def signal(self, motion: Motion, name: str) -> tuple[Array, Array]:
-        """Return a simulated signal (n,) and its derivatives (n, parameters + 2)."""
-        if name == "force":
-            return motion.inputs[:, 0], motion.input_slopes[:, 0]
-        k = ("x", "v").index(name)
-        return motion.states[:-1, k], motion.slopes[:-1, k]
+        if why := why_no_motion(motion):
+            return f"data '{self.name}': {why}"
+        found = {n: (motion.states[:-1, k], motion.slopes[:-1, k]) for k, n in enumerate("xv")}
+        return found | {"force": (motion.inputs[:, 0], motion.input_slopes[:, 0])}
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class LoopRows:
-    """Residuals of `ClosedLoop`; see `Residuals`."""
+class LoopRows(Blocks):
+    """Residuals, simulated minus measured signals, of `ClosedLoop`.
 
-    parameters: tuple[str, ...]
+    The own unknowns, if any, are position and velocity at the start of each record.
+    """
+
     runs: tuple[Run, ...]
-    estimated: bool
 
-    @property
-    def own(self) -> tuple[Unknown, ...]:
-        """Position and velocity at the start of each record, if they are fitted."""
-        if not self.estimated:
-            return ()
-        found = list[Unknown]()
-        for run in self.runs:
-            unit = run.units.get("x", "m")
-            for name, value, of in zip("xv", run.first, (unit, f"{unit}/s"), strict=True):
-                scale = max(abs(float(value)), 1e-3)
-                start = f"x0.{name}[{run.number}]"
-                found.append(Unknown(start, of, float(value), scale=scale, nuisance=True))
-        return tuple(found)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Parameters of the model, then start values."""
-        return (*self.parameters, *(unknown.name for unknown in self.own))
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Each signal of each record."""
-        found, first = list[Channel](), 0
-        for run in self.runs:
-            for name, y in run.measured.items():
-                rows = slice(first, first := first + y.size)
-                unit = run.units[name]
-                found.append(Channel(run.number, name, unit, rows, run.t, y, run.regressors))
-        return tuple(found)
-
-    def at(self, values: Array) -> Evaluation | str:
-        """Return simulated minus measured signals, and their derivatives."""
-        given = np.asarray(values, dtype=float)
-        count = len(self.parameters)
-        r, J = list[Array](), list[Array]()
+    def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
+        """Yield the residuals of each signal of each record, and their derivatives."""
         for k, run in enumerate(self.runs):
-            mine = count + 2 * k
-            first = given[mine : mine + 2] if self.estimated else run.first
-            motion = run.motion(given[:count], first)
-            if isinstance(motion, str):
-                return motion
+            first = own[2 * k : 2 * k + 2] if own.size else run.first
+            signals = run.signals(p, first)
+            if isinstance(signals, str):
+                yield signals
+                return
             for name, y in run.measured.items():
-                value, slope = run.signal(motion, name)
-                whole = np.zeros((y.size, given.size))
-                whole[:, :count] = slope[:, :count]
-                if self.estimated:
-                    whole[:, mine : mine + 2] = slope[:, count:]
-                r.append(value - y)
-                J.append(whole)
-        return Evaluation(np.concatenate(r), np.vstack(J))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+                value, slope = signals[name]
+                whole = np.zeros((y.size, p.size + own.size))
+                whole[:, : p.size] = slope[:, : p.size]
+                if own.size:
+                    place = p.size + 2 * k
+                    whole[:, place : place + 2] = slope[:, p.size :]
+                yield value - y, whole

@@ -1,9 +1,9 @@
 """Common interface of all residuals for minimisation, tests and plots."""
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, final
+from typing import NamedTuple, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,7 @@ class Channel:
     ordered: bool = True
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Evaluation:
+class Evaluation(NamedTuple):
     """Residuals r = predicted - measured in SI units (rows,), and dr/dvalues (rows, values)."""
 
     r: Array
@@ -73,7 +71,47 @@ class Residuals(Protocol):
         """Channels that together cover all rows."""
         ...
 
-    @abstractmethod
     def at(self, values: Array) -> Evaluation | str:
         """Return the residuals at `values`, or a message if they cannot be evaluated."""
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Residuals in blocks of rows, one below the other.
+
+    Attributes:
+        parameters: free parameters of the model.
+        own: unknowns of the data set.
+        channels: of all rows.
+    """
+
+    parameters: tuple[str, ...]
+    own: tuple[Unknown, ...]
+    channels: tuple[Channel, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the values: parameters, then own unknowns."""
+        return (*self.parameters, *(unknown.name for unknown in self.own))
+
+    @abstractmethod
+    def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
+        """Yield residuals and derivatives by all values of each block, or a message.
+
+        Args:
+            p: values of the parameters.
+            own: values of the own unknowns.
+        """
+        ...
+
+    def at(self, values: Array) -> Evaluation | str:
+        """Return residuals and derivatives, or a message if they cannot be evaluated."""
+        values = np.asarray(values, float)
+        count, found = len(self.parameters), list[tuple[Array, Array]]()
+        for block in self.blocks(values[:count], values[count:]):
+            if isinstance(block, str):
+                return block
+            found.append(block)
+        r, J = zip(*found, strict=True)
+        return Evaluation(np.concatenate(r), np.vstack(J))

@@ -7,10 +7,9 @@ sticks. All other states start as the model states.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from math import comb
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -41,11 +40,12 @@ def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[sli
         return (slice(0, n),)
     count = max(1, round(span / length))
     ends = t[0] + span * np.arange(1, count) / count
-    cuts = np.searchsorted(t, ends)
+    cuts = np.searchsorted(t, ends).tolist()
     if speed is not None:
         reach = MARGIN * span / count
-        cuts = np.array([_fastest(t, speed, float(end), reach) for end in ends], dtype=np.intp)
-    edges = [0, *cuts.tolist(), n]
+        near = [np.searchsorted(t, [end - reach, end + reach]) for end in ends]
+        cuts = [int(a + np.argmax(np.abs(speed[a : max(b, a + 1)]))) for a, b in near]
+    edges = [0, *cuts, n]
     pieces = tuple(slice(a, b) for a, b in pairwise(edges))
     shortest = min(piece.stop - piece.start for piece in pieces)
     if shortest < FEWEST:
@@ -54,11 +54,6 @@ def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[sli
             f"{shortest} with windows={length:g} s"
         )
     return pieces
-
-
-def _fastest(t: Array, speed: Array, middle: float, reach: float) -> int:
-    a, b = np.searchsorted(t, [middle - reach, middle + reach])
-    return int(a + np.argmax(np.abs(speed[a : max(b, a + 1)])))
 
 
 def turnaround(t: Array, y: Array) -> float:
@@ -94,9 +89,7 @@ def noise_of(y: Array) -> float:
     return min(found)
 
 
-@final
-@dataclass(frozen=True)
-class Local:
+class Local(NamedTuple):
     """Value and rate of a signal at one time, with standard errors for white noise."""
 
     value: float
@@ -107,29 +100,24 @@ class Local:
 
 def local(t: Array, y: Array, k: int, noise: float) -> Local:
     """Fit a cubic around sample k, through as many samples as noise alone explains."""
-    found, reach = _cubic(t, y, k, LEAST)[0], LEAST
-    while reach < min(MOST, y.size):
-        reach *= 2
-        wider, misfit, free = _cubic(t, y, k, reach)
-        if free > 0 and misfit > noise**2 * (1 + MISFIT * np.sqrt(2 / free)):
+    found, reach = np.zeros(4), LEAST
+    while True:
+        rows = slice(max(0, k - reach), min(t.size, k + reach + 1))
+        s = t[rows] - t[k]
+        scale = max(float(np.abs(s).max()), 1e-300)
+        A = np.vander(s / scale, min(4, s.size), increasing=True)
+        q, r = np.linalg.qr(A)
+        c = np.linalg.solve(r, q.T @ y[rows])
+        free, left = s.size - c.size, y[rows] - A @ c
+        misfit = float(left @ left) / max(free, 1)
+        if reach > LEAST and free > 0 and misfit > noise**2 * (1 + MISFIT * np.sqrt(2 / free)):
             break
-        found = wider
-    return Local(*found[:2], *(noise * found[2:]))
-
-
-def _cubic(t: Array, y: Array, k: int, reach: int) -> tuple[Array, float, int]:
-    """Return value, rate, their errors over the noise; mean square misfit, degrees of freedom."""
-    rows = slice(max(0, k - reach), min(t.size, k + reach + 1))
-    s = t[rows] - t[k]
-    scale = max(float(np.abs(s).max()), 1e-300)
-    A = np.vander(s / scale, min(4, s.size), increasing=True)
-    q, r = np.linalg.qr(A)
-    c = np.linalg.solve(r, q.T @ y[rows])
-    errors = np.linalg.norm(np.linalg.inv(r), axis=1)
-    free = s.size - c.size
-    left = y[rows] - A @ c
-    found = np.array([c[0], c[1] / scale, errors[0], errors[1] / scale])
-    return found, float(left @ left) / max(free, 1), free
+        errors = np.linalg.norm(np.linalg.inv(r), axis=1)
+        found = np.array([c[0], c[1] / scale, noise * errors[0], noise * (errors[1] / scale)])
+        if reach >= min(MOST, y.size):
+            break
+        reach *= 2
+    return Local(*found.tolist())
 
 
 def rates(model: Model) -> dict[str, str]:
@@ -154,9 +142,7 @@ def hidden(model: Model) -> set[str]:
     return {v.name for v in model.x} - own - reset
 
 
-@final
-@dataclass(frozen=True)
-class Begin:
+class Begin(NamedTuple):
     """Start value of one state.
 
     Attributes:
@@ -170,9 +156,7 @@ class Begin:
     estimated: bool = True
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Sensed:
+class Sensed(NamedTuple):
     """Measured information on the states of a model in one record.
 
     Attributes:
@@ -201,18 +185,15 @@ class Sensed:
 
     def at(self, k: int) -> dict[str, Begin]:
         """Return the start values at sample k; for bristles if they are unknown or unstrained."""
-        here = {
-            name: local(self.t, self.measured[source], k, self.noise[source])
-            for name, (source, _) in self.observed_from.items()
-        }
+        found = dict[str, Begin]()
         values, errors, scales = list[float](), list[float](), list[float]()
         for name, (source, is_rate) in self.observed_from.items():
-            y, one = self.measured[source], here[name]
+            y = self.measured[source]
+            one = local(self.t, y, k, self.noise[source])
             values.append(one.rate if is_rate else one.value)
             errors.append(one.rate_error if is_rate else one.value_error)
             scales.append(self._pace(y) if is_rate else float(np.std(y)))
-        rows = zip(self.observed_from, values, scales, strict=True)
-        found = {name: Begin(value, scale) for name, value, scale in rows}
+            found[name] = Begin(values[-1], scales[-1])
         for slip, names in self.slips.values():
             value, slope = (np.ravel(np.array(a)) for a in slip(np.array(values)))
             usual = float(np.linalg.norm(slope * scales))
@@ -227,11 +208,14 @@ class Sensed:
     @property
     def speed(self) -> Array:
         """Rate of the measured states, each over its usual rate, summed, shape (n,)."""
-        found = np.zeros(self.t.size)
+        t, reach = self.t, max(1, self.t.size // 100)
+        rows = np.arange(t.size)
+        a, b = np.maximum(rows - reach, 0), np.minimum(rows + reach, t.size - 1)
+        found = np.zeros(t.size)
         for y in self.measured.values():
             pace = self._pace(y)
             if pace > 0:
-                found += np.abs(_smoothed_rate(self.t, y)) / pace
+                found += np.abs((y[b] - y[a]) / (t[b] - t[a])) / pace
         return found
 
     def _pace(self, y: Array) -> float:
@@ -248,10 +232,9 @@ def _slips(
     Bristles are the states that change sign with the velocity; others, such as the age of a
     contact, start as in the model.
     """
-    others = [v for v in model.x if v.name not in observed_from]
     symbols = {v.name: v.symbol for v in model.x}
-    x = ca.vertcat(*(symbols[name] for name in observed_from))
-    rest = ca.vertcat(*(v.symbol for v in others), model.vector("z"), model.vector("u"))
+    x = ca.vertcat(*(symbols.pop(name) for name in observed_from))
+    rest = ca.vertcat(*symbols.values(), model.vector("z"), model.vector("u"))
     for contact in model.contacts:
         pairs = zip(contact.law.states, contact.states, strict=True)
         names = tuple(v.name for state, v in pairs if not state.even)
@@ -260,11 +243,3 @@ def _slips(
         slip = ca.substitute(contact.slip, model.vector("p"), ca.DM(model.values("p")))
         slope = ca.densify(ca.jacobian(slip, x))
         yield contact.name, (ca.Function("slip", [x], [slip, slope]), names)
-
-
-def _smoothed_rate(t: Array, y: Array) -> Array:
-    """Return the rate of a signal over fiftieths of the record."""
-    k = max(1, t.size // 100)
-    a, b = np.arange(t.size) - k, np.arange(t.size) + k
-    a, b = np.maximum(a, 0), np.minimum(b, t.size - 1)
-    return (y[b] - y[a]) / (t[b] - t[a])

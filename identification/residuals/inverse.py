@@ -1,20 +1,20 @@
 """Inverse dynamics: force needed for the measured motion, minus the measured force."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, cast, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.filters import Filter
-from identification.residuals.balance import Balance, Row, balance, coordinates
-from identification.residuals.evaluation import Channel, Evaluation
-from identification.residuals.motions import Motion, Piece, measure, piece
-from identification.residuals.sampled import Sampled
+from identification.data.differentiate import derivatives, uncertain
+from identification.data.filters import Decimation, Filter, Velocity, choose_filter
+from identification.data.record import Record
+from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
+from identification.residuals.evaluation import Blocks, Channel
+from identification.residuals.sampled import Sampled, moving_start
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -23,6 +23,8 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 WHERE = "InverseDynamics"
+FEWEST, ENOUGH = 10, 100
+"""Least number of equations of a signal, and the target if the filter is adapted."""
 
 
 @final
@@ -101,114 +103,250 @@ class InverseDynamics:
         motions = [measure(model, found, record, called, self.filter) for record in data]
         typical = np.median(np.hstack([m.w for m in motions]), axis=1)
         made = balance(model, subject.names, found, typical, where)
+        own = tuple[Unknown, ...]()
         if self.dead_time is not None:
-            _check_dead_time(made, model, where)
-        pieces = tuple(piece(made, motion, model, self.filter is None) for motion in motions)
-        return InverseRows(
-            subject.names, made.equations.compiled(), made.rows, pieces, self.dead_time
+            if made.loaded:
+                such = "expected laws without the applied force"
+                raise ValueError(f"{where}: dead_time: {such}")
+            low, high = self.dead_time
+            first = min(max(0.0, low), high)
+            own = tuple(
+                Unknown(f"dead_time[{k}]", "s", first, low, high, motion.step, nuisance=True)
+                for k, motion in enumerate(motions)
+            )
+        p = np.array([float(v.start) for v in model.p if v.name in subject.names])
+        pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
+        channels = tuple(_channels(made.rows, pieces))
+        return InverseRows(subject.names, own, channels, made.equations, made.rows, pieces)
+
+
+class Motion(NamedTuple):
+    """Measured motion and inputs of one record.
+
+    Attributes:
+        name: of the record.
+        t: times (n,) [s].
+        step: sample interval [s].
+        w: positions, rates, accelerations, inputs, time, shape (nw, n).
+        noise: standard deviations of the filtered rates.
+        filter: the filter used.
+    """
+
+    name: str
+    t: Array
+    step: float
+    w: Array
+    noise: Array
+    filter: Filter
+
+    @property
+    def inputs(self) -> slice:
+        """Rows of `w` with the inputs."""
+        return slice(3 * self.noise.size, -1)
+
+    @property
+    def inside(self) -> slice:
+        """Samples away from the end effects of the filter."""
+        return self.filter.inside(self.t.size, self.step)
+
+    @property
+    def begin(self) -> Array:
+        """The first sample, with rates near rest set to zero."""
+        first, count = self.w[:, 0].copy(), self.noise.size
+        first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
+        return first
+
+
+def measure(
+    model: Model,
+    found: Sequence[Coordinate],
+    record: Record,
+    called: Mapping[str, str],
+    filter: Filter | None,
+) -> Motion:
+    """Differentiate a record with the channels that the model needs.
+
+    Args:
+        model: its `found` coordinates.
+        record: equally spaced samples.
+        called: name in the model -> channel, if they differ.
+        filter: None: chosen for the fastest input, or without inputs for the fastest motion.
+
+    Raises:
+        ValueError: missing channels, unequal intervals.
+    """
+    step = record.uniform().step
+    known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
+    missing, raw = list[str](), list[tuple[Array | None, Array | None]]()
+    for c in found:
+        names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
+        x, v = (record[n] if n is not None and n in record else None for n in names)
+        needed = c.rate if c.position is None else c.position
+        if (v if c.position is None else x) is None and (
+            v is None or ca.depends_on(known, needed.symbol)
+        ):
+            missing.append(called.get(needed.name, needed.name))
+        raw.append((x, v))
+    inputs = [called.get(u.name, u.name) for u in model.u]
+    missing += [n for n in inputs if n not in record]
+    if missing:
+        raise ValueError(
+            f"data '{record.name}': expected channels {', '.join(missing)} for the inverse "
+            f"dynamics of '{model.name}', got {', '.join(record.signals)}; rename columns, or use "
+            "Shooting() for motion that is not measured"
         )
+    forces = [record[n] for n in inputs]
+    velocities = [Velocity.of(x, v, step) for x, v in raw]
+    if filter is None:
+        moved = [np.gradient(cast(Array, x), step) if v is None else v for x, v in raw]
+        bands = [t.band(x, v, step) for t, (x, v) in zip(velocities, raw, strict=True)]
+        each = (choose_filter(signal, step, bands) for signal in forces or moved)
+        filter = max(each, key=lambda f: f.cutoff)
+    motion = [derivatives(x, v, step, filter, t) for t, (x, v) in zip(velocities, raw, strict=True)]
+    w = np.vstack([*(part[k] for k in range(3) for part in motion), *forces, record.time])
+    noise = np.array([velocity.deviation(filter, step) for velocity in velocities])
+    return Motion(record.name, record.time, step, w, noise, filter)
 
 
-def _check_dead_time(made: Balance, model: Model, where: str) -> None:
-    """Raise ValueError for laws that depend on the instantaneous force."""
-    if ca.depends_on(ca.vertcat(made.equations.g, made.equations.step), model.vector("u")):
-        raise ValueError(f"{where}: dead_time: expected laws without the applied force")
+class Piece(NamedTuple):
+    """A record with its decimation.
+
+    Attributes:
+        motion: the measured motion.
+        decimation: low-pass filter and decimation of its samples.
+        kept: for each row of the balance the decimated samples in use.
+    """
+
+    motion: Motion
+    decimation: Decimation
+    kept: tuple[NDArray[np.int64], ...]
+
+    def equations(self, row: int, signals: Array) -> Array:
+        """Return the columns of `signals`, shape (n, k), decimated to the equations in use."""
+        return self.decimation.columns(signals[self.motion.inside])[self.kept[row]]
+
+    @property
+    def fewest(self) -> int:
+        """Least number of equations of a row."""
+        return min((kept.size for kept in self.kept), default=FEWEST)
+
+
+def _piece(made: Balance, motion: Motion, model: Model, p: Array, adapts: bool) -> Piece:
+    """Select the equations of a record whose low-pass filter includes no undetermined sample.
+
+    Args:
+        made, motion, model: balance, measured motion and model.
+        p: start values of the unknown parameters.
+        adapts: the filter was chosen automatically; if it leaves too few equations, as for a
+            motion with many reversals, the decimation is lowered.
+
+    Raises:
+        ValueError: too few equations remain.
+    """
+    slow = _slow(made, motion, model, p)
+    found = _decimated(made.rows, motion, slow)
+    if adapts and found.fewest < FEWEST:
+        factor = motion.filter.decimation
+        while found.fewest < ENOUGH and factor > 1:
+            factor //= 2
+            less = motion._replace(filter=replace(motion.filter, decimation=factor))
+            found = _decimated(made.rows, less, slow)
+    left = {row.signal: k.size for row, k in zip(made.rows, found.kept, strict=True)}
+    left = left if found.decimation.rows else {"all signals": 0}
+    for signal, count in left.items():
+        if count < FEWEST:
+            f = found.motion.filter
+            limit = "by the data" if f.v_min is None else f"{f.v_min:g} m/s"
+            raise ValueError(
+                f"data '{motion.name}': expected at least {FEWEST} equations of {signal} after the "
+                f"filter ({f.cutoff:g} Hz, decimation {f.decimation}, v_min {limit}), got {count}; "
+                "raise the cut-off, lower the decimation or v_min in "
+                "InverseDynamics(filter=Filter(...)), or leave out a part with few equations by "
+                "data.between(begin, end)"
+            )
+    return found
+
+
+def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Piece:
+    n = motion.t[motion.inside].size
+    decimation = Decimation(n, motion.filter.decimation)
+    kept: list[NDArray[np.int64]] = []
+    for row in rows:
+        unsure = np.zeros(n, bool)
+        for k in row.slips:
+            unsure |= slow[k][motion.inside]
+        touched = decimation.touched(unsure) if decimation.rows else np.ones(0, bool)
+        kept.append(np.flatnonzero(~touched))
+    return Piece(motion, decimation, tuple(kept))
+
+
+def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
+    """Return a mask for each contact: samples where its (static) law is undetermined."""
+    if not model.contacts:
+        return []
+    n = motion.t.size
+    v, slopes = (part.full() for part in made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1)))
+    gains = np.median(np.abs(slopes), axis=1).reshape(motion.noise.size, len(model.contacts)).T
+    noise = [float(np.linalg.norm(gain * motion.noise)) for gain in gains]
+    return [
+        uncertain(v[k], noise[k], motion.step, motion.filter) & (not c.states)
+        for k, c in enumerate(model.contacts)
+    ]
+
+
+def _channels(rows: Sequence[Row], pieces: Sequence[Piece]) -> Iterator[Channel]:
+    """Yield each balance of each record."""
+    first = 0
+    for number, part in enumerate(pieces):
+        motion = part.motion
+        times = part.decimation.centres(motion.t[motion.inside])
+        for k, row in enumerate(rows):
+            kept, count = part.kept[k], motion.noise.size
+            q, v, a = motion.w[row.coordinate : 3 * count : count]
+            signals = {"x": q, "v": v, "sign(v)": np.sign(v), "a": a}
+            force = np.zeros_like(q) if row.input is None else motion.w[motion.inputs][row.input]
+            columns = part.equations(k, np.column_stack([force, *signals.values()])).T
+            breaks = tuple((np.flatnonzero(np.diff(kept) > 1) + 1).tolist())
+            regressors = dict(zip(signals, columns[1:], strict=True))
+            place = slice(first, first := first + kept.size)
+            yield Channel(
+                number, row.signal, row.unit, place, times[kept], columns[0], regressors, breaks
+            )
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class InverseRows:
-    """Residuals of `InverseDynamics`; see `Residuals`."""
+class InverseRows(Blocks):
+    """Residuals D (force needed - force measured) of `InverseDynamics`."""
 
-    parameters: tuple[str, ...]
     sampled: Sampled
     rows: tuple[Row, ...]
     pieces: tuple[Piece, ...]
-    dead_time: tuple[float, float] | None
 
-    @property
-    def own(self) -> tuple[Unknown, ...]:
-        """The dead time of each record, if it is requested."""
-        if self.dead_time is None:
-            return ()
-        low, high = self.dead_time
-        return tuple(
-            Unknown(
-                f"dead_time[{k}]", "s", min(max(0.0, low), high), low, high,
-                scale=part.motion.step, nuisance=True,
-            )
-            for k, part in enumerate(self.pieces)
-        )  # fmt: skip
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Parameters of the model, then dead times."""
-        return (*self.parameters, *(unknown.name for unknown in self.own))
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Each balance of each record."""
-        return self._channels
-
-    @cached_property
-    def _channels(self) -> tuple[Channel, ...]:
-        found, first = list[Channel](), 0
+    def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
+        """Yield the residuals of each balance of each record; `own` are dead times."""
         for number, part in enumerate(self.pieces):
-            for k, row in enumerate(self.rows):
-                size = part.kept[k].size
-                q, v, a = part.motion.of(row.coordinate)
-                signals = {"x": q, "v": v, "sign(v)": np.sign(v), "a": a}
-                force = (
-                    np.zeros_like(q)
-                    if row.input is None
-                    else part.motion.w[part.motion.inputs.start + row.input]
-                )
-                columns = part.equations(k, np.column_stack([force, *signals.values()]))
-                breaks = np.flatnonzero(np.diff(part.kept[k]) > 1) + 1
-                found.append(
-                    Channel(
-                        record=number,
-                        signal=row.signal,
-                        unit=row.unit,
-                        rows=slice(first, first + size),
-                        t=part.times(k),
-                        measured=columns[:, 0],
-                        regressors=dict(zip(signals, columns[:, 1:].T, strict=True)),
-                        breaks=tuple(breaks.tolist()),
-                    )
-                )
-                first += size
-        return tuple(found)
-
-    def at(self, values: Array) -> Evaluation | str:
-        """Return the residuals D (force needed - force measured), and their derivatives."""
-        given = np.asarray(values, float)
-        count = len(self.parameters)
-        p, delays = given[:count], given[count:]
-        residuals, slopes = list[Array](), list[Array]()
-        for number, part in enumerate(self.pieces):
-            w, rates = self._shifted(part.motion, float(delays[number]) if delays.size else None)
-            path = self.sampled.along(w, part.motion.step, p, part.motion.begin)
+            motion = part.motion
+            w, rates = _shifted(motion, float(own[number])) if own.size else (motion.w, motion.w)
+            path = self.sampled.along(w, motion.step, p, motion.begin)
             if isinstance(path, str):
-                return f"data '{part.motion.name}': {path}"
+                yield f"data '{motion.name}': {path}"
+                return
             for k, row in enumerate(self.rows):
-                J = np.zeros((part.motion.t.size, given.size))
-                J[:, :count] = path.slopes[:, k]
-                if delays.size and row.input is not None:
-                    J[:, count + number] = rates[row.input]
+                J = np.zeros((motion.t.size, p.size + own.size))
+                J[:, : p.size] = path.slopes[:, k]
+                if own.size and row.input is not None:
+                    J[:, p.size + number] = rates[row.input]
                 both = part.equations(k, np.column_stack([path.rows[:, k], J]))
-                residuals.append(both[:, 0])
-                slopes.append(both[:, 1:])
-        return Evaluation(np.concatenate(residuals), np.vstack(slopes))
+                yield both[:, 0], both[:, 1:]
 
-    def _shifted(self, motion: Motion, delay: float | None) -> tuple[Array, Array]:
-        """Return `w` with the acting force u(t - delay), and du/dt there (inputs, n)."""
-        if delay is None:
-            return motion.w, np.zeros((0, 0))
-        from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
 
-        spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)
-        at = np.clip(motion.t - delay, motion.t[0], motion.t[-1])
-        w = motion.w.copy()
-        w[motion.inputs] = spline(at)
-        return w, np.asarray(spline(at, 1))
+def _shifted(motion: Motion, delay: float) -> tuple[Array, Array]:
+    """Return `w` with the acting force u(t - delay), and du/dt there (inputs, n)."""
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
+
+    spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)
+    at = np.clip(motion.t - delay, motion.t[0], motion.t[-1])
+    w = motion.w.copy()
+    w[motion.inputs] = spline(at)
+    return w, np.asarray(spline(at, 1))

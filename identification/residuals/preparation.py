@@ -6,13 +6,14 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.residuals.evaluation import Channel
 from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
-from identification.residuals.open_loop import SHARE, SUBSTEPS, choose_substeps, why_not
 from identification.residuals.shots import DEAD_TIME, Drives, Shot, Shots, delayed, plain
+from identification.residuals.stepper import why_not_sampled
 from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
@@ -21,6 +22,10 @@ from symfric.foundation.programs import find_compiler
 from symfric.integrator import Hold, Linear
 from symfric.model import Model
 
+SUBSTEPS = (1, 2, 4, 8, 16, 32)
+"""Candidate numbers of steps per sample of the sampled engine."""
+SHARE = 1e-5
+"""Tolerable error over the spread of a signal if the engine is requested: laws err more."""
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
 """Candidate tolerances, and the reference tolerance."""
 BIAS = 0.1
@@ -55,50 +60,39 @@ class Preparation:
         self.hidden = sorted(hidden(model))
         self.signals = self._signals()
         self.inputs = self._inputs()
+        self.channels = {n: c for n, c in self.inputs.items() if isinstance(c, str)}
+        self.others = {n: c for n, c in self.inputs.items() if not isinstance(c, str)}
         self.timeless = self._timeless()
         self._check_x0()
         self.own = list[Unknown]()
-        self.first = len(model.p)
 
     def shots(self) -> Shots:
         """Return the residuals of all records, cut into windows."""
-        given = self.kind.dead_time
-        tau = None if isinstance(given, tuple) else given
-        if isinstance(given, tuple):
-            low, high = given
-            unknown = Unknown(
-                DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
-            )
-            self.own.append(unknown)
+        tau, model = self.kind.dead_time, plain(self.model, self.signals)
+        parameters = tuple(v.name for v in model.p)
+        if isinstance(tau, tuple):
+            if not self.channels:
+                raise ValueError(
+                    "Shooting: dead_time: expected an input that is a channel, got none"
+                )
+            low, high = tau
+            middle = (low + high) / 2
+            self.own.append(Unknown(DEAD_TIME, "s", middle, low, high, high - low, nuisance=True))
+            tau, model = None, delayed(model, [*self.channels])
         pieces, channels, rows = list[Shot](), list[Channel](), 0
         for number, record in enumerate(self.records):
             found = list(self._cut(number, record, rows))
             pieces += found
             channels += self._channels(number, record, found, rows)
             rows = channels[-1].rows.stop
-        model = plain(self.model, self.signals)
-        names = tuple(v.name for v in model.p)
-        if tau is None:
-            sampled = [n for n, given in self.inputs.items() if isinstance(given, str)]
-            if not sampled:
-                raise ValueError(
-                    "Shooting: dead_time: expected an input that is a channel, got none"
-                )
-            model = delayed(model, sampled)
-        backend = "compiled" if find_compiler() else "vm"
         shots = Shots(
-            model=model,
-            parameters=names,
-            own=tuple(self.own),
-            channels=tuple(channels),
-            shots=tuple(pieces),
-            dead_time=tau,
-            rtol=self.kind.rtol or RTOLS[-1],
-            backend=backend,
-        )
-        shots = replace(shots, substeps=self._substeps(shots))
+            parameters, tuple(self.own), tuple(channels), model, tuple(pieces), tau,
+            self.kind.rtol or RTOLS[-1], "compiled" if find_compiler() else "vm",
+        )  # fmt: skip
+        values = np.array([*self.values.values(), *(u.start for u in self.own)])
+        shots = replace(shots, substeps=self._substeps(shots, values))
         if self.kind.rtol is None and not shots.substeps:
-            shots = replace(shots, rtol=self._rtol(shots))
+            shots = replace(shots, rtol=_rtol(shots, values))
         return shots
 
     def easier(self) -> tuple[float, int] | None:
@@ -125,6 +119,7 @@ class Preparation:
     def _signals(self) -> dict[str, str]:
         """Return signal of the model -> channel, for all signals in some record."""
         where, given = "Shooting: signals", self.kind.signals
+        here = sorted({name for record in self.records for name in record.signals})
         driven = {v.name for v in self.model.u}
         known = [n for n in self.model.signals if n not in driven]
         if given is None:
@@ -134,9 +129,8 @@ class Preparation:
         else:
             found = {n: n for n in checks.names(where, given, known)}
         missing = [c for c in found.values() if not any(c in r for r in self.records)]
-        here = sorted({name for record in self.records for name in record.signals})
         if missing or not found:
-            lacking = ", ".join(missing) or ", ".join(known)
+            lacking = ", ".join(missing or known)
             raise ValueError(
                 f"{where}: expected channels for {lacking}, got {', '.join(here)}; name them as "
                 "signals={'signal of the model': 'channel'}"
@@ -147,9 +141,7 @@ class Preparation:
 
     def _same_unit(self, where: str, name: str, unit: str, channel: str) -> None:
         for record in self.records:
-            if channel not in record:
-                continue
-            there = record.unit(channel)
+            there = record.unit(channel) if channel in record else ""
             if unit and there and unit != there:
                 raise ValueError(
                     f"{where}: expected {name} in {unit}, got {channel} of '{record.name}' in "
@@ -163,8 +155,9 @@ class Preparation:
         given = checks.named(where, self.kind.inputs, units)
         found = {name: given.get(name, name) for name in units}
         for name, source in found.items():
-            if not isinstance(source, str):
+            if isinstance(source, Hold | Linear):
                 self._check_span(f"{where}: {name}", source)
+            if not isinstance(source, str):
                 continue
             lacking = [record.name for record in self.records if source not in record]
             if lacking:
@@ -177,17 +170,14 @@ class Preparation:
 
     def _timeless(self) -> bool:
         """Return True if the motion is independent of the time origin (no step resolves 1e9 s)."""
-        given = [u for u in self.inputs.values() if not isinstance(u, str)]
-        model, outputs = self.model, [self.model.outputs[n].expression for n in self.signals
-                                      if n in self.model.outputs]  # fmt: skip
-        equations = [e for e in (model.ode, model.alg, model.residual, *outputs) if e is not None]
-        timed = ca.depends_on(ca.veccat(*map(ca.SX, equations)), model.t)
-        return not timed and not model.events and all(map(is_number, given))
+        model, outputs = self.model, self.model.outputs
+        given = [outputs[n].expression for n in self.signals if n in outputs]
+        parts = [e for e in (model.ode, model.alg, model.residual, *given) if e is not None]
+        timed = ca.depends_on(ca.veccat(*map(ca.SX, parts)), model.t)
+        return not timed and not model.events and all(map(is_number, self.others.values()))
 
-    def _check_span(self, where: str, source: object) -> None:
+    def _check_span(self, where: str, source: Hold | Linear) -> None:
         """Raise ValueError for input samples that do not cover a record."""
-        if not isinstance(source, Hold | Linear):
-            return
         t = np.ravel(np.asarray(source.t, dtype=float))
         slack = float(np.median(np.diff(t))) if t.size > 1 else np.inf  # one number holds always
         for record in self.records:
@@ -199,21 +189,18 @@ class Preparation:
                 )
 
     def _check_x0(self) -> None:
-        if isinstance(self.kind.x0, str):
-            return
-        where = "Shooting: x0"
-        for name, value in checks.named(where, self.kind.x0, self.states).items():
+        given = {} if isinstance(self.kind.x0, str) else self.kind.x0
+        for name, value in checks.named("Shooting: x0", given, self.states).items():
+            where = f"Shooting: x0: {name}"
             if isinstance(value, str):
-                checks.choice(f"{where}: {name}", value, ("estimate",))
-            elif np.ndim(value):
-                numbers = checks.array(f"{where}: {name}", value)
-                if numbers.size != len(self.records):
-                    raise ValueError(
-                        f"{where}: {name}: expected a number for each of the {len(self.records)} "
-                        f"records, got {numbers.size}"
-                    )
-            else:
-                checks.number(f"{where}: {name}", value)
+                checks.choice(where, value, ("estimate",))
+            elif not np.ndim(value):
+                checks.number(where, value)
+            elif (size := checks.array(where, value).size) != len(self.records):
+                raise ValueError(
+                    f"{where}: expected a number for each of the {len(self.records)} records, got "
+                    f"{size}"
+                )
 
     # ---- windows of records
 
@@ -228,38 +215,20 @@ class Preparation:
                 f"'{record.name}', got {', '.join(record.signals)}"
             )
         sensed = Sensed.of(self.model, t, {s: y for s, y in measured.items() if s in self.states})
-        windows = cut(t, self.kind.seconds, sensed.speed if sensed.slips else None)
-        windows = windows[:: self.every]
-        every = self.kind.every
-        looks = [np.arange(w.start, w.stop, every) for w in windows]
+        windows = cut(t, self.kind.seconds, sensed.speed if sensed.slips else None)[:: self.every]
+        looks = [np.arange(w.start, w.stop, self.kind.every) for w in windows]
         total = sum(look.size for look in looks)
-        done = 0
-        drives = Drives(
-            t,
-            {n: record[c] for n, c in self.inputs.items() if isinstance(c, str)},
-            {n: given for n, given in self.inputs.items() if not isinstance(given, str)},
-            self.kind.interpolation == "hold",
-        )
+        sampled = {n: record[c] for n, c in self.channels.items()}
+        drives = Drives(t, sampled, self.others, self.kind.interpolation == "hold")
         for w, look in enumerate(looks):
-            places = {
-                s: slice(row + k * total + done, row + k * total + done + look.size)
-                for k, s in enumerate(measured)
-            }
+            firsts = range(row, row + len(measured) * total, total)
+            places = {s: slice(k, k + look.size) for s, k in zip(measured, firsts, strict=True)}
             label = f"[{number}]" if len(windows) == 1 else f"[{number},{w}]"
             held, free = self._start(number, sensed, int(look[0]), label)
-            last = windows[w].stop - 1
-            yield Shot(
-                record=record.name,
-                origin=origin,
-                t=t[look],
-                end=float(t[last]),
-                measured={s: y[look] for s, y in measured.items()},
-                places=places,
-                drives=drives,
-                held=held,
-                free=free,
-            )
-            done += look.size
+            here = {s: y[look] for s, y in measured.items()}
+            end = float(t[windows[w].stop - 1])
+            yield Shot(record.name, origin, t[look], end, here, places, drives, held, free)
+            row += look.size
 
     def _start(
         self, number: int, sensed: Sensed, k: int, label: str
@@ -284,7 +253,7 @@ class Preparation:
             ):
                 held[v.name] = here.value
             else:
-                free[v.name] = self.first + len(self.own)
+                free[v.name] = len(self.model.p) + len(self.own)
                 self.own.append(self._unknown(v, here, label, begin))
         return held, free
 
@@ -303,62 +272,73 @@ class Preparation:
     ) -> Iterator[Channel]:
         t = np.concatenate([piece.origin + piece.t for piece in pieces])
         breaks = tuple(np.cumsum([piece.t.size for piece in pieces])[:-1].tolist())
-        inputs = {n: np.interp(t, record.time, record[c])
-                  for n, c in self.inputs.items() if isinstance(c, str)}  # fmt: skip
+        inputs = {n: np.interp(t, record.time, record[c]) for n, c in self.channels.items()}
         for s in pieces[0].measured:
-            y = np.concatenate([piece.measured[s] for piece in pieces])
-            yield Channel(
-                record=number,
-                signal=s,
-                unit=self.model.signals[s],
-                rows=slice(row, row + t.size),
-                t=t,
-                measured=y,
-                regressors=inputs,
-                breaks=breaks,
-            )
-            row += t.size
+            y, unit = np.concatenate([piece.measured[s] for piece in pieces]), self.model.signals[s]
+            rows = slice(row, row := row + t.size)
+            yield Channel(number, s, unit, rows, t, y, inputs, breaks)
 
     # ---- accuracy
 
-    def _substeps(self, shots: Shots) -> int:
-        """Return the steps per sample of the sampled engine; 0 if `simulate` runs."""
+    def _substeps(self, shots: Shots, values: NDArray[np.float64]) -> int:
+        """Return the steps per sample of the sampled engine; 0 if `simulate` runs.
+
+        It is the smallest number whose error is tolerable.
+        """
         engine = self.kind.engine
-        why = "" if engine == "simulate" else why_not(self.model, list(self.signals), self.inputs)
+        why = "" if engine == "simulate" else self._why_not_sampled()
         if engine == "sampled" and why:
             raise ValueError(f"Shooting: engine: model '{self.model.name}': {why}")
         wanted = self.kind.rtol is None and bool(self.model.contacts)
         if engine == "simulate" or why or (engine == "auto" and not wanted):
             return 0
-        values = np.array([*self.values.values(), *(u.start for u in self.own)])
-        tolerable = list[tuple[slice, float]]()
+        most = list[float]()
         for c in shots.channels:
             noise, share = noise_of(c.measured), SHARE * float(np.std(c.measured))
             exact = BIAS * noise / np.sqrt(shots.rows)  # as `_rtol` requires of `simulate`
-            tolerable.append((c.rows, exact if engine == "auto" else max(noise, share)))
-        found = choose_substeps(lambda n: replace(shots, substeps=n).predicted(values), tolerable)
-        if found is None:
-            return 0 if engine == "auto" else SUBSTEPS[-1]
-        return found
-
-    def _rtol(self, shots: Shots) -> float:
-        """Return the loosest tolerance that biases no estimate by a tenth of its standard error.
-
-        An error e of the simulation moves estimates by at most |e / noise| standard errors,
-        independent of the number of samples. It is evaluated at the start values.
-        """
-        values = np.array([*self.values.values(), *(u.start for u in self.own)])
-        fine = replace(shots, rtol=FINEST).predicted(values)
-        if isinstance(fine, str):
-            return RTOLS[-1]
-        noise = np.empty(fine.size)
-        for channel in shots.channels:
-            size = float(np.abs(channel.measured).max()) or np.inf
-            noise[channel.rows] = max(noise_of(channel.measured), NOISELESS * size)
-        for rtol in RTOLS[:-1]:
-            found = replace(shots, rtol=rtol).predicted(values)
-            if isinstance(found, str):
+            most.append(exact if engine == "auto" else max(noise, share))
+        coarse = replace(shots, substeps=SUBSTEPS[0]).predicted(values)
+        for substeps in SUBSTEPS:
+            fine = replace(shots, substeps=2 * substeps).predicted(values)
+            if isinstance(coarse, str) or isinstance(fine, str):
                 break
-            if np.linalg.norm((found - fine) / noise) <= BIAS:
-                return rtol
+            errors = [np.sqrt(np.mean((fine - coarse)[c.rows] ** 2)) for c in shots.channels]
+            if all(error <= limit for error, limit in zip(errors, most, strict=True)):
+                return substeps
+            coarse = fine
+        return 0 if engine == "auto" else SUBSTEPS[-1]
+
+    def _why_not_sampled(self) -> str:
+        """Return the reason why the sampled engine does not suit the windows; "" if it does."""
+        others = [name for name in self.signals if name not in self.states]
+        odd = [n for n, given in self.others.items() if not is_number(given)]
+        states = ", ".join(self.states)
+        why = why_not_sampled(self.model)
+        if not why and others:
+            why = f"expected signals among the states {states}, got {', '.join(others)}"
+        if not why and odd:
+            got = ", ".join(odd)
+            why = f"expected inputs that are channels or numbers, got another type for {got}"
+        return why
+
+
+def _rtol(shots: Shots, values: NDArray[np.float64]) -> float:
+    """Return the loosest tolerance that biases no estimate by a tenth of its standard error.
+
+    An error e of the simulation moves estimates by at most |e / noise| standard errors,
+    independent of the number of samples. It is evaluated at the start values.
+    """
+    fine = replace(shots, rtol=FINEST).predicted(values)
+    if isinstance(fine, str):
         return RTOLS[-1]
+    noise = np.empty(fine.size)
+    for channel in shots.channels:
+        size = float(np.abs(channel.measured).max()) or np.inf
+        noise[channel.rows] = max(noise_of(channel.measured), NOISELESS * size)
+    for rtol in RTOLS[:-1]:
+        found = replace(shots, rtol=rtol).predicted(values)
+        if isinstance(found, str):
+            break
+        if np.linalg.norm((found - fine) / noise) <= BIAS:
+            return rtol
+    return RTOLS[-1]

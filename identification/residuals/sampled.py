@@ -3,10 +3,10 @@
 States of laws follow the imposed velocity and normal force from sample to sample (`imposed_step`).
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -51,52 +51,33 @@ def imposed_step(
     Raises:
         ValueError: a law whose modes or states are coupled: only a simulation can follow it.
     """
+    from symfric.codegen.blocks.held_step import advanced  # noqa: PLC0415 (slow to import)
+    from symfric.laws import GMS  # noqa: PLC0415 (slow to import)
+
     v, N, size = (ca.SX.sym(name) for name in ("v", "N", "h"))
     names = list(before[2])
     given = {name: ca.SX.sym(name) for name in names}
     rate = ca.SX(law.rate(v, N, z, **given))
-    end = _held(law, v, N, z, rate, given, size, where)
-    inner = ca.vertcat(v, N, *given.values())
-
-    first, last = (_stacked(point, names) for point in (before, after))
-    crosses = first[0] * last[0] < 0
-    share = ca.if_else(crosses, first[0] / (first[0] - last[0] + (1 - crosses)), 0.5)
-    middle = first + share * (last - first)
-    middle[0] = ca.if_else(crosses, 0, middle[0])
-    old = ca.vertcat(inner, size)
-    half = ca.substitute(end, old, ca.vertcat((first + middle) / 2, share * h))
-    new = ca.vertcat((middle + last) / 2, (1 - share) * h, half)
-    return ca.substitute(end, ca.vertcat(old, z), new)
-
-
-def _held(
-    law: Law,
-    v: ca.SX,
-    N: ca.SX,
-    z: ca.SX,
-    rate: ca.SX,
-    given: Mapping[str, ca.SX],
-    h: ca.SX,
-    where: str,
-) -> ca.SX:
-    """Return the states after a step with constant inputs."""
-    from symfric.codegen.blocks.held_step import advanced  # noqa: PLC0415 (slow to import)
-    from symfric.laws import GMS  # noqa: PLC0415 (slow to import)
-
+    stepped = law
     if isinstance(law, GMS) and law.form != "event":
-        law = replace(law, form="event")
+        stepped = replace(law, form="event")
     try:
-        return advanced(law, v, N, z, rate, given, h, where).end
+        end = advanced(stepped, v, N, z, rate, given, size, where).end
     except ValueError:
         raise ValueError(
             f"{where}: expected a law with a step for imposed velocity, got {type(law).__name__}, "
             "whose modes or states are coupled; use Shooting(), which simulates"
         ) from None
-
-
-def _stacked(point: tuple[Scalar, Scalar, Mapping[str, Scalar]], names: list[str]) -> ca.SX:
-    v, N, given = point
-    return ca.vertcat(ca.SX(v), ca.SX(N), *(ca.SX(given[name]) for name in names))
+    first, last = (ca.vertcat(ca.SX(v), ca.SX(N), *(ca.SX(inputs[name]) for name in names))
+                   for v, N, inputs in (before, after))  # fmt: skip
+    crosses = first[0] * last[0] < 0
+    share = ca.if_else(crosses, first[0] / (first[0] - last[0] + (1 - crosses)), 0.5)
+    middle = first + share * (last - first)
+    middle[0] = ca.if_else(crosses, 0, middle[0])
+    old = ca.vertcat(v, N, *given.values(), size)
+    half = ca.substitute(end, old, ca.vertcat((first + middle) / 2, share * h))
+    new = ca.vertcat((middle + last) / 2, (1 - share) * h, half)
+    return ca.substitute(end, ca.vertcat(old, z), new)
 
 
 def moving_start(v: Array) -> float:
@@ -115,83 +96,8 @@ SETTLED = 1e-9
 """Change of the algebraic unknowns, over their size, below which they are converged."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Equations:
-    """Equations at each sample of a record, in symbols.
-
-        0 = g(w, z, y, p)                 algebraic unknowns y: reactions, normal forces
-        z_{k+1} = step(z_k, w_k, y_k, w_{k+1}, y_{k+1}, h, p),   z_0 = start(w_0, y_0, p)
-        r = rows(w, z, y, p)
-
-    Attributes:
-        w, z, y, p: SX symbols of measured quantities, law states, unknowns, parameters.
-        rows, g, start: SX expressions in them.
-        step: SX expression in z, w, y, p, `h` and `later`, the symbols of w_{k+1} and y_{k+1}.
-        guess: start values of y, shape (ny,).
-    """
-
-    w: ca.SX
-    p: ca.SX
-    rows: ca.SX
-    z: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    y: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    g: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    step: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    later: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    h: ca.SX = field(default_factory=lambda: ca.SX.sym("h"))
-    guess: tuple[float, ...] = ()
-
-    def compiled(self) -> "Sampled":
-        """Return the equations as Functions, which can be evaluated and pickled."""
-        here, along = ca.vertcat(self.w, self.y), ca.vertcat(self.z, self.y, self.p)
-
-        def with_slopes(name: str, of: ca.SX) -> ca.Function:
-            slopes = ca.vec(ca.densify(ca.jacobian(of, along)))
-            return ca.Function(f"sampled_{name}", [here, self.z, self.p], [ca.densify(of), slopes])
-
-        return Sampled(
-            with_slopes("rows", self.rows),
-            with_slopes("g", self.g),
-            with_slopes("start", self.start),
-            *self._steps(here),
-            (self.w.numel(), self.z.numel(), self.y.numel(), self.p.numel()),
-            np.array(self.guess, float),
-        )
-
-    def _steps(self, here: ca.SX) -> tuple[ca.Function, ca.Function]:
-        """Return the step, and the step with the derivatives S of the states by p.
-
-        The derivatives of y are Y at the sample and Y_later at the next one.
-        """
-        nw, nz, ny, count = (x.numel() for x in (self.w, self.z, self.y, self.p))
-        later = self.later if nz else ca.SX.sym("later", nw + ny)
-        S, Y, Y_later = (ca.SX.sym(n, k, count) for n, k in (("S", nz), ("Y", ny), ("Yl", ny)))
-        slope = (
-            ca.mtimes(ca.jacobian(self.step, self.z), S)
-            + ca.jacobian(self.step, self.p)
-            + ca.mtimes(ca.jacobian(self.step, self.y), Y)
-            + ca.mtimes(ca.jacobian(self.step, later[nw:, 0]), Y_later)
-        )
-        both = ca.vertcat(self.z, ca.vec(S))
-        new = ca.vertcat(self.step, ca.vec(ca.densify(slope)))
-        given, further = [here, later, self.h], [ca.vec(Y), ca.vec(Y_later), self.p]
-        return (
-            ca.Function("sampled_step", [self.z, *given, self.p], [ca.densify(self.step)]),
-            ca.Function("sampled_tangent", [both, *given, *further], [ca.densify(new)]),
-        )
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Path:
-    """Rows along a record of n samples.
-
-    Attributes:
-        rows: (n, m).
-        slopes: their derivatives by p, (n, m, n_p).
-    """
+class Path(NamedTuple):
+    """Rows along a record of n samples, (n, m), and their derivatives by p, (n, m, n_p)."""
 
     rows: Array
     slopes: Array
@@ -200,10 +106,20 @@ class Path:
 @final
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """`Equations` as numeric Functions; `sizes` are those of w, z, y and p.
+    """Equations at each sample of a record, as numeric Functions.
+
+        0 = g(w, z, y, p)                 algebraic unknowns y: reactions, normal forces
+        z_{k+1} = step(z_k, w_k, y_k, w_{k+1}, y_{k+1}, h, p),   z_0 = start(w_0, y_0, p)
+        r = rows(w, z, y, p)
 
     Laws with states run in compiled code if there is a compiler, all others in CasADi's virtual
     machine; both give the same bits.
+
+    Attributes:
+        rows, g, start: Functions of (w, y), z, p with derivatives by (z, y, p).
+        step, tangent: the step, and the step of z with its derivatives by p.
+        sizes: of w, z, y and p.
+        guess: start values of y, shape (ny,).
     """
 
     rows: ca.Function
@@ -214,24 +130,69 @@ class Sampled:
     sizes: tuple[int, int, int, int]
     guess: Array
 
+    @classmethod
+    def of(
+        cls, w: ca.SX, p: ca.SX, rows: ca.SX, *,
+        z: ca.SX | None = None, start: ca.SX | None = None, step: ca.SX | None = None,
+        later: ca.SX | None = None, h: ca.SX | None = None,
+        y: ca.SX | None = None, g: ca.SX | None = None, guess: Sequence[float] = (),
+    ) -> "Sampled":  # fmt: skip
+        """Return the Functions of SX expressions.
+
+        Args:
+            w, z, y, p: symbols of measured quantities, law states, unknowns, parameters.
+            rows, g, start: expressions in them.
+            step: expression in z, w, y, p, `h` and `later`, the symbols of w_{k+1} and y_{k+1}.
+            guess: start values of y, shape (ny,).
+        """
+        none = ca.SX(0, 1)
+        z, y, g, start, step = (none if x is None else x for x in (z, y, g, start, step))
+        nw, nz, ny, count = sizes = (w.numel(), z.numel(), y.numel(), p.numel())
+        h = ca.SX.sym("h") if h is None else h
+        later = later if nz and later is not None else ca.SX.sym("later", nw + ny)
+        here, along = ca.vertcat(w, y), ca.vertcat(z, y, p)
+
+        def with_slopes(name: str, of: ca.SX) -> ca.Function:
+            slopes = ca.vec(ca.densify(ca.jacobian(of, along)))
+            return ca.Function(f"sampled_{name}", [here, z, p], [ca.densify(of), slopes])
+
+        # derivatives by p: S of the states, Y of y at the sample, Y_later at the next one
+        S, Y, Y_later = (ca.SX.sym(n, k, count) for n, k in (("S", nz), ("Y", ny), ("Yl", ny)))
+        slope = (
+            ca.mtimes(ca.jacobian(step, z), S)
+            + ca.jacobian(step, p)
+            + ca.mtimes(ca.jacobian(step, y), Y)
+            + ca.mtimes(ca.jacobian(step, later[nw:, 0]), Y_later)
+        )
+        given, moved = [here, later, h], [ca.vec(Y), ca.vec(Y_later)]
+        both, new = ca.vertcat(z, ca.vec(S)), ca.vertcat(step, ca.vec(ca.densify(slope)))
+        return cls(
+            with_slopes("rows", rows),
+            with_slopes("g", g),
+            with_slopes("start", start),
+            ca.Function("sampled_step", [z, *given, p], [ca.densify(step)]),
+            ca.Function("sampled_tangent", [both, *given, *moved, p], [ca.densify(new)]),
+            sizes,
+            np.array(guess, float),
+        )
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields; a copy compiles or loads its own code."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
     def _columns(self) -> dict[str, Columns]:
-        chained = {"step": True, "tangent": True}
         names = ("rows", "g", "start", "step", "tangent")
-        return {n: Columns(getattr(self, n), chained.get(n, False)) for n in names}
+        return {n: Columns(getattr(self, n), n in ("step", "tangent")) for n in names}
 
-    def _run(self, name: str, rows: list[Any], first: Array | None = None) -> list[Array]:
-        columns = self._columns[name]
+    def run(self, name: str, rows: list[Any], first: Array | None = None) -> list[Array]:
+        """Return the results of a Function for all `rows`, see `Columns`."""
         if self.sizes[1] and name != "start" and find_compiler() is not None:
             try:
-                return columns(rows, first, "compiled")
+                return self._columns[name](rows, first, "compiled")
             except CompileError:  # a broken compiler is no reason not to evaluate
                 pass
-        return columns(rows, first, "vm")
+        return self._columns[name](rows, first, "vm")
 
     def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
         """Return rows at all samples and their derivatives by p, or a message on a failure.
@@ -242,24 +203,36 @@ class Sampled:
             h: sample interval [s], one or (n - 1,); not used without states.
             p: parameters, shape (n_p,).
         """
-        n, (_, nz, ny, _) = w.shape[1], self.sizes
-        w, z, y = w.T, np.zeros((n, nz)), np.repeat(self.guess[None, :], n, axis=0)
-        first = w[0] if begin is None else begin
-        for _ in range(ROUNDS if nz and ny else 1):
-            old = y
-            if ny:
-                found = self._solve(w, z, y, p)
-                if isinstance(found, str):
-                    return found
-                y = found
+        return _Along(self, w.T, h, p, w[:, 0] if begin is None else begin).path()
+
+
+class _Along:
+    """Evaluation of a record of n samples at the parameters p."""
+
+    def __init__(self, of: Sampled, w: Array, h: float | Array, p: Array, begin: Array) -> None:
+        self.of, self.w, self.p, self.begin, self.n = of, w, p, begin, w.shape[0]
+        _, self.nz, self.ny, self.count = of.sizes
+        self.h = np.ascontiguousarray(np.broadcast_to(h, self.n - 1).reshape(-1, 1))
+        self.z = np.zeros((self.n, self.nz))
+        self.y = np.repeat(of.guess[None, :], self.n, axis=0)
+        self.rounds = ROUNDS if self.nz and self.ny else 1
+
+    def path(self) -> Path | str:
+        """Return the rows and their derivatives."""
+        nz, ny = self.nz, self.ny
+        for _ in range(self.rounds):
+            old = self.y
+            why = self.solve() if ny else ""
+            if why:
+                return why
             if nz:
-                z = self._states(w, y, h, p, first)
-            if not (nz and ny) or _settled(old, y):
+                self.z = self.states()
+            if self.rounds == 1 or _settled(old, self.y):
                 break
         else:
             return "friction and the reactions that load it did not converge"
-        dz, dy = self._tangents(w, z, y, h, p, first)
-        r, at = self._at("rows", w, z, y, p)
+        dz, dy = self.tangents()
+        r, at = self.at("rows")
         slopes = at[:, :, nz + ny :].copy()
         if nz:
             slopes += at[:, :, :nz] @ dz
@@ -269,78 +242,75 @@ class Sampled:
             return "the friction law is not finite at some samples"
         return Path(r, slopes)
 
-    def _at(self, name: str, w: Array, z: Array, y: Array, p: Array) -> tuple[Array, Array]:
-        """Return values (n, m) and derivatives (n, m, k) of a function at all samples."""
-        n = w.shape[0]
-        value, slopes = self._run(name, [np.hstack([w, y]), z, _same(p, n)])
+    def at(self, name: str) -> tuple[Array, Array]:
+        """Return values (n, m) and derivatives (n, m, k) of a Function at all samples."""
+        return self.evaluated(name, np.hstack([self.w, self.y]), self.z)
+
+    def first(self) -> tuple[Array, Array]:
+        """Return the states at the first sample and their derivatives."""
+        here = np.hstack([self.begin[None], self.y[:1]])
+        value, slopes = self.evaluated("start", here, self.z[:1])
+        return value[0], slopes[0]
+
+    def evaluated(self, name: str, here: Array, z: Array) -> tuple[Array, Array]:
+        """Return values and derivatives of a Function at some samples."""
+        n = here.shape[0]
+        value, slopes = self.of.run(name, [here, z, _same(self.p, n)])
         return value, slopes.reshape(n, -1, value.shape[1]).transpose(0, 2, 1)
 
-    def _solve(self, w: Array, z: Array, y: Array, p: Array) -> Array | str:
-        """Solve for the algebraic unknowns of all samples by Newton's method."""
-        nz, ny = self.sizes[1:3]
+    def solve(self) -> str:
+        """Solve for the algebraic unknowns of all samples by Newton's method; or say why not."""
+        y_columns = slice(self.nz, self.nz + self.ny)
         for _ in range(NEWTON):
-            g, slopes = self._at("g", w, z, y, p)
+            g, slopes = self.at("g")
             try:
-                step = np.linalg.solve(slopes[:, :, nz : nz + ny], g[:, :, None])[:, :, 0]
+                step = np.linalg.solve(slopes[:, :, y_columns], g[:, :, None])[:, :, 0]
             except np.linalg.LinAlgError:
                 return "the motion does not determine the reactions at some samples"
             if not np.isfinite(step).all():
                 return "the equations of the reactions are not finite at some samples"
-            y = y - step
-            if _settled(y + step, y):
-                return y
+            self.y = self.y - step
+            if _settled(self.y + step, self.y):
+                return ""
         return "the reactions were not found by Newton's method at some samples"
 
-    def _states(self, w: Array, y: Array, h: float | Array, p: Array, begin: Array) -> Array:
-        """Return the states of the laws along the record, (n, nz)."""
-        n = w.shape[0]
-        here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
-        first = self._at("start", begin[None], np.zeros((1, self.sizes[1])), y[:1], p)[0]
-        given = [here[:-1], here[1:], np.ascontiguousarray(steps), _same(p, n - 1)]
-        return np.vstack([first, self._run("step", given, first[0])[0]])
+    def chained(self, name: str, first: Array, *given: Array) -> Array:
+        """Return all results of a Function that is applied from sample to sample, `first` first."""
+        here = np.hstack([self.w, self.y])
+        rows = [here[:-1], here[1:], self.h, *given, _same(self.p, self.n - 1)]
+        return np.vstack([first[None, :], self.of.run(name, rows, first)[0]])
 
-    def _tangents(
-        self, w: Array, z: Array, y: Array, h: float | Array, p: Array, begin: Array
-    ) -> tuple[Array, Array]:
+    def states(self) -> Array:
+        """Return the states of the laws along the record, (n, nz)."""
+        return self.chained("step", self.first()[0])
+
+    def tangents(self) -> tuple[Array, Array]:
         """Return derivatives of states (n, nz, n_p) and unknowns (n, ny, n_p) by the parameters."""
-        n, (_, nz, ny, count) = w.shape[0], self.sizes
-        dz, dy = np.zeros((n, nz, count)), np.zeros((n, ny, count))
-        by_z, by_p = np.zeros((n, ny, nz)), np.zeros((n, ny, count))
+        nz, ny = self.nz, self.ny
+        dz, dy = np.zeros((self.n, nz, self.count)), np.zeros((self.n, ny, self.count))
+        by_z, by_p = np.zeros((self.n, ny, nz)), dy
         if ny:
-            slopes = self._at("g", w, z, y, p)[1]
+            slopes = self.at("g")[1]
             known = np.concatenate([slopes[:, :, :nz], slopes[:, :, nz + ny :]], axis=2)
             found = -np.linalg.solve(slopes[:, :, nz : nz + ny], known)
             by_z, by_p = found[:, :, :nz], found[:, :, nz:]
-        for _ in range(ROUNDS if nz and ny else 1):
+        for _ in range(self.rounds):
             old, dy = dy, by_z @ dz + by_p
             if nz:
-                dz = self._tangent(w, z, y, dy, h, p, begin)
-            if not (nz and ny) or _settled(old, dy):
+                dz = self.tangent(dy)
+            if self.rounds == 1 or _settled(old, dy):
                 break
         return dz, dy
 
-    def _tangent(
-        self,
-        w: Array,
-        z: Array,
-        y: Array,
-        dy: Array,
-        h: float | Array,
-        p: Array,
-        begin: Array,
-    ) -> Array:
+    def tangent(self, dy: Array) -> Array:
         """Return the derivatives of the states by the parameters, given those of y, dy."""
-        n, (_, nz, ny, count) = w.shape[0], self.sizes
-        first = self._at("start", begin[None], z[:1], y[:1], p)[1][0]
+        nz, ny = self.nz, self.ny
+        first = self.first()[1]
         S = first[:, nz + ny :] + first[:, nz : nz + ny] @ dy[0]
-        here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
-        flat = np.ascontiguousarray(dy.transpose(0, 2, 1)).reshape(n, count * ny)
-        given = [
-            here[:-1], here[1:], np.ascontiguousarray(steps), flat[:-1], flat[1:], _same(p, n - 1),
-        ]  # fmt: skip
-        start = np.concatenate([z[0], S.T.ravel()])
-        both = np.vstack([start[None, :], self._run("tangent", given, start)[0]])
-        return both[:, nz:].reshape(n, count, nz).transpose(0, 2, 1)
+        flat = np.ascontiguousarray(dy.transpose(0, 2, 1)).reshape(self.n, self.count * ny)
+        start = np.concatenate([self.z[0], S.T.ravel()])
+        both = self.chained("tangent", start, flat[:-1], flat[1:])
+        return both[:, nz:].reshape(self.n, self.count, nz).transpose(0, 2, 1)
 
 
 def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
@@ -350,7 +320,5 @@ def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
 
 def _settled(old: Array, new: Array) -> bool:
     """Return True if only rounding has changed."""
-    if not new.size:
-        return True
-    size = max(float(np.abs(new).max()), 1e-12)
-    return bool(np.abs(new - old).max() <= SETTLED * size)
+    size = max(float(np.abs(new).max(initial=0.0)), 1e-12)
+    return bool(np.abs(new - old).max(initial=0.0) <= SETTLED * size)

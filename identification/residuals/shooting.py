@@ -41,14 +41,6 @@ samples than `LEAST` times the fewest determine their start values poorly.
 """
 
 
-def lengths(data: Dataset) -> list[float | None]:
-    """Return the lengths to try [s]; None is whole records."""
-    span = max(float(r.time[-1] - r.time[0]) for r in data)
-    least = LEAST * FEWEST * max(r.median_step for r in data)
-    shorter = [span / 2 ** (k + 1) for k in range(LENGTHS)]
-    return [None, *(s for s in shorter if s >= least)]
-
-
 def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "Shooting":
     """Return `kind` with windows of the length that predicts left-out quarters best.
 
@@ -64,7 +56,11 @@ def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "
     # parts of a record begin anywhere; the tolerance of usual data saves a search
     x0 = "data" if kind.x0 == "data" else "estimate"
     fixed = replace(kind, x0=x0, rtol=kind.rtol or RTOL)
-    errors = {s: _left_out(replace(fixed, windows=s), subject, data, solve) for s in lengths(data)}
+    span = max(float(r.time[-1] - r.time[0]) for r in data)
+    least = LEAST * FEWEST * max(r.median_step for r in data)
+    shorter = (span / 2 ** (k + 1) for k in range(LENGTHS))
+    tried = [None, *(s for s in shorter if s >= least)]
+    errors = {s: _left_out(replace(fixed, windows=s), subject, data, solve) for s in tried}
     best = min(errors, key=lambda s: errors[s])
     if not np.isfinite(errors[best]):
         raise ValueError(
@@ -106,11 +102,11 @@ def _free_run(
     predicted = shots.predicted(np.array([{**values, **own}[name] for name in shots.names]))
     if isinstance(predicted, str):
         return np.inf
-    errors = list[float]()
-    for c in shots.channels:
-        size = float(np.var(c.measured))
-        if size > 0:
-            errors.append(float(np.mean((predicted[c.rows] - c.measured) ** 2)) / size)
+    errors = [
+        float(np.mean((predicted[c.rows] - c.measured) ** 2)) / size
+        for c in shots.channels
+        if (size := float(np.var(c.measured))) > 0
+    ]
     return float(np.mean(errors)) if errors else np.inf
 
 
@@ -178,46 +174,42 @@ class Shooting:
         elif windows is not None:
             seconds = checks.number(f"{where}: windows", windows, unit="s", above=0.0)
             object.__setattr__(self, "windows", seconds)
-        self._check_names()
+        if isinstance(self.signals, Mapping):
+            for channel in checks.named(f"{where}: signals", self.signals).values():
+                checks.text(f"{where}: signals", channel, "signal -> name of a channel")
+        elif self.signals is not None:
+            checks.names(f"{where}: signals", self.signals)
+        checks.named(f"{where}: inputs", self.inputs)
         if isinstance(self.x0, str):
             checks.choice(f"{where}: x0", self.x0, ("estimate", "data", "given"))
-        else:
+        elif self.x0 is None:  # pyright: ignore[reportUnnecessaryComparison]
             such = "'estimate', 'given', or values by state"
-            if self.x0 is None:  # pyright: ignore[reportUnnecessaryComparison]
-                raise checks.refused(f"{where}: x0", such, self.x0)
+            raise checks.refused(f"{where}: x0", such, self.x0)
+        else:
             object.__setattr__(self, "x0", checks.named(f"{where}: x0", self.x0))
         checks.choice(f"{where}: interpolation", self.interpolation, INTERPOLATIONS)
         object.__setattr__(self, "every", checks.count(f"{where}: every", self.every))
         checks.choice(f"{where}: engine", self.engine, ENGINES)
         if self.rtol is not None:
             checks.number(f"{where}: rtol", self.rtol, above=0.0, upper=0.1)
-        self._check_dead_time()
+        object.__setattr__(self, "dead_time", self._checked_dead_time())
 
-    def _check_names(self) -> None:
-        where, signals = "Shooting: signals", self.signals
-        if isinstance(signals, Mapping):
-            for channel in checks.named(where, signals).values():
-                checks.text(where, channel, "signal -> name of a channel")
-        elif signals is not None:
-            checks.names(where, signals)
-        if self.inputs is not None:
-            checks.named("Shooting: inputs", self.inputs)
-
-    def _check_dead_time(self) -> None:
+    def _checked_dead_time(self) -> float | tuple[float, float]:
         where, given = "Shooting: dead_time", self.dead_time
-        bounds = given if isinstance(given, tuple) else (given,)
-        if len(bounds) > 2 or (isinstance(given, tuple) and len(bounds) < 2):
+        if not isinstance(given, tuple):
+            return checks.number(where, given, unit="s", lower=0.0)
+        if len(given) != 2:
             raise checks.refused(where, "seconds, or (low, high) to estimate it between", given)
-        numbers = tuple(checks.number(where, x, unit="s", lower=0.0) for x in bounds)
-        if len(numbers) == 2 and numbers[0] >= numbers[1]:
+        low, high = (checks.number(where, x, unit="s", lower=0.0) for x in given)
+        if low >= high:
             raise checks.refused(where, "(low, high) with low < high", given)
-        if len(numbers) == 2 and self.interpolation == "hold":
+        if self.interpolation == "hold":
             raise ValueError(
                 f"{where}: expected interpolation='linear' where it is estimated, got 'hold', "
                 "whose motion has no derivative by it; a held input is about a linear one that "
                 "comes half a sample later"
             )
-        object.__setattr__(self, "dead_time", numbers if len(numbers) == 2 else numbers[0])
+        return low, high
 
     @property
     def seconds(self) -> float | None:

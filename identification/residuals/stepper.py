@@ -22,7 +22,7 @@ compiled C if there is a compiler, else in CasADi's virtual machine: both give t
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, cast, final
 
 import casadi as ca
 import numpy as np
@@ -42,8 +42,6 @@ LOOSE = 2e-2
 """Largest residual of the implicit equation, over its velocities, that counts as solved."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
 class Mass:
     """Equations of one mass, x' = v and v' = a(x, v, u, p), and their derivatives.
 
@@ -52,62 +50,42 @@ class Mass:
         slopes: (x, v, u, p) -> a, a_x, a_v, a_u, a_p.
         bends: (x, v, u, p) -> derivatives of a_v by x, v, u, p.
         newton: (x, v, u, p) -> a, a_v.
-        inputs, parameters: names of u and p.
-        states: names of x and v.
+        inputs: names of u.
+        parameters: number of p.
         creep: speed [velocity unit] below which a held mass is at rest.
+
+    Raises:
+        ValueError: states other than a position and its velocity (a law with own states), algebraic
+            variables, events, or equations with time.
     """
 
-    a: ca.Function
-    slopes: ca.Function
-    bends: ca.Function
-    newton: ca.Function
-    inputs: tuple[str, ...]
-    parameters: tuple[str, ...]
-    states: tuple[str, str]
-    creep: float
-
-    @classmethod
-    def of(cls, model: Model) -> "Mass":
-        """Return the mass of `model`.
-
-        Raises:
-            ValueError: states other than a position and its velocity (a law with own states),
-                algebraic variables, events, or equations with time.
-        """
+    def __init__(self, model: Model) -> None:
         wrong = why_not_sampled(model)
         if wrong:
             raise ValueError(f"sampled motion of '{model.name}': {wrong}")
-        x, v = (variable.symbol for variable in model.x)
-        u, p = model.vector("u"), model.vector("p")
-        a, at = _equations(model)[1], [x, v, u, p]
-        a_v = ca.jacobian(a, v)
-        return cls(
-            a=ca.Function("a", at, [a]),
-            slopes=ca.Function("slopes", at, [a, *(ca.jacobian(a, q) for q in at)]),
-            bends=ca.Function("bends", at, [ca.jacobian(a_v, q) for q in at]),
-            newton=ca.Function("newton", at, [a, a_v]),
-            inputs=tuple(variable.name for variable in model.u),
-            parameters=tuple(variable.name for variable in model.p),
-            states=(model.x[0].name, model.x[1].name),
-            creep=CREEP * model.x[1].nominal,
-        )
-
-
-def _equations(model: Model) -> ca.SX:
-    return ca.SX(0, 1) if model.ode is None else model.ode
+        at = [*(variable.symbol for variable in model.x), model.vector("u"), model.vector("p")]
+        a = cast(ca.SX, model.ode)[1]
+        a_v = ca.jacobian(a, at[1])
+        self.a = ca.Function("a", at, [a])
+        self.slopes = ca.Function("slopes", at, [a, *(ca.jacobian(a, q) for q in at)])
+        self.bends = ca.Function("bends", at, [ca.jacobian(a_v, q) for q in at])
+        self.newton = ca.Function("newton", at, [a, a_v])
+        self.inputs = [variable.name for variable in model.u]
+        self.parameters = len(model.p)
+        self.creep = CREEP * model.x[1].nominal
 
 
 def why_not_sampled(model: Model) -> str:
     """Return the reason why a model cannot be stepped as one mass; "" if it can."""
-    states = [variable.name for variable in model.x]
+    states, algebraic = ([v.name for v in group] for group in (model.x, model.z))
     if len(states) != 2 or model.z or model.ode is None:
         return (
             "expected two states, a position and its velocity, and a friction law without states, "
             f"got states {', '.join(states) or 'none'}"
-            f"{' and algebraic ' + ', '.join(z.name for z in model.z) if model.z else ''}; "
+            f"{' and algebraic ' + ', '.join(algebraic) if algebraic else ''}; "
             "use engine='simulate'"
         )
-    rate = _equations(model)[0]
+    rate = model.ode[0]
     if model.events or not ca.is_equal(ca.simplify(rate), model.x[1].symbol, 2):
         what = "events" if model.events else f"{states[0]}' = {rate}"
         return f"expected {states[0]}' = {states[1]} without events, got {what}"
@@ -120,9 +98,7 @@ def why_not_sampled(model: Model) -> str:
     return ""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Tangent:
+class Tangent(NamedTuple):
     """A value with its derivatives by the start and the parameters: a row (1, n) of SX."""
 
     value: ca.SX
@@ -169,15 +145,10 @@ def _phi(z: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return phi(z) = (e^z - 1)/z and its derivative, by their series near 0."""
     small = ca.fabs(z) < 1e-2
     safe = ca.if_else(small, 1, z)
-    phi = ca.if_else(
-        small, 1 + z / 2 * (1 + z / 3 * (1 + z / 4 * (1 + z / 5))), ca.expm1(safe) / safe
-    )
-    growth = ca.if_else(
-        small,
-        0.5 + z * (1 / 3 + z * (1 / 8 + z * (1 / 30 + z / 144))),
-        (ca.exp(safe) - phi) / safe,
-    )
-    return phi, growth
+    series = 1 + z / 2 * (1 + z / 3 * (1 + z / 4 * (1 + z / 5)))
+    phi = ca.if_else(small, series, ca.expm1(safe) / safe)
+    series = 0.5 + z * (1 / 3 + z * (1 / 8 + z * (1 / 30 + z / 144)))
+    return phi, ca.if_else(small, series, (ca.exp(safe) - phi) / safe)
 
 
 def _velocity(
@@ -197,7 +168,7 @@ def _velocity(
     held = side * gap >= 0
     off_rest = rest - gap / (1 - S * a_v)
     low, high = rest, side * ca.fmax(side * free, mass.creep)
-    w = _between(guess, low, high, side)
+    w = side * ca.fmin(ca.fmax(side * guess, side * low), side * high)
     for k in range(evaluations):
         a, a_v = mass.newton(x, w, u, p)
         gap = w - v - S * a
@@ -210,33 +181,25 @@ def _velocity(
     return held, ca.if_else(held, 0, w), free
 
 
-def _between(w: ca.SX, low: ca.SX, high: ca.SX, side: ca.SX) -> ca.SX:
-    return side * ca.fmin(ca.fmax(side * w, side * low), side * high)
-
-
 def _inside(w: ca.SX, low: ca.SX, high: ca.SX, side: ca.SX) -> ca.SX:
     return ca.logic_and(side * w >= side * low, side * w <= side * high)
 
 
-Feedback = Callable[[Sequence[Tangent], ca.SX, ca.SX], tuple[list[Tangent], list[Tangent]]]
-"""(x, v, controller's states; row of a sample; its length [s]) -> (inputs, controller's states)."""
+Feedback = Callable[[Sequence[Tangent], ca.SX], tuple[list[Tangent], list[Tangent]]]
+"""(x, v, controller's states; row of a sample) -> (inputs, controller's states)."""
 
 
 def given_inputs(count: int) -> Feedback:
     """Return a feedback without controller: the inputs come from the rows."""
 
-    def feedback(
-        state: Sequence[Tangent], row: ca.SX, length: ca.SX
-    ) -> tuple[list[Tangent], list[Tangent]]:
+    def feedback(state: Sequence[Tangent], row: ca.SX) -> tuple[list[Tangent], list[Tangent]]:
         still = ca.SX(1, state[0].slope.shape[1])
         return [Tangent(row[i], still) for i in range(count)], []
 
     return feedback
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(NamedTuple):
     """A motion at n + 1 instants, the inputs in the n samples between, and all their derivatives.
 
     Attributes:
@@ -255,9 +218,7 @@ class Motion:
 
     def every(self, k: int) -> "Motion":
         """Return the motion at every k-th instant, and the inputs that begin there."""
-        return Motion(
-            self.states[::k], self.slopes[::k], self.inputs[::k], self.input_slopes[::k], self.gap
-        )
+        return Motion(*(part[::k] for part in self[:4]), gap=self.gap)
 
 
 @final
@@ -269,7 +230,7 @@ class Chain:
         sample: (state, row, p) -> (state after the sample, inputs in it). The state holds x, v,
             the controller's states, the gaps so far, and the derivatives of all but the gaps; the
             row holds the length of the sample [s] and the arguments of the feedback.
-        inputs, states, slopes: their numbers; `slopes` is 0 without derivatives.
+        inputs, states, slopes: their numbers.
     """
 
     sample: ca.Function
@@ -279,37 +240,33 @@ class Chain:
 
     @classmethod
     def of(
-        cls, mass: Mass, feedback: Feedback, *, row: int, memory: int = 0, starts: int = 2,
-        substeps: int = 2, sensitivities: bool = True,
-    ) -> "Chain":  # fmt: skip
-        """Return the chain of `mass`.
+        cls, mass: Mass, feedback: Feedback, *, row: int, memory: int = 0, substeps: int = 2
+    ) -> "Chain":
+        """Return the chain of `mass`, with derivatives by its parameters, x and v at the start.
 
         Args:
             feedback: its controller or inputs.
             row: count of numbers per sample in addition to its length.
             memory: states of the controller.
-            starts: unknowns of the start.
             substeps: steps per sample.
-            sensitivities: whether derivatives are computed.
         """
-        count, n = len(mass.parameters), 2 + memory
-        many = count + starts if sensitivities else 0
+        count, n = mass.parameters, 2 + memory
+        many = count + 2
         values, gap, slope = ca.SX.sym("s", n), ca.SX.sym("gap"), ca.SX.sym("S", n, many)
         length, given, p = ca.SX.sym("length"), ca.SX.sym("row", row), ca.SX.sym("p", count)
-        by_p = ca.horzcat(ca.SX.eye(count), ca.SX(count, starts)) if many else ca.SX(count, 0)
+        by_p = ca.horzcat(ca.SX.eye(count), ca.SX(count, 2))
         before = [Tangent(values[i], slope[i, :]) for i in range(n)]
-        inputs, after = feedback(before, given, length)
-        u = _stacked(inputs, many)
+        inputs, after = feedback(before, given)
+        u = _stacked(inputs)
         x, v, most = before[0], before[1], gap
         for _ in range(substeps):
             x, v, left = advance(mass, (x, v, u), Tangent(p, by_p), length / substeps)
             most = most + left**4  # a norm that keeps NaN
-        new = _stacked([x, v, *after], many)
+        new = _stacked([x, v, *after])
         arguments = [ca.vertcat(values, gap, ca.vec(slope)), ca.vertcat(length, given), p]
-        results = [ca.vertcat(new.value, most, ca.vec(new.slope))]
-        results.append(ca.vertcat(u.value, ca.vec(u.slope)))
-        made = ca.Function("sample", arguments, list(map(ca.densify, results)), {"cse": True})
-        return cls(made, len(inputs), n, many)
+        state, acting = [new.value, most, ca.vec(new.slope)], [u.value, ca.vec(u.slope)]
+        results = [ca.densify(ca.vertcat(*part)) for part in (state, acting)]
+        return cls(ca.Function("sample", arguments, results, {"cse": True}), len(inputs), n, many)
 
     @cached_property
     def _columns(self) -> Columns:
@@ -330,7 +287,8 @@ class Chain:
         n, k, many = self.states, self.inputs, self.slopes
         first = np.concatenate([start, [0.0], start_slopes.ravel("F")])
         same = (p.reshape(1, -1), np.zeros(len(rows), dtype=np.intp))
-        after, inputs = self._columns([rows, same], first, backend())
+        backend = "vm" if find_compiler() is None else "compiled"
+        after, inputs = self._columns([rows, same], first, backend)
         every = np.vstack([first, after])
         return Motion(
             states=every[:, :n],
@@ -341,15 +299,10 @@ class Chain:
         )
 
 
-def _stacked(parts: Sequence[Tangent], many: int) -> Tangent:
+def _stacked(parts: Sequence[Tangent]) -> Tangent:
     """Stack values and dense derivatives."""
-    slopes = ca.vertcat(*(part.slope for part in parts)) if many else ca.SX(len(parts), 0)
-    return Tangent(ca.vertcat(*(part.value for part in parts)), ca.densify(slopes))
-
-
-def backend() -> str:
-    """Return "compiled" if there is a compiler, else "vm", independent of elapsed time."""
-    return "vm" if find_compiler() is None else "compiled"
+    value, slope = zip(*parts, strict=True) if parts else ((), ())
+    return Tangent(ca.vertcat(*value), ca.densify(ca.vertcat(*slope)))
 
 
 def why_no_motion(motion: Motion) -> str:

@@ -216,7 +216,7 @@ def _back(search: _Search) -> int:
     Return the number of evaluations.
     """
     box, old = search.task.unknowns, search.best
-    w = np.clip(old.w, box.floor, box.ceiling)
+    w = np.clip(old.w, *box.limits)
     if np.array_equal(w, old.w):
         return 0
     there = search.task.at(w)

@@ -1,9 +1,9 @@
 """Unknowns from the limits of the parameters and the requests of the user, in order."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, sqrt
-from typing import Any, final
+from typing import Any, NamedTuple
 
 from identification.unknowns import roles
 from identification.unknowns.spec import Above, Range, Spec, Tied, Unknown, as_spec
@@ -17,75 +17,61 @@ APART = 1.2
 Order = tuple[str, str, bool]
 
 
-@final
-@dataclass(frozen=True)
-class Wishes:
-    """Requests of the user: specifications of free parameters, values of fixed ones.
+class Requests:
+    """Arguments `free` and `fixed` of a fit.
 
     Attributes:
         free: name -> specification.
-        fixed: name -> value.
-        only: whether only the parameters in `free` are fitted.
-        names: all given names, by argument.
-        problems: errors in the specifications and values.
-    """
-
-    free: dict[str, Spec]
-    fixed: dict[str, float]
-    only: bool
-    names: dict[str, tuple[str, ...]]
-    problems: tuple[str, ...] = ()
-
-    @property
-    def started(self) -> frozenset[str]:
-        """Names with a given start value."""
-        return frozenset(
-            n for n, s in self.free.items() if not isinstance(s, Tied) and s.start is not None
-        )
-
-    def check(self, known: Iterable[str]) -> None:
-        """Raise one error for all names that are not `known` and all other problems."""
-        problems = list[str]()
-        everything = list(known)
-        for where, given in self.names.items():
-            try:
-                checks.check_names(where, given, everything)
-            except ValueError as error:
-                problems.append(str(error))
-        refuse([*problems, *self.problems])
-
-
-def wishes(free: object, fixed: object, start: Iterable[str] = ()) -> Wishes:
-    """Read the arguments `free` and `fixed` of a fit, and the names in `start`.
-
-    Problems of single entries are collected; `Wishes.check` raises them.
+        fixed: name -> value of a held parameter.
+        only: True if only the parameters in `free` are fitted.
+        problems: errors in the specifications and values, which `check` raises.
 
     Raises:
         ValueError: an argument that is neither names nor values by name.
     """
-    if free is None or isinstance(free, Mapping):
-        given: dict[str, Any] = checks.named("Fit: free", free)
-    else:
-        given = dict.fromkeys(checks.names("Fit: free", free))
-    only = isinstance(fixed, str)
-    if only and fixed != OTHERS:
-        raise checks.refused("Fit: fixed", f"values by name or '{OTHERS}'", fixed)
-    numbers = {} if only else checks.named("Fit: fixed", fixed)
-    problems: list[str] = []
-    specs, held = dict[str, Spec](), dict[str, float]()
-    for name, value in given.items():
-        try:
-            specs[name] = as_spec(f"free {name}", value)
-        except ValueError as error:
-            problems.append(str(error))
-    for name, value in numbers.items():
-        try:
-            held[name] = checks.number(f"fixed {name}", value)
-        except ValueError as error:
-            problems.append(str(error))
-    problems += [f"{n}: expected free or fixed, got both" for n in given if n in numbers]
-    names = {"free": tuple(given), "fixed": tuple(numbers), "start": tuple(start)}
-    return Wishes(specs, held, only, names, tuple(problems))
+
+    def __init__(self, free: object, fixed: object, start: Iterable[str] = ()) -> None:
+        given: dict[str, Any] = (
+            checks.named("Fit: free", free)
+            if free is None or isinstance(free, Mapping)
+            else dict.fromkeys(checks.names("Fit: free", free))
+        )
+        self.only = isinstance(fixed, str)
+        if self.only and fixed != OTHERS:
+            raise checks.refused("Fit: fixed", f"values by name or '{OTHERS}'", fixed)
+        numbers = {} if self.only else checks.named("Fit: fixed", fixed)
+        self.free, self.fixed, self.problems = dict[str, Spec](), dict[str, float](), list[str]()
+        for argument, entries in (("free", given), ("fixed", numbers)):
+            for name, value in entries.items():
+                try:
+                    if argument == "free":
+                        self.free[name] = as_spec(f"free {name}", value)
+                    else:
+                        self.fixed[name] = checks.number(f"fixed {name}", value)
+                except ValueError as error:
+                    self.problems.append(str(error))
+        self.problems += [f"{n}: expected free or fixed, got both" for n in given if n in numbers]
+        self.names = {"free": [*given], "fixed": [*numbers], "start": [*start]}
+
+    @property
+    def started(self) -> frozenset[str]:
+        """Names with a given start value."""
+        return frozenset(n for n, s in self.free.items() if getattr(s, "start", None) is not None)
+
+    @property
+    def ties(self) -> dict[str, Tied]:
+        """Parameters computed from others."""
+        return {n: s for n, s in self.free.items() if isinstance(s, Tied)}
+
+    def check(self, known: Sequence[str]) -> None:
+        """Raise one error for all names that are not `known` and all other problems."""
+        problems = list[str]()
+        for where, given in self.names.items():
+            try:
+                checks.check_names(where, given, known)
+            except ValueError as error:
+                problems.append(str(error))
+        refuse([*problems, *self.problems])
 
 
 def refuse(problems: Sequence[str]) -> None:
@@ -94,55 +80,38 @@ def refuse(problems: Sequence[str]) -> None:
         raise ValueError("Fit: " + "; ".join(problems))
 
 
-@final
-@dataclass(frozen=True)
-class Limits:
-    """Value, bounds and scaling of a parameter of a law, a scene or a model.
+class Draft(NamedTuple):
+    """An unknown with the bounds of its definition.
 
-    Attributes:
-        value: its present value.
-        lower, upper: bounds of its definition.
-        window: bounds of what the data can resolve, used if the user gives no bounds.
-        logarithmic: fitted by its logarithm, unless the user requests otherwise.
+    Its own bounds are those of what the data can resolve, used if the user gives no bounds.
     """
 
-    name: str
-    unit: str
-    value: float
+    unknown: Unknown
     lower: float
     upper: float
-    window: tuple[float, float]
-    logarithmic: bool
-    scale: float
 
 
-def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Limits:
-    """Return the limits of a parameter of a law or a scene, by its role."""
+def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Draft:
+    """Return the draft of a parameter of a law or a scene, by its role."""
     value = float(parameter.value)
-    return Limits(
-        name=parameter.name, unit=unit, value=value, lower=parameter.lower, upper=parameter.upper,
-        window=roles.window(parameter, speeds), logarithmic=roles.is_logarithmic(parameter),
+    unknown = Unknown(
+        parameter.name, unit, value, *roles.window(parameter, speeds),
         scale=abs(value) or abs(parameter.default) or 1.0,
+        logarithmic=roles.is_logarithmic(parameter),
     )  # fmt: skip
+    return Draft(unknown, parameter.lower, parameter.upper)
 
 
-def of_variable(variable: Variable) -> Limits:
-    """Return the limits of a model parameter: logarithmic if it starts and stays positive."""
-    value = float(variable.start)
-    return Limits(
-        name=variable.name,
-        unit=variable.unit,
-        value=value,
-        lower=variable.lower,
-        upper=variable.upper,
-        window=(variable.lower, variable.upper),
-        logarithmic=variable.lower >= 0 and value > 0,
-        scale=abs(value) or variable.nominal,
-    )
+def of_variable(v: Variable) -> Draft:
+    """Return the draft of a model parameter: logarithmic if it starts and stays positive."""
+    value, logarithmic = float(v.start), v.lower >= 0 and float(v.start) > 0
+    scale = abs(value) or v.nominal
+    unknown = Unknown(v.name, v.unit, value, v.lower, v.upper, scale, logarithmic)
+    return Draft(unknown, v.lower, v.upper)
 
 
 def drafted(
-    free: Sequence[Limits], wished: Wishes, held: Mapping[str, float], orders: Iterable[Order]
+    free: Sequence[Draft], requests: Requests, held: Mapping[str, float], orders: Iterable[Order]
 ) -> dict[str, Unknown]:
     """Return the unknowns of the `free` parameters, by name; tied ones included, for their start.
 
@@ -150,127 +119,107 @@ def drafted(
         ValueError: all bounds, starts and orders that contradict each other.
     """
     problems: list[str] = []
-    drafts = dict[str, Unknown]()
-    for limits in free:
-        drafts[limits.name] = _draft(limits, wished.free.get(limits.name, Range()), problems)
+    specs = requests.free
+    found = {d.unknown.name: _first(d, specs.get(d.unknown.name, Range()), problems) for d in free}
     for order in orders:
-        _order(drafts, wished, held, order, problems)
-    for name, spec in wished.free.items():
-        if isinstance(spec, Above) and name in drafts:
+        _order(found, requests, held, order, problems)
+    for name, spec in specs.items():
+        if isinstance(spec, Above) and name in found:
             if spec.name in held:
-                low = max(held[spec.name], drafts[name].lower)
-                drafts[name] = replace(drafts[name], lower=low, above="")
-            elif spec.name not in drafts:
+                low = max(held[spec.name], found[name].lower)
+                found[name] = replace(found[name], lower=low, above="")
+            elif spec.name not in found:
                 problems.append(f"{name}: above: expected a parameter, got {spec.name}")
             else:
-                _put_above(drafts, wished, spec.name, name, False)
-    for unknown in drafts.values():
-        problems += _contradictions(unknown)
+                _put_above(found, requests, spec.name, name, False)
+    for u in found.values():
+        if not u.lower < u.upper:
+            such = f"expected lower < upper, got {u.lower:g} and {u.upper:g}; fix it instead"
+            problems.append(f"{u.name}: {such}")
+        elif u.logarithmic and not u.above and not u.upper > 0:
+            such = f"expected positive bounds of a logarithm, got {u.lower:g} and {u.upper:g}"
+            problems.append(f"{u.name}: {such}")
     refuse(problems)
-    return {n: u if u.partner else replace(u, start=_between(u)) for n, u in drafts.items()}
+    return {n: u if u.partner else replace(u, start=_between(u)) for n, u in found.items()}
 
 
-def _draft(limits: Limits, spec: Spec, problems: list[str]) -> Unknown:
+def _first(draft: Draft, spec: Spec, problems: list[str]) -> Unknown:
     """Return one unknown, without orders."""
-    low, high = limits.window
-    logarithmic, start = limits.logarithmic, limits.value
+    unknown, lowest, highest = draft
+    low, high, start = unknown.lower, unknown.upper, unknown.start
+    logarithmic = unknown.logarithmic
+
+    def check(what: str, such: str, value: float) -> None:
+        if not lowest <= value <= highest:
+            such = f"expected {such} in [{lowest:g}, {highest:g}], got {value:g}"
+            problems.append(f"free {unknown.name}: {what}: {such}")
+
     if isinstance(spec, Range):
-        if spec.lower > -inf or spec.upper < inf:
-            low, high = limits.lower, limits.upper
         for side, bound in (("lower", spec.lower), ("upper", spec.upper)):
-            if abs(bound) < inf and not limits.lower <= bound <= limits.upper:
-                allowed = f"[{limits.lower:g}, {limits.upper:g}]"
-                problems.append(
-                    f"free {limits.name}: {side}: expected a bound in {allowed}, got {bound:g}"
-                )
+            if abs(bound) < inf:
+                low, high = lowest, highest
+                check(side, "a bound", bound)
         low, high = max(low, spec.lower), min(high, spec.upper)
-        if spec.logarithmic is not None:
-            logarithmic = spec.logarithmic
+        logarithmic = logarithmic if spec.logarithmic is None else spec.logarithmic
     elif isinstance(spec, Above):
-        high = min(limits.upper, spec.upper)
+        high = min(highest, spec.upper)
     if not isinstance(spec, Tied) and spec.start is not None:
         start = spec.start
-        if not limits.lower <= start <= limits.upper:
-            allowed = f"[{limits.lower:g}, {limits.upper:g}]"
-            problems.append(
-                f"free {limits.name}: start: expected a value in {allowed}, got {start:g}"
-            )
+        check("start", "a value", start)
         low, high = min(low, start), max(high, start)
     if logarithmic and not start > 0:
-        start = sqrt(low * high) if low > 0 and high < inf else limits.scale
-    return Unknown(
-        name=limits.name,
-        unit=limits.unit,
-        start=start,
-        lower=low,
-        upper=high,
-        scale=limits.scale,
-        logarithmic=logarithmic,
-    )
+        start = sqrt(low * high) if low > 0 and high < inf else unknown.scale
+    return replace(unknown, start=start, lower=low, upper=high, logarithmic=logarithmic)
 
 
 def _order(
-    drafts: dict[str, Unknown],
-    wished: Wishes,
-    held: Mapping[str, float],
-    order: Order,
+    found: dict[str, Unknown], requests: Requests, held: Mapping[str, float], order: Order,
     problems: list[str],
-) -> None:
+) -> None:  # fmt: skip
     """Enforce low <= high by a bound, or by a coordinate if both are free."""
     low, high, strictly = order
-    tied = [n for n in (low, high) if isinstance(wished.free.get(n), Tied)]
     step = 1 + 1e-6 * strictly
-    if high in drafts and low in drafts and not tied:
-        if drafts[low].upper > drafts[high].lower:
-            _put_above(drafts, wished, low, high, strictly)
-    elif high in drafts and low in held:
-        lower = max(drafts[high].lower, held[low] * step)
-        drafts[high] = replace(drafts[high], lower=lower)
-    elif low in drafts and high in held:
-        upper = min(drafts[low].upper, held[high] / step)
-        drafts[low] = replace(drafts[low], upper=upper)
+    if high in found and low in found and not {low, high} & requests.ties.keys():
+        if found[low].upper > found[high].lower:
+            _put_above(found, requests, low, high, strictly)
+    elif high in found and low in held:
+        lower = max(found[high].lower, held[low] * step)
+        found[high] = replace(found[high], lower=lower)
+    elif low in found and high in held:
+        upper = min(found[low].upper, held[high] / step)
+        found[low] = replace(found[low], upper=upper)
     elif low in held and high in held and held[low] > held[high]:
-        problems.append(
-            f"expected {low} <= {high}, got {low} = {held[low]:g} and {high} = {held[high]:g}"
-        )
+        got = f"{low} = {held[low]:g} and {high} = {held[high]:g}"
+        problems.append(f"expected {low} <= {high}, got {got}")
 
 
 def _put_above(
-    drafts: dict[str, Unknown], wished: Wishes, low: str, high: str, strictly: bool
+    found: dict[str, Unknown], requests: Requests, low: str, high: str, strictly: bool
 ) -> None:
     """Express `high` relative to `low`, or `low` relative to `high` if `high` has a lower bound."""
-    a, b = drafts[low], drafts[high]
-    asked = wished.free.get(high)
-    if isinstance(asked, Range) and asked.lower > a.lower:
+    a, b = found[low], found[high]
+    spec = requests.free.get(high)
+    if isinstance(spec, Range) and spec.lower > a.lower:
         # a lower value with its own upper bound keeps its box: no coordinate satisfies both,
         # and trials out of order are refused when the law is made
         if a.upper >= b.upper:
-            first = min(a.start, _between(b))
-            drafts[low] = replace(a, below=high, start=first, logarithmic=False)
-        drafts[high] = replace(b, start=_between(b))
+            start = min(a.start, _between(b))
+            found[low] = replace(a, below=high, start=start, logarithmic=False)
+        found[high] = replace(b, start=_between(b))
         return
-    room = 1.01 if strictly else 1.0
-    a = replace(a, lower=max(a.lower, b.lower), upper=min(a.upper, b.upper / room))
+    upper = min(a.upper, b.upper / (1.01 if strictly else 1.0))
+    a = replace(a, lower=max(a.lower, b.lower), upper=upper)
     a = replace(a, start=_between(a))
     if not a.start < b.start:
-        if high in wished.started and low not in wished.started and b.start > 0:
+        if high in requests.started and low not in requests.started and b.start > 0:
             a = replace(a, start=b.start / APART)
         else:
             b = replace(b, start=a.start * APART if a.start > 0 else a.start + b.scale)
-    drafts[low] = replace(a, start=_between(a))
+    found[low] = replace(a, start=_between(a))
     both = strictly and a.logarithmic and b.logarithmic
-    drafts[high] = replace(b, above=low, logarithmic=both, scale=abs(b.start) or b.scale)
+    found[high] = replace(b, above=low, logarithmic=both, scale=abs(b.start) or b.scale)
 
 
 def _between(unknown: Unknown) -> float:
     """Return the start value, clipped to the bounds."""
     return min(max(unknown.start, unknown.lower), unknown.upper)
-
-
-def _contradictions(unknown: Unknown) -> list[str]:
-    name, low, high = unknown.name, unknown.lower, unknown.upper
-    if not low < high:
-        return [f"{name}: expected lower < upper, got {low:g} and {high:g}; fix it instead"]
-    if unknown.logarithmic and not unknown.above and not high > 0:
-        return [f"{name}: expected positive bounds of a logarithm, got {low:g} and {high:g}"]
-    return []

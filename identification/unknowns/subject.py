@@ -3,18 +3,18 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 
 from identification.unknowns import roles
 from identification.unknowns.drafts import (
-    Wishes,
+    Draft,
+    Requests,
     drafted,
     of_parameter,
     of_variable,
     refuse,
-    wishes,
 )
 from identification.unknowns.spec import Tied, Unknown
 from symfric.foundation import checks
@@ -28,9 +28,7 @@ from symfric.scenes import Drive
 from symfric.scenes.base import Scene
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Closed:
+class Closed(NamedTuple):
     """The subject with numbers: law and machine if it has them, and the model."""
 
     law: Law | None
@@ -72,7 +70,7 @@ class Subject:
     held: dict[str, float]
     variables: dict[str, Variable]
     guard: Callable[[Mapping[str, float]], Law | Scene | None]
-    started: frozenset[str] = frozenset()
+    started: frozenset[str]
 
     @property
     def drive(self) -> Drive | None:
@@ -87,19 +85,16 @@ class Subject:
         """
         mine = {n: float(values[n]) for n in self.names}
         p = tuple(replace(v, start=mine.get(v.name, v.start)) for v in self.model.p)
-        whole, model = self.guard(mine), restarted(self.model, p)
+        opening = self.model.opening
+        opening = None if opening is None else partial(_open, opening, p)
+        whole, model = self.guard(mine), replace(self.model, p=p, opening=opening)
         if isinstance(whole, Scene):
             return Closed(whole.law, whole, model)
         return Closed(whole, None, model)
 
 
-def restarted(model: Model, p: Variables) -> Model:
-    """Return the model with other starts of its parameters, also if its contacts are open."""
-    opening = None if model.opening is None else partial(_open, model.opening, p)
-    return replace(model, p=p, opening=opening)
-
-
 def _open(opening: Callable[[], Model], p: Variables) -> Model:
+    """Return a model with open contacts that starts at the values of `p`."""
     made, known = opening(), {v.name: v for v in p}
     return replace(made, p=tuple(known.get(v.name, v) for v in made.p))
 
@@ -135,9 +130,9 @@ def subject(
     Raises:
         ValueError: all problems, in one error.
     """
-    wished = wishes(free, fixed, start)
+    requests = Requests(free, fixed, start)
     if isinstance(what, Model):
-        return _of_model(what, wished)
+        return _of_model(what, requests)
     if isinstance(what, str):
         from symfric.laws import law_from_text  # noqa: PLC0415 (slow to import)
 
@@ -153,21 +148,13 @@ def subject(
     elif isinstance(what, Drive):
         turning = what.turning
     moving = not points if moving is None else moving
-    return _of_parts(what, wished, _Setting(load, moving, turning, roles.Speeds(v_max, v_min)))
+    return _of_parts(what, requests, load, moving, turning, roles.Speeds(v_max, v_min))
 
 
-@final
-@dataclass(frozen=True)
-class _Setting:
-    """Setting of the data: normal force [N], changing states, angles, speeds."""
-
-    load: float
-    moving: bool
-    turning: bool
-    speeds: roles.Speeds
-
-
-def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
+def _of_parts(
+    whole: Scene | Law, requests: Requests, load: float, moving: bool, turning: bool,
+    speeds: roles.Speeds,
+) -> Subject:  # fmt: skip
     """Return the subject for a law (with points) or a scene (with a motion)."""
     from symfric.laws import law_name  # noqa: PLC0415 (slow to import)
 
@@ -176,64 +163,67 @@ def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
     if symbols:
         shown = f"symbols or arrays for {', '.join(symbols)}; name them in free="
         raise ValueError(f"Fit: expected numbers as start values, got {shown}")
-    wished.check(n for n in known if n != "N" or not isinstance(whole, Drive))
-    units = {n: turned(p.unit) if setting.turning else p.unit for n, p in known.items()}
-    reasons = _reasons(whole, wished, setting)
-    free = [n for n in known if n not in reasons]
-    if not free:
-        raise ValueError("Fit: expected at least one free parameter, got all fixed")
-    held = {n: wished.fixed.get(n, roles.held_value(known[n], setting.speeds)) for n in reasons}
-    limits = [of_parameter(known[n], units[n], setting.speeds) for n in free]
-    drafts = drafted(limits, wished, held, list(roles.orders(whole)))
-    whole = with_values(whole, held | {n: u.start for n, u in drafts.items()})
+    requests.check([n for n in known if n != "N" or not isinstance(whole, Drive)])
+    units = {n: turned(p.unit) if turning else p.unit for n, p in known.items()}
+    variables = {
+        n: Variable(n, units[n], q.value, lower=q.lower, upper=q.upper, doc=q.doc)
+        for n, q in known.items()
+    }
+    reasons = _reasons(whole, requests, load, moving)
+    given = requests.fixed
+    held = {n: given.get(n, roles.held_value(known[n], speeds)) for n in reasons}
+    drafts = [of_parameter(p, units[n], speeds) for n, p in known.items() if n not in reasons]
+    free = _unknowns(drafts, requests, held, roles.orders(whole))
+    whole = with_values(whole, held | {n: u.start for n, u in free.items()})
     symbolic, p = symbolise(whole, *free)
-    model = (
-        points_model(symbolic, setting.load, p)
-        if isinstance(symbolic, Law)
-        else symbolic.equations(p)
-    )
     law, scene = (whole, None) if isinstance(whole, Law) else (whole.law, whole)
-    ties = {n: s for n, s in wished.free.items() if isinstance(s, Tied)}
-    mine = tuple(drafts[n] for n in free if n not in ties)
-    return Subject(
-        name=law_name(law),
-        names=tuple(free),
-        model=model,
-        law=law,
-        scene=scene,
-        unknowns=mine,
-        ties=ties,
-        reasons={n: reasons[n] for n in known if n in reasons},
-        held=held,
-        variables={
-            n: Variable(n, units[n], q.value, lower=q.lower, upper=q.upper, doc=q.doc)
-            for n, q in known.items()
-        },
-        guard=partial(with_values, whole),
-        started=wished.started,
+    model = points_model(symbolic, load, p) if isinstance(symbolic, Law) else symbolic.equations(p)
+    guard = partial(with_values, whole)
+    return _subject(
+        law_name(law), requests, free, reasons, held, variables, model, law, scene, guard
     )
 
 
-def _reasons(whole: Scene | Law, wished: Wishes, setting: _Setting) -> dict[str, str]:
+def _unknowns(
+    drafts: Sequence[Draft], requests: Requests, held: Mapping[str, float],
+    orders: Iterable[tuple[str, str, bool]],
+) -> dict[str, Unknown]:  # fmt: skip
+    """Return the unknowns of at least one free parameter."""
+    if not drafts:
+        raise ValueError("Fit: expected at least one free parameter, got all fixed")
+    return drafted(drafts, requests, held, orders)
+
+
+def _subject(
+    name: str, requests: Requests, free: Mapping[str, Unknown], reasons: Mapping[str, str],
+    held: dict[str, float], variables: dict[str, Variable], model: Model, law: Law | None,
+    scene: Scene | None, guard: Callable[[Mapping[str, float]], Law | Scene | None],
+) -> Subject:  # fmt: skip
+    ties = requests.ties
+    return Subject(
+        name, tuple(free), model, law, scene,
+        tuple(u for n, u in free.items() if n not in ties), ties,
+        {n: reasons[n] for n in variables if n in reasons}, held, variables, guard,
+        requests.started,
+    )  # fmt: skip
+
+
+def _reasons(whole: Scene | Law, requests: Requests, load: float, moving: bool) -> dict[str, str]:
     """Return the held parameters with the reason for each."""
     known = parameters(whole)
+    if requests.only:
+        return {n: "given" for n in known if n not in requests.free}
     law = whole if isinstance(whole, Law) else whole.law
-    frictional = parameters(law)
-    strange = not isinstance(whole, Law | Drive)
-    directions, bristle = roles.has_directions(whole), setting.moving if law.states else None
+    strange = set[str]() if isinstance(whole, Law | Drive) else known.keys() - parameters(law)
+    directions, bristle = roles.has_directions(whole), moving if law.states else None
     reasons = {
-        n: roles.reason(
-            p, directions=directions, bristle=bristle, machine=strange and n not in frictional
-        )
+        n: roles.reason(p, directions=directions, bristle=bristle, machine=n in strange)
         for n, p in known.items()
-        if n not in wished.free
+        if n not in requests.free
     }
-    reasons |= dict.fromkeys(wished.fixed, "given")
-    if wished.only:
-        reasons |= {n: "given" for n in known if n not in wished.free}
-        return reasons
-    asked = [*wished.free, *(n for n in known if n not in wished.free and not reasons[n])]
-    reasons |= roles.inseparable(law, setting.load, asked, set(wished.free), bool(bristle))
+    reasons |= dict.fromkeys(requests.fixed, "given")
+    names = [*requests.free, *(n for n in known if n in reasons and not reasons[n])]
+    reasons |= roles.inseparable(law, load, names, set(requests.free), bool(bristle))
     return {n: text for n, text in reasons.items() if text}
 
 
@@ -242,63 +232,33 @@ def points_model(law: Law, load: float, p: Variables) -> Model:
     v, N = Variable("v", "m/s", nominal=0.1), Variable("N", "N", start=load, nominal=load)
     further = tuple(Variable(i.name, i.unit, start=i.steady, nominal=i.nominal) for i in law.inputs)
     inputs = {x.name: x.symbol for x in further}
-    if law.states:
-        force = law.force(v.symbol, N.symbol, ca.SX(law.steady_state(v.symbol, N.symbol)), **inputs)
-    else:
-        force = law.force(v.symbol, N.symbol, ca.SX(0, 1), **inputs)
-    F = Output(ca.SX(force), "N", "friction force opposing v")
+    z = ca.SX(law.steady_state(v.symbol, N.symbol)) if law.states else ca.SX(0, 1)
+    F = Output(ca.SX(law.force(v.symbol, N.symbol, z, **inputs)), "N", "friction force opposing v")
     return Model(name="points", u=(v, N, *further), p=p, outputs={"F": F})
 
 
-def _of_model(model: Model, wished: Wishes) -> Subject:
+def _of_model(model: Model, requests: Requests) -> Subject:
     """Return the subject for a model: all its parameters are free unless fixed."""
-    names = [v.name for v in model.p]
-    if not names:
+    variables = {v.name: v for v in model.p}
+    if not variables:
         raise ValueError("Fit: expected a model with parameters, got none; scene.model(free=[...])")
-    wished.check(names)
-    reasons = dict.fromkeys(wished.fixed, "given")
-    if wished.only:
-        reasons |= {n: "given" for n in names if n not in wished.free}
-    held = {v.name: wished.fixed.get(v.name, float(v.start)) for v in model.p if v.name in reasons}
-    free = [v for v in model.p if v.name not in reasons]
-    if not free:
-        raise ValueError("Fit: expected at least one free parameter, got all fixed")
+    requests.check([*variables])
+    given = [n for n in variables if requests.only and n not in requests.free]
+    reasons = dict.fromkeys([*requests.fixed, *given], "given")
+    odd = [n for n, v in variables.items() if not is_number(v.start)]
+    refuse([f"{n}: expected a number as start value, got an expression" for n in odd])
+    held = {n: requests.fixed.get(n, float(variables[n].start)) for n in variables if n in reasons}
     laws = [c.law for c in model.contacts if isinstance(c.law, Law)]
     orders = [pair for law in laws for pair in roles.symbols_in_order(law)]
-    odd = [v.name for v in model.p if not is_number(v.start)]
-    refuse([f"{n}: expected a number as start value, got an expression" for n in odd])
-    drafts = drafted([of_variable(v) for v in free], wished, held, orders)
-    starts = held | {n: u.start for n, u in drafts.items()}
+    drafts = [of_variable(v) for n, v in variables.items() if n not in reasons]
+    free = _unknowns(drafts, requests, held, orders)
+    starts = held | {n: u.start for n, u in free.items()}
     p = tuple(replace(v, start=starts[v.name]) for v in model.p)
-    guard = _guard(laws, p)
-    ties = {n: s for n, s in wished.free.items() if isinstance(s, Tied)}
-    return Subject(
-        name=model.name,
-        names=tuple(v.name for v in free),
-        model=replace(model, p=p),
-        law=guard({}),
-        scene=None,
-        unknowns=tuple(drafts[v.name] for v in free if v.name not in ties),
-        ties=ties,
-        reasons=reasons,
-        held=held,
-        variables={v.name: v for v in model.p},
-        guard=guard,
-        started=wished.started,
+    guard = Laws.of(laws, p)
+    model = replace(model, p=p)
+    return _subject(
+        model.name, requests, free, reasons, held, variables, model, guard({}), None, guard
     )
-
-
-def _guard(laws: Sequence[Law], p: Variables) -> "Laws":
-    """Return a function that evaluates the model's laws, whose parameters are expressions in p."""
-    plain: list[tuple[Law, ca.Function, tuple[str, ...]]] = []
-    column = symbols_of(p)
-    for law in laws:
-        written = {n: q.value for n, q in parameters(law).items() if is_symbolic(q.value)}
-        value = ca.Function("value", [column], [ca.densify(ca.vertcat(*written.values()))])
-        start = value([float(v.start) for v in p]).full().ravel().tolist()
-        numeric = with_values(law, dict(zip(written, start, strict=True)))
-        plain.append((numeric, value, tuple(written)))
-    return Laws(tuple(plain), tuple((v.name, float(v.start)) for v in p))
 
 
 @final
@@ -307,11 +267,25 @@ class Laws:
     """The laws of a model's contacts as functions of its parameters."""
 
     laws: tuple[tuple[Law, ca.Function, tuple[str, ...]], ...]
-    starts: tuple[tuple[str, float], ...]
+    starts: dict[str, float]
+
+    @classmethod
+    def of(cls, laws: Sequence[Law], p: Variables) -> "Laws":
+        """Return the functions of laws whose parameters are expressions in `p`."""
+        plain: list[tuple[Law, ca.Function, tuple[str, ...]]] = []
+        starts = {v.name: float(v.start) for v in p}
+        for law in laws:
+            written = {n: q.value for n, q in parameters(law).items() if is_symbolic(q.value)}
+            values = ca.densify(ca.vertcat(*written.values()))
+            value = ca.Function("value", [symbols_of(p)], [values])
+            start = value([*starts.values()]).full().ravel().tolist()
+            numeric = with_values(law, dict(zip(written, start, strict=True)))
+            plain.append((numeric, value, tuple(written)))
+        return cls(tuple(plain), starts)
 
     def __call__(self, values: Mapping[str, float]) -> Law | None:
         """Return the only law with numbers, None if there are several; ValueError if refused."""
-        p = [values.get(name, start) for name, start in self.starts]
+        p = [values.get(name, start) for name, start in self.starts.items()]
         made = [
             with_values(law, dict(zip(names, at(p).full().ravel().tolist(), strict=True)))
             for law, at, names in self.laws

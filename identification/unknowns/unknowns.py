@@ -13,8 +13,9 @@
 A solver only has to respect a box in w; orders and ties hold at every trial.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 from typing import Any, final
 
@@ -31,8 +32,10 @@ DECADES = 6.0
 """Decades from the start beyond which the solver ignores a bound of a logarithmic value: its
 steps depend on distant bounds, too. The law itself still checks the bound.
 """
-VANISHED = 12.0
-"""Decades from the start at which a value that tends to zero or infinity is at its bound."""
+VANISHED = 12.0 * float(np.log(10.0))
+"""Logarithmic distance from the start at which a value that tends to zero or infinity is at its
+bound.
+"""
 WITHIN = 1e-6
 """Relative distance to a bound within which a value counts as at it, so rounding cannot pass it."""
 NEAR = 2.0
@@ -45,6 +48,94 @@ STRICTLY = 1e-4
 """Least share of the range between a lower value and the bound for a value strictly above it."""
 AT_BOUND = 1e-5
 """Distance to a bound, over the width of the box or one, below which a value is at the bound."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Coordinate:
+    """A coordinate w of a value p whose partner in an order, if any, has the value q.
+
+    Attributes:
+        value: (w, q) -> p, symbolic.
+        inverse: (p, q) -> w.
+        lower, upper: bounds of w.
+        floor, ceiling: coordinates beyond which p counts as zero or infinite. The search does not
+            use them, since its steps depend on distant bounds, too.
+    """
+
+    value: Callable[[Any, Any], Any]
+    inverse: Callable[[float, float], float]
+    lower: float
+    upper: float
+    floor: float = -inf
+    ceiling: float = inf
+
+
+def coordinate(unknown: Unknown) -> Coordinate:
+    """Return the coordinate of an unknown."""
+    low, high, scale = unknown.lower, unknown.upper, unknown.scale
+    if unknown.below and low > -inf:
+        return Coordinate(
+            lambda w, q: low + (q - low) * w,
+            lambda p, q: (p - low) / max(q - low, 1e-300), 0.0, 1.0,
+        )  # fmt: skip
+    if unknown.below:
+        return Coordinate(
+            lambda w, q: q - scale * (1 - w), lambda p, q: 1 - (q - p) / scale, -inf, 1.0
+        )
+    if unknown.above:
+        return _above(high, scale, unknown.logarithmic)
+    if not unknown.logarithmic:
+        return Coordinate(lambda w, _: scale * w, lambda p, _: p / scale, low / scale, high / scale)
+    first = _log(unknown.start)
+    lower = _log(low) if low > 0 else -inf
+    upper = _log(high) if high < inf else inf
+    reach = float(np.log(10.0)) * DECADES
+    return Coordinate(
+        lambda w, _: _exp(w),
+        lambda p, _: _log(p),
+        lower if lower > first - reach else -inf,
+        upper if upper < first + reach else inf,
+        max(first - VANISHED, lower + WITHIN),
+        min(first + VANISHED, upper - WITHIN),
+    )
+
+
+def _above(high: float, scale: float, logarithmic: bool) -> Coordinate:
+    """Return the coordinate of a value at least another one and at most `high`."""
+
+    def excess(p: float, q: float) -> float:
+        return max(p - q, 1e-3 * max(abs(q), 1e-12))
+
+    def power(p: float, q: float) -> float:
+        share = np.log(1 + excess(p, q) / q)
+        return float(share / np.log(max(high / q, 1 + 1e-12)))
+
+    if logarithmic and high < inf:
+        return Coordinate(lambda w, q: q * (high / q) ** w, power, STRICTLY, 1.0)
+    if high < inf:
+        return Coordinate(
+            lambda w, q: q + (high - q) * w,
+            lambda p, q: excess(p, q) / max(high - q, 1e-300), 0.0, 1.0,
+        )  # fmt: skip
+    if logarithmic:
+        middle = _log(scale)
+        return Coordinate(
+            lambda w, q: q + _exp(w), lambda p, q: float(np.log(excess(p, q))), -inf, inf,
+            middle - VANISHED, middle + VANISHED,
+        )  # fmt: skip
+    return Coordinate(
+        lambda w, q: q + NEAR * scale * (_exp(w) - 1),
+        lambda p, q: float(np.log1p(excess(p, q) / (NEAR * scale))), 0.0, inf, ceiling=VANISHED,
+    )  # fmt: skip
+
+
+def _exp(w: ca.SX) -> ca.SX:
+    return ca.exp(w)
+
+
+def _log(value: float) -> float:
+    return float(np.log(max(value, 1e-300)))
 
 
 @final
@@ -77,15 +168,12 @@ class Unknowns:
 
     def values(self, w: Array) -> Array:
         """Return the values at w, shape (k,)."""
-        return self._both(w)[0]
+        return evaluate_all(self.function, np.asarray(w, float))[0].ravel()
 
     def slope(self, w: Array) -> Array:
         """Return dvalues/dw at w, shape (k, n)."""
-        return self._both(w)[1]
-
-    def _both(self, w: Array) -> tuple[Array, Array]:
-        found, slope = evaluate_all(self.function, np.asarray(w, float))
-        return found.ravel(), slope.reshape(len(self.names), len(self.unknowns))
+        slope = evaluate_all(self.function, np.asarray(w, float))[1]
+        return slope.reshape(len(self.names), len(self.unknowns))
 
     def named(self, w: Array) -> dict[str, float]:
         """Return the values at w by name."""
@@ -100,19 +188,18 @@ class Unknowns:
         """Return the coordinates of `values`, moved inside the box; others are at their start."""
         known = {u.name: u.start for u in self.unknowns} | dict(values)
         if any(u.partner and u.partner not in known for u in self.unknowns):
-            known = self._with_ties(known) | known
-        w = [_coordinate(u, known[u.name], known.get(u.partner, 0.0)) for u in self.unknowns]
-        return self.inside(np.array(w))
+            free = [replace(u, above="", below="") for u in self.unknowns]
+            found = self.named(self._inverse(free, known, {}))
+            for _ in range(2):  # a tied value may follow from one with an order of its own
+                found = self.named(self._inverse(self.unknowns, known, found))
+            known = found | known
+        return self._inverse(self.unknowns, known, known)
 
-    def _with_ties(self, known: Mapping[str, float]) -> dict[str, float]:
-        """Return the values that others are ordered with, tied ones included."""
-        free = [replace(u, above="", below="") for u in self.unknowns]
-        w = np.array([_coordinate(u, known[u.name], 0.0) for u in free])
-        for _ in range(2):  # a tied value may follow from one with an order of its own
-            found = self.named(self.inside(w))
-            w = np.array([_coordinate(u, known[u.name], found[u.partner]) if u.partner else w[i]
-                          for i, u in enumerate(self.unknowns)])  # fmt: skip
-        return self.named(self.inside(w))
+    def _inverse(
+        self, unknowns: Sequence[Unknown], known: Mapping[str, float], partners: Mapping[str, float]
+    ) -> Array:
+        w = [coordinate(u).inverse(known[u.name], partners.get(u.partner, 0.0)) for u in unknowns]
+        return self.inside(np.array(w))
 
     def inside(self, w: Array) -> Array:
         """Return `w` moved inside the box by a thousandth of its width or of one."""
@@ -122,44 +209,19 @@ class Unknowns:
     def at_bound(self, w: Array) -> NDArray[np.bool_]:
         """Return a mask of the unknowns at a bound, shape (n,)."""
         near = AT_BOUND * np.minimum(1.0, self.upper - self.lower)
-        low, high = np.maximum(self.lower, self.floor), np.minimum(self.upper, self.ceiling)
+        floor, ceiling = self.limits
+        low, high = np.maximum(self.lower, floor), np.minimum(self.upper, ceiling)
         return (w - low < near) | (high - w < near)
 
-    @property
-    def floor(self) -> Array:
-        """Coordinates below which a logarithmic value counts as zero, shape (n,).
-
-        The search does not use them, since its steps depend on distant bounds, too.
-        """
-        open_ = self._scales & np.isinf(self.lower)
-        least = np.array([0.0 if u.above else u.lower for u in self.unknowns])
-        first = np.log(self._sizes) - VANISHED * np.log(10.0)
-        known = np.log(np.where(least > 0, least, 1.0)) + WITHIN
-        first = np.where(least > 0, np.maximum(first, known), first)
-        return np.where(open_, first, -np.inf)
-
-    @property
-    def ceiling(self) -> Array:
-        """Coordinates above which a value counts as infinite, shape (n,); see `floor`."""
-        reach = VANISHED * np.log(10.0)
-        most = np.array([np.inf if u.above else u.upper for u in self.unknowns])
-        known = np.log(np.where((most > 0) & (most < np.inf), most, 1.0)) - WITHIN
-        first = np.log(self._sizes) + reach
-        first = np.where((most > 0) & (most < np.inf), np.minimum(first, known), first)
-        excess = np.array([bool(u.above) and not u.logarithmic for u in self.unknowns], dtype=bool)
-        found = np.where(excess, reach, np.where(self._scales, first, np.inf))
-        return np.where(np.isinf(self.upper), found, np.inf)
-
-    @property
-    def _scales(self) -> NDArray[np.bool_]:
-        """Mask of the coordinates that are logarithms of a value or an excess, shape (n,)."""
-        return np.array([u.logarithmic and not u.below for u in self.unknowns], dtype=bool)
-
-    @property
-    def _sizes(self) -> Array:
-        """Start values of logarithmic coordinates; one for others, shape (n,)."""
-        sizes = np.array([u.scale if u.above else u.start for u in self.unknowns])
-        return np.where(self._scales, sizes, 1.0)
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Coordinates beyond which values count as zero or infinite, see `Coordinate`."""
+        each = [coordinate(u) for u in self.unknowns]
+        floor, ceiling = np.array([(c.floor, c.ceiling) for c in each]).reshape(-1, 2).T
+        return (
+            np.where(np.isinf(self.lower), floor, -inf),
+            np.where(np.isinf(self.upper), ceiling, inf),
+        )
 
 
 def unknowns_of(
@@ -177,113 +239,31 @@ def unknowns_of(
             unknown nor tied.
     """
     w = ca.SX.sym("w", len(unknowns))
-    by_name = {u.name: (u, w[i]) for i, u in enumerate(unknowns)}
+    each = [coordinate(u) for u in unknowns]
     values: dict[str, Any] = {n: ca.SX(x) for n, x in (held or {}).items()}
-    waiting = [*by_name, *ties]
+    waiting: dict[str, Callable[[], Any]] = {
+        u.name: lambda i=i, u=u: each[i].value(w[i], values[u.partner] if u.partner else 0)
+        for i, u in enumerate(unknowns)
+    } | {name: lambda tie=tie: tie.rule(values) for name, tie in ties.items()}
+    partners = {u.name: u.partner for u in unknowns}
     while waiting:
-        done = [n for n in waiting if _write(n, by_name, ties, values)]
-        if not done:
-            raise ValueError(_circle(waiting, by_name, ties, values))
-        waiting = [n for n in waiting if n not in done]
+        missing = dict[str, str]()
+        for name, expression in waiting.items():
+            try:
+                values[name] = ca.SX(expression())
+            except (KeyError, ValueError) as error:
+                why = f"is tied to an absent name or in a cycle ({error})"
+                if name in partners:
+                    why = f"is ordered with {partners[name]}, which is absent"
+                missing[name] = f"{name} {why}"
+        if len(missing) == len(waiting):
+            such = "Fit: free: expected ties and orders without cycles"
+            raise ValueError(f"{such}, got {'; '.join(missing.values())}")
+        waiting = {name: waiting[name] for name in missing}
     absent = [n for n in names if n not in values]
     if absent:
         raise ValueError(f"Fit: expected an unknown for each value, got none for {absent[0]}")
     column = ca.densify(ca.vertcat(*(values[n] for n in names))) if names else ca.SX(0, 1)
     function = ca.Function("values", [w], [column, ca.densify(ca.jacobian(column, w))])
-    box = np.array([_box(u) for u in unknowns]).reshape(-1, 2)
+    box = np.array([(c.lower, c.upper) for c in each]).reshape(-1, 2)
     return Unknowns(tuple(unknowns), tuple(names), box[:, 0], box[:, 1], function)
-
-
-def _write(
-    name: str,
-    unknowns: Mapping[str, tuple[Unknown, ca.SX]],
-    ties: Mapping[str, Tied],
-    values: dict[str, Any],
-) -> bool:
-    """Add the expression of `name` to `values`; return False if it needs absent values."""
-    if name in ties:
-        try:
-            values[name] = ca.SX(ties[name].rule(values))
-        except (KeyError, ValueError):
-            return False
-        return True
-    unknown, w = unknowns[name]
-    if unknown.partner and unknown.partner not in values:
-        return False
-    if unknown.below:
-        values[name] = _under(unknown, values[unknown.below], w)
-        return True
-    low = values[unknown.above] if unknown.above else ca.SX(0)
-    if unknown.above and unknown.upper < inf:
-        high = unknown.upper
-        values[name] = low * (high / low) ** w if unknown.logarithmic else low + (high - low) * w
-    elif unknown.above and not unknown.logarithmic:
-        values[name] = low + NEAR * unknown.scale * (ca.exp(w) - 1)
-    else:
-        values[name] = low + (ca.exp(w) if unknown.logarithmic else unknown.scale * w)
-    return True
-
-
-def _under(unknown: Unknown, high: Any, w: Any) -> Any:
-    """Return an expression that does not exceed `high`."""
-    if unknown.lower > -inf:
-        return unknown.lower + (high - unknown.lower) * w
-    return high - unknown.scale * (1 - w)
-
-
-def _circle(
-    waiting: Iterable[str],
-    unknowns: Mapping[str, tuple[Unknown, ca.SX]],
-    ties: Mapping[str, Tied],
-    values: Mapping[str, Any],
-) -> str:
-    """Return the message on the names `waiting` that cannot be expressed."""
-    messages: list[str] = []
-    for name in waiting:
-        if name in ties:
-            try:
-                ties[name].rule(values)
-            except (KeyError, ValueError) as error:
-                messages.append(f"{name} is tied to an absent name or in a cycle ({error})")
-        else:
-            messages.append(f"{name} is ordered with {unknowns[name][0].partner}, which is absent")
-    return "Fit: free: expected ties and orders without cycles, got " + "; ".join(messages)
-
-
-def _coordinate(unknown: Unknown, value: float, low: float) -> float:
-    """Return the coordinate of a value; `low` is the value of its partner in an order, if any."""
-    if unknown.below:
-        if unknown.lower > -inf:
-            return (value - unknown.lower) / max(low - unknown.lower, 1e-300)
-        return 1 - (low - value) / unknown.scale
-    if unknown.above:
-        excess = max(value - low, 1e-3 * max(abs(low), 1e-12))
-        if unknown.upper < inf and unknown.logarithmic:
-            return float(np.log(1 + excess / low) / np.log(max(unknown.upper / low, 1 + 1e-12)))
-        if unknown.upper < inf:
-            return excess / max(unknown.upper - low, 1e-300)
-        if unknown.logarithmic:
-            return float(np.log(excess))
-        return float(np.log1p(excess / (NEAR * unknown.scale)))
-    if unknown.logarithmic:
-        return float(np.log(max(value, 1e-300)))
-    return value / unknown.scale
-
-
-def _box(unknown: Unknown) -> tuple[float, float]:
-    """Return the bounds of the coordinate."""
-    if unknown.below:
-        return (0.0 if unknown.lower > -inf else -inf), 1.0
-    if unknown.above:
-        if unknown.upper < inf:
-            return (STRICTLY if unknown.logarithmic else 0.0), 1.0
-        if not unknown.logarithmic:
-            return 0.0, inf
-    if unknown.logarithmic:
-        if unknown.above:
-            return -inf, inf
-        reach, first = float(np.log(10.0)) * DECADES, float(np.log(max(unknown.start, 1e-300)))
-        low = float(np.log(unknown.lower)) if unknown.lower > 0 else -inf
-        high = float(np.log(unknown.upper)) if unknown.upper < inf else inf
-        return (low if low > first - reach else -inf), (high if high < first + reach else inf)
-    return unknown.lower / unknown.scale, unknown.upper / unknown.scale

@@ -1,24 +1,21 @@
 """Benchmarks of short calls, events, gradients, signals and import.
 
 Times are processor times of whole calls from Python, the shortest of several rounds in which all
-contenders take turns. Ratios are relative to the first method of each task, which is symfric.
+methods take turns. Ratios are relative to the first method of each task, which is symfric.
 """
 
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from math import nan
-from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench import table
 from symfric.bench.contenders import buffered, compiled, tolerances
-from symfric.bench.table import interleaved, unwarned
+from symfric.bench.report import Found, Progress, Report, backend, interleaved, unwarned
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.background import wait
@@ -38,105 +35,63 @@ SEED, RTOL = 10, 1e-6
 TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)
 """Largest torques [N m] of the joints of the arm, from the base on."""
 FREE = ("mu_s", "mu_d", "k", "v_belt")
+TITLE = "Processor time of short tasks"
 
 
-class CallRow(NamedTuple):
-    """Cost of one method for a task.
+def bench(quick: bool = False, progress: Progress = None) -> Report:
+    """Measure all tasks; `quick`: fewer steps, elements, points and rounds."""
 
-    Attributes:
-        task: task and scene.
-        who: method.
-        time_us: shortest processor time per unit [us].
-        per: unit: step, run, call or import.
-        error: relative error of the result, NaN if it has none.
-        ratio: time relative to the first method of the task.
-    """
-
-    task: str
-    who: str
-    time_us: float
-    per: str
-    error: float
-    ratio: float
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class CallBenchmark(table.Report):
-    """Results of the benchmark of short calls."""
-
-    rows: tuple[CallRow, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the rows as plain data, without errors that are NaN."""
-        rows = table.plain(self.rows)
-        return {"rows": [{k: v for k, v in row.items() if v is not None} for row in rows]}
-
-    def shown(self) -> Iterator[table.Table | str]:
-        """Yield the table of tasks and methods."""
-        yield table.of(
-            "Processor time of short tasks", self.rows,
-            {"task": "task", "method": "who", "time [us]": table.shortened("time_us"),
-             "per": "per", "relative error": table.shortened("error"),
-             "ratio to the first": table.rounded("ratio", 2)},
-        )  # fmt: skip
-
-
-def bench_calls(*, quick: bool = False, progress: table.Progress = None) -> CallBenchmark:
-    """Measure all tasks on this machine.
-
-    Args:
-        quick: fewer steps, elements, points and rounds; for tests.
-        progress: called with the current item and the fraction done.
-    """
-    tasks = (_drive, _arm, _events, _gradient, _signals, _imports)
-    rows: list[CallRow] = []
-    for task in table.each(tasks, progress, lambda task: task.__name__.strip("_")):
+    def quietly(task: Callable[[bool], Iterator[Found]]) -> list[Found]:
         with unwarned():
-            rows += task(quick)
-    return CallBenchmark(tuple(rows))
+            return list(task(quick))
+
+    tasks = {task.__name__.strip("_"): partial(quietly, task) for task in TASKS}
+    return Report().collect(tasks, progress)
 
 
 def _rows(
-    task: str, per: str, calls: Calls, errors: dict[str, float], count: int, rounds: int
-) -> Iterator[CallRow]:
-    best = interleaved(calls, rounds)
-    first = next(iter(best.values()))
-    for who, time in best.items():
-        yield CallRow(task, who, 1e6 * time / count, per, errors[who], time / first)
+    task: str, per: str, times: dict[str, float], errors: dict[str, float] | None = None
+) -> Iterator[Found]:
+    """Yield a row for each method from its time [s] and the relative error of its result."""
+    first = next(iter(times.values()))
+    for who, time in times.items():
+        yield TITLE, {
+            "task": task, "method": who, "time [us]": 1e6 * time, "per": per,
+            "relative error": (errors or {}).get(who, nan), "ratio to the first": time / first,
+        }  # fmt: skip
 
 
 # ---- many short steps with different inputs ----
 
 
-def _drive(quick: bool) -> Iterator[CallRow]:
+def _drive(quick: bool) -> Iterator[Found]:
     """Measure a belt drive in steps of 5 ms."""
     model, count = Drive(LuGre()).model(), 50 if quick else 1000
     forces = np.random.default_rng(SEED).uniform(-15.0, 15.0, (count, 1))
     yield from _stepped("drive, steps of 5 ms", model, 5e-3, forces, 2 if quick else 5)
 
 
-def _arm(quick: bool) -> Iterator[CallRow]:
+def _arm(quick: bool) -> Iterator[Found]:
     """Measure an arm of six joints under torques held for 1 ms: smooth ones, and noise."""
     model, count = Arm(BrownMcPhee()).model(), 20 if quick else 1000
     t = 1e-3 * np.arange(count)
-    smooth = np.sin(2 * np.pi * np.outer(t, np.linspace(1.0, 4.0, 6))) * TORQUES
-    noise = np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)) * TORQUES
-    rounds = 1 if quick else 3
-    yield from _stepped("arm, 1 kHz, sines", model, 1e-3, smooth, rounds)
-    yield from _stepped("arm, 1 kHz, noise", model, 1e-3, noise, rounds)
+    torques = {
+        "sines": np.sin(2 * np.pi * np.outer(t, np.linspace(1.0, 4.0, 6))),
+        "noise": np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)),
+    }
+    for name, u in torques.items():
+        yield from _stepped(f"arm, 1 kHz, {name}", model, 1e-3, u * TORQUES, 1 if quick else 3)
 
 
-def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Iterator[CallRow]:
+def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Iterator[Found]:
     """Measure the steps of a model; `u` has one row per step and one column per input."""
-    names = [v.name for v in model.u]
-    hold = {n: Hold(dt * np.arange(len(u)), u[:, i]) for i, n in enumerate(names)}
+    hold = {v.name: Hold(dt * np.arange(len(u)), u[:, i]) for i, v in enumerate(model.u)}
 
     def at_once(rtol: float = RTOL) -> Array:
-        run = simulate(model, dt * len(u), u=hold, rtol=rtol, samples=2, backend=_backend())
+        run = simulate(model, dt * len(u), u=hold, rtol=rtol, samples=2, backend=backend())
         return np.array([run[v.name][-1] for v in model.x])
 
-    plant = stepper(model, dt, rtol=RTOL, backend=_backend())
+    plant = stepper(model, dt, rtol=RTOL, backend=backend())
 
     def step_by_step() -> Array:
         plant.reset()
@@ -144,15 +99,15 @@ def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Itera
             plant.step(row)
         return plant.x.copy()
 
-    methods: dict[str, Callable[[], Array]] = {
+    methods = {
         "stepper": step_by_step, "one simulate, Hold": at_once,
         "casadi rosenbrock": _stepping_peer(model, dt, u),
     }  # fmt: skip
     exact = at_once(1e-10)
-    scale = np.array([v.nominal for v in model.x])
-    scale = np.maximum(scale, np.abs(exact))
+    scale = np.maximum([v.nominal for v in model.x], np.abs(exact))
     errors = {who: float(np.max(np.abs(run() - exact) / scale)) for who, run in methods.items()}
-    yield from _rows(task, "step", dict(methods), errors, len(u), rounds)
+    times = interleaved(methods, rounds)
+    yield from _rows(task, "step", {who: time / len(u) for who, time in times.items()}, errors)
 
 
 def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
@@ -184,10 +139,10 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
     return solve
 
 
-# ---- events ----
+# ---- events, gradients, signals, import ----
 
 
-def _events(quick: bool) -> Iterator[CallRow]:
+def _events(quick: bool) -> Iterator[Found]:
     """Measure exact Maxwell-slip elements with events, and their smooth form."""
     elements = 4 if quick else 30
     pairs: dict[str, Callable[[str], Law]] = {
@@ -195,13 +150,14 @@ def _events(quick: bool) -> Iterator[CallRow]:
         "rabinowicz maxwell_slip, 4 elements": lambda form: MaxwellSlip(form=form),
     }
     for task, law in pairs.items():
-        models = {form: Rabinowicz(law(form)).model() for form in ("smooth", "event")}
-
-        def run(form: str, of: dict[str, Model] = models) -> Trajectory:
-            return simulate(of[form], 20.0, rtol=RTOL, samples=401, backend=_backend())
-
-        calls: Calls = {form: partial(run, form) for form in models}
-        yield from _rows(task, "run", calls, dict.fromkeys(calls, nan), 1, 1 if quick else 3)
+        calls: Calls = {
+            form: partial(
+                simulate, Rabinowicz(law(form)).model(), 20.0, rtol=RTOL, samples=401,
+                backend=backend(),
+            )
+            for form in ("smooth", "event")
+        }  # fmt: skip
+        yield from _rows(task, "run", interleaved(calls, 1 if quick else 3))
 
 
 def _gms(count: int, form: str) -> Law:
@@ -211,10 +167,7 @@ def _gms(count: int, form: str) -> Law:
     return GMS(elements=tuple(Element(float(k), 1.0 / count) for k in stiffness), form=form)
 
 
-# ---- gradients ----
-
-
-def _gradient(quick: bool) -> Iterator[CallRow]:
+def _gradient(quick: bool) -> Iterator[Found]:
     """Measure the gradient of the mean square position at 401 times by four parameters.
 
     Errors are relative to the sum of the magnitudes of the terms.
@@ -223,7 +176,7 @@ def _gradient(quick: bool) -> Iterator[CallRow]:
 
     def run(rtol: float = RTOL, sensitivities: tuple[str, ...] = FREE) -> Trajectory:
         return simulate(
-            model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=_backend(),
+            model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=backend(),
             method="radau5",
         )  # fmt: skip
 
@@ -232,71 +185,51 @@ def _gradient(quick: bool) -> Iterator[CallRow]:
         return np.array([found[name]["x"] for name in FREE])
 
     weights = run(1e-11)["x"]
-
-    def adjoint() -> Array:
-        return np.array(list(run().gradient({"x": weights}).values()))
-
     exact = slopes(1e-11)
     scale = np.abs(exact) @ np.abs(weights)
     methods: dict[str, Callable[[], Array]] = {
-        "run": lambda: run(sensitivities=())["x"],
         "forward": lambda: slopes() @ weights,
-        "adjoint": adjoint,
+        "adjoint": lambda: np.array(list(run().gradient({"x": weights}).values())),
     }
-    errors = {"run": nan} | {
-        who: float(np.max(np.abs(methods[who]() - exact @ weights) / scale))
-        for who in ("forward", "adjoint")
+    errors = {
+        who: float(np.max(np.abs(found() - exact @ weights) / scale))
+        for who, found in methods.items()
     }
-    yield from _rows("gradient, 4 parameters", "run", dict(methods), errors, 1, 2 if quick else 20)
+    times_s = interleaved({"run": lambda: run(sensitivities=())} | methods, 2 if quick else 20)
+    yield from _rows("gradient, 4 parameters", "run", times_s, errors)
 
-
-# ---- signals ----
 
 OFTEN = 60
 """Number of calls after which signals are compiled in the background."""
 
 
-def _signals(quick: bool) -> Iterator[CallRow]:
+def _signals(quick: bool) -> Iterator[Found]:
     """Measure all signals of a mechanism at 2001 times."""
     for name, scene in {"four_bar": FourBar(BrownMcPhee()), "arm": Arm(BrownMcPhee())}.items():
-        runs = {
-            backend: simulate(scene.model(), 0.1, samples=51 if quick else 2001, backend=backend)
-            for backend in dict.fromkeys((_backend(), "vm"))
-        }
-        calls: Calls = {who: partial(run.at, run.t) for who, run in runs.items()}
-        for call in calls.values():
+        calls: Calls = {}
+        for engine in dict.fromkeys((backend(), "vm")):
+            run = simulate(scene.model(), 0.1, samples=51 if quick else 2001, backend=engine)
+            calls[engine] = partial(run.at, run.t)
             for _ in range(1 if quick else OFTEN):
-                call()
+                run.at(run.t)
         wait()
-        yield from _rows(
-            f"signals of {name}", "call", calls, dict.fromkeys(calls, nan), 1, 1 if quick else 3
-        )
+        yield from _rows(f"signals of {name}", "call", interleaved(calls, 1 if quick else 3))
 
 
-# ---- import ----
-
-
-def _imports(quick: bool) -> Iterator[CallRow]:
+def _imports(quick: bool) -> Iterator[Found]:
     """Measure imports of the package, of a first simulation and of CasADi in a new interpreter."""
-    texts = {
-        "import symfric": "import symfric",
-        "from symfric import simulate, ...": "from symfric import LuGre, rabinowicz, simulate",
-        "import casadi": "import casadi",
-    }
-    best = dict.fromkeys(texts, np.inf)
+    statements = (
+        "import symfric", "from symfric import LuGre, rabinowicz, simulate", "import casadi"
+    )  # fmt: skip
+    best = dict.fromkeys(statements, np.inf)
     for _ in range(1 if quick else 7):
-        for who, text in texts.items():
-            best[who] = min(best[who], _spent_by(text))
-    for who, time in best.items():
-        yield CallRow("import", who, 1e6 * time, "import", nan, time / best["import symfric"])
+        for text in statements:
+            code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"
+            done = subprocess.run(
+                [sys.executable, "-c", code], check=True, capture_output=True, text=True
+            )
+            best[text] = min(best[text], float(done.stdout))
+    yield from _rows("import", "import", best)
 
 
-def _spent_by(text: str) -> float:
-    """Return the processor time [s] of an import in a new interpreter."""
-    code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    return float(done.stdout)
-
-
-def _backend() -> str:
-    return "compiled" if find_compiler() else "vm"
+TASKS = (_drive, _arm, _events, _gradient, _signals, _imports)

@@ -1,8 +1,8 @@
 """Generated code at run time: FMUs compared with `simulate`, compensators in a control loop."""
 
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, ExactCoulomb, Hold, Law, LuGre, SolveError, simulate
-from symfric.bench.table import Cell, Goal, Table
+from symfric.bench.report import Found, Row, goal
 from symfric.codegen import Block, law_block
 from symfric.compensation import (
     Cascade,
@@ -44,51 +44,38 @@ LAWS: Mapping[str, Callable[[], Law]] = {
     "exact": ExactCoulomb,
 }
 QUICK = ("rabinowicz", "drive", "pendulum")
-UNIT_TABLE = Table(
+UNITS = (
     f"FMI 3.0 co-simulation at rtol {RTOL:g}, communication step {STEP:g} s; largest difference of "
     "a state from `simulate`, relative to its largest value. Laws: bm: Brown-McPhee, exact: "
-    "Coulomb with events",
-    ("scene, law", "size [kB]", "compile time [s]", "largest difference [rtol]", "attempts",
-     "time per step [us]", f"time per step of {TINY:g} s [us]", f"attempts per step of {TINY:g} s",
-     "messages of FMPy's validator"),
-    (),
-    ("scene, law", "kB", "cc", "rtol", "attempts", "us", "tiny", "a tiny", "fmpy"),
-)  # fmt: skip
+    "Coulomb with events"
+)
+DIFFERENCE, MESSAGES = "largest difference [rtol]", "messages of FMPy's validator"
 
 
-@final
-class _UnfinishedError(Exception):
-    """Error for a scene that `simulate` does not finish either."""
-
-
-def units(quick: bool) -> Table:
+def units(quick: bool) -> Iterator[Found]:
     """Measure every scene and law that `simulate` finishes; `quick`: three scenes."""
     if find_compiler() is None:
-        return replace(UNIT_TABLE, notes=("found no C compiler ($CC, gcc, clang or cc)",))
-    rows: list[list[Cell]] = []
-    goals: list[Goal] = []
-    left: list[str] = []
+        yield "fmu: no C compiler found ($CC, gcc, clang or cc)"
+        return
     for scene in QUICK if quick else ALL_SCENES:
         for law, make in LAWS.items():
             name = f"{scene} {law}"
             try:
-                row, worst, messages = _unit_row(ALL_SCENES[scene](make()))
-            except _UnfinishedError:
-                left.append(name)
+                row = _unit(ALL_SCENES[scene](make()))
+            except SolveError:
+                yield f"fmu: simulate does not finish {name} either"
                 continue
-            rows.append([name, *row, messages if isinstance(messages, str) else float(messages)])
+            yield UNITS, {"scene, law": name, **row}
             if law != "exact":
-                goals.append(Goal(f"{name}: difference [rtol]", worst, MOST))
-            if not isinstance(messages, str):
-                goals.append(Goal(f"{name}: messages of FMPy", float(messages), 0.0))
-    notes = [f"simulate itself does not finish {', '.join(left)}"] if left else []
+                yield goal(f"{name}: difference [rtol]", float(row[DIFFERENCE]), MOST)
+            if row[MESSAGES] != "-":
+                yield goal(f"{name}: messages of FMPy", float(row[MESSAGES]), 0.0)
     if find_spec("fmpy") is None:
-        notes.append("FMPy's validator was not run: pip install fmpy")
-    return replace(UNIT_TABLE, rows=rows, goals=goals, notes=notes)
+        yield "fmu: FMPy's validator was not run: pip install fmpy"
 
 
-def _unit_row(scene: Scene) -> tuple[list[Cell], float, str | int]:
-    """Return the cells of an FMU, its largest difference [rtol], and messages of the validator."""
+def _unit(scene: Scene) -> Row:
+    """Return the measurements of one FMU."""
     with tempfile.TemporaryDirectory() as folder:
         times: Array = STEP * np.arange(round(scene.t_end / STEP) + 1, dtype=float)
         unit = export_fmu(scene, Path(folder) / "unit.fmu", rtol=RTOL, t_end=float(times[-1]))
@@ -96,10 +83,7 @@ def _unit_row(scene: Scene) -> tuple[list[Cell], float, str | int]:
         model = scene.model(tuned)
         given = {v.name: 2.0 * np.sin(np.pi * times) for v in model.u}
         held: dict[str, Input] = {name: Hold(times, values) for name, values in given.items()}
-        try:
-            same = simulate(model, float(times[-1]), t_eval=times, rtol=RTOL, u=held)
-        except SolveError as error:
-            raise _UnfinishedError from error
+        same = simulate(model, float(times[-1]), t_eval=times, rtol=RTOL, u=held)
         # an event at a communication point, or at the start, occurs in the step after it
         names = [v.name for v in model.x if not v.name.endswith("mode")]
         found, attempts, each = _stepped(unit, names, times, given)
@@ -108,12 +92,22 @@ def _unit_row(scene: Scene) -> tuple[list[Cell], float, str | int]:
             for name, column in zip(names, found.T, strict=True)
             if np.abs(same[name]).max() > 0
         )
-        tiny, spent = _tiny(unit)
-        row: list[Cell] = [
-            round(unit.size / 1024), round(unit.times[1], 1), round(worst / RTOL, 3), attempts,
-            round(1e6 * each), round(1e6 * tiny, 1), round(spent, 3),
-        ]  # fmt: skip
-        return row, worst / RTOL, _validated(unit)
+        count = round(0.1 / TINY)
+        with running(unit.path) as one:
+            begin = perf_counter()
+            for _ in range(count):
+                one.step(TINY)
+            tiny = (perf_counter() - begin) / count
+            tiny_attempts = float(one.get(["attempts"])[0]) / count
+        messages = "-"
+        if find_spec("fmpy") is not None:
+            messages = len(import_module("fmpy.validation").validate_fmu(str(unit.path)))
+        return {
+            "size [kB]": round(unit.size / 1024), "compile time [s]": unit.times[1],
+            DIFFERENCE: worst / RTOL, "attempts": attempts, "time per step [us]": 1e6 * each,
+            f"time per step of {TINY:g} s [us]": 1e6 * tiny,
+            f"attempts per step of {TINY:g} s": tiny_attempts, MESSAGES: messages,
+        }  # fmt: skip
 
 
 def _stepped(
@@ -129,25 +123,8 @@ def _stepped(
                 one.set({name: float(values[k]) for name, values in given.items()})
             one.step(float(times[k + 1] - times[k]))
             rows.append(one.get(names))
-        return np.array(rows), float(one.get(["attempts"])[0]), (perf_counter() - begin) / len(rows)
-
-
-def _tiny(unit: Exported) -> tuple[float, float]:
-    """Return mean time [s] and attempts of tiny communication steps over a tenth of a second."""
-    count = round(0.1 / TINY)
-    with running(unit.path) as one:
-        begin = perf_counter()
-        for _ in range(count):
-            one.step(TINY)
-        spent = perf_counter() - begin
-        return spent / count, float(one.get(["attempts"])[0]) / count
-
-
-def _validated(unit: Exported) -> str | int:
-    """Return the number of messages of FMPy's validator, or a dash."""
-    if find_spec("fmpy") is None:
-        return "-"
-    return len(import_module("fmpy.validation").validate_fmu(str(unit.path)))
+        each = (perf_counter() - begin) / (times.size - 1)
+        return np.array(rows), float(one.get(["attempts"])[0]), each
 
 
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
@@ -160,6 +137,10 @@ GOAL = 5.0
 """Goal for the reduction factor of the RMS error."""
 PROVEN = "excess 0"
 """Case whose numbers have goals."""
+LOOPS = (
+    "Compensators in C in a position loop (1 kg, 1 kHz, counts of 1 um, delay of one sample): "
+    "reduction factor of the RMS error of a sine / hunting after a step [counts]"
+)
 
 
 @final
@@ -188,7 +169,9 @@ def trials() -> list[Trial]:
     """Return LuGre compensators with exact and wrong parameters, observers, and combinations."""
     law = compensator(BELIEVED, v_blend=0.02, error_gain=CONTROLLER.kp)
     plain = compensator(BELIEVED, v_blend=0.02)
-    levels = {f"levels x {s:g}": _levels(s) for s in (1.0, 0.5, 0.8, 1.2)}
+    levels = {
+        f"levels x {s:g}": {"scale_coulomb": s, "scale_stribeck": s} for s in (1.0, 0.5, 0.8, 1.2)
+    }
     force = disturbance_observer(CONTROLLER.inertia, 100.0)
     return [
         Trial((law,), levels | {PROVEN: {"scale_stribeck": 0.0}}),
@@ -202,78 +185,48 @@ def trials() -> list[Trial]:
     ]  # fmt: skip
 
 
-def _levels(s: float) -> dict[str, float]:
-    return {"scale_coulomb": s, "scale_stribeck": s}
+def compensation(quick: bool) -> Iterator[Found]:
+    """Measure every case on every plant; the first case has no compensation."""
+    rows: dict[str, dict[str, str]] = {}
+    for name, law in plants(quick).items():
+        plant = drive(law, m=CONTROLLER.inertia, N=1.0)
+        for trial in trials():
+            moving, resting = (
+                close_loop(
+                    plant, reference, trial.blocks,
+                    controller=CONTROLLER, cases=trial.cases, noise=trial.noise,
+                )
+                for reference in (sine(0.02, 0.5, 6.0), step(0.01, 20.0))
+            )  # fmt: skip
+            for case in ("without", *trial.cases):
+                smaller = moving.reduction(case)
+                hunting = resting[case].hunting / resting.count
+                shown = f"{hunting:.4g}" if not hunting < 1e-3 else "0"
+                rows.setdefault(case, {"case": case})[name] = f"{smaller:.3g} / {shown}"
+                if why := moving[case].ended or resting[case].ended:
+                    yield f"compensation: {name}, {case}: {why}"
+                if case == PROVEN:
+                    yield goal(f"{name}: reduction of the RMS error [1]", smaller, GOAL, ">=")
+                    yield goal(f"{name}: hunting [counts]", hunting, 1.0)
+    yield from ((LOOPS, row) for row in rows.values())
+    yield from (f"compensation: {note}" for note in (_cost(), *NOTES))
 
 
-def compensation(quick: bool) -> Table:
-    """Measure every case on every plant."""
-    known, ended = plants(quick), dict[str, str]()
-    columns = {name: _column(name, law, ended) for name, law in known.items()}
-    first = next(iter(columns.values()))
-    rows: list[list[Cell]] = [
-        [case, *(_compensated(*column[case]) for column in columns.values())] for case in first
-    ]
-    goals = [
-        goal
-        for name, column in columns.items()
-        for goal in (
-            Goal(f"{name}: reduction of the RMS error [1]", column[PROVEN][0], GOAL, ">="),
-            Goal(f"{name}: hunting [counts]", column[PROVEN][1], 1.0),
-        )
-    ]
-    return Table(
-        "Compensators in C in a position loop (1 kg, 1 kHz, counts of 1 um, delay of one sample): "
-        "reduction factor of the RMS error of a sine / hunting after a step [counts]",
-        ["case", *known],
-        rows,
-        goals=goals,
-        notes=_notes(ended),
-    )
-
-
-def _column(name: str, law: Law, ended: dict[str, str]) -> dict[str, tuple[float, float]]:
-    """Return case -> (reduction factor, hunting [counts]); the first case has no compensation."""
-    plant = drive(law, m=CONTROLLER.inertia, N=1.0)
-    found: dict[str, tuple[float, float]] = {}
-    for trial in trials():
-        moving, resting = (
-            close_loop(
-                plant, reference, trial.blocks,
-                controller=CONTROLLER, cases=trial.cases, noise=trial.noise,
-            )
-            for reference in (sine(0.02, 0.5, 6.0), step(0.01, 20.0))
-        )  # fmt: skip
-        for case in ("without", *trial.cases):
-            hunting = resting[case].hunting / resting.count
-            found[case] = moving.reduction(case), hunting
-            if why := moving[case].ended or resting[case].ended:
-                ended[f"{name}, {case}"] = why
-    return found
-
-
-def _compensated(smaller: float, hunting: float) -> str:
-    return f"{smaller:.3g} / {hunting:.4g}" if not hunting < 1e-3 else f"{smaller:.3g} / 0"
-
-
-def _size() -> str:
+def _cost() -> str:
     """Describe the cost of the compensator's C on a small core."""
-    whole, alone = on_core(trials()[0].blocks[0]), on_core(law_block(BELIEVED))
-    if not whole.ok:
-        return f"No instructions counted: {whole.status}"
+    both, alone = on_core(trials()[0].blocks[0]), on_core(law_block(BELIEVED))
+    if not both.ok:
+        return f"no instructions counted, {both.status}"
     return (
-        f"Cortex-M4F, float, guards: {whole.average:.0f} instructions per sample (LuGre alone "
-        f"{alone.average:.0f}), text {whole.text:.0f} B, stack {whole.stack:.0f} B."
+        f"Cortex-M4F, float, guards: {both.average:.0f} instructions per sample (LuGre alone "
+        f"{alone.average:.0f}), text {both.text:.0f} B, stack {both.stack:.0f} B"
     )
 
 
-def _notes(ended: Mapping[str, str]) -> list[str]:
-    return [
-        *(f"{case}: {why}" for case, why in ended.items()),
-        _size(),
-        "Hunting: peak-to-peak motion in the second half of 20 s at rest.",
-        "Compensators use LuGre with half the stiffness of the plants; levels x s scales both "
-        "levels of it.",
-        f"{PROVEN}: without the excess of break-away over sliding friction; this case has goals.",
-        "its k = 0: LuGre driven by the measured velocity alone, without correction.",
-    ]
+NOTES = (
+    "hunting is the peak-to-peak motion in the second half of 20 s at rest",
+    "compensators use LuGre with half the stiffness of the plants; levels x s scales both levels "
+    "of it",
+    f"{PROVEN} is without the excess of break-away over sliding friction; this case has goals",
+    "its k = 0 is LuGre driven by the measured velocity alone, without correction",
+)

@@ -1,9 +1,9 @@
-"""Integrators that are compared: ours, CasADi's and SciPy's on the same model, and C by hand.
+"""Compared integrators: those of symfric, CasADi and SciPy on the same model, and C by hand.
 
-Each is made for one tolerance and then called as often as needed. A call is what a user waits for
-once everything is built: `simulate` starts from names, solves for a consistent start and ends in
-named signals; the others get that start and end in states. So does our compiled loop alone,
-`loop`, for comparison where a run takes some milliseconds or less.
+Each is built for one tolerance and then called repeatedly. The measured call is what a user waits
+for once everything is built. `simulate` starts from names, solves for a consistent start and
+returns named signals; the others get that start and return states. So does `loop`, the compiled
+loop of symfric alone, for comparison if a run takes a few milliseconds or less.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.table import FASTEST, compile_time
+from symfric.bench.report import FASTEST, compile_time
 from symfric.foundation.numeric import bound
 from symfric.integrator.arguments import chosen
 from symfric.integrator.by_peer import peer
@@ -26,7 +26,7 @@ from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.initial import consistent, first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
@@ -41,13 +41,13 @@ Watched = tuple[str, ...]
 """Names of states."""
 Solve = Callable[..., tuple[Array, Callable[[], int]]]
 """Start values by keyword -> watched states at the times, shape (watched, times), and a function
-that counts the steps, which takes no time of the call."""
+that counts the steps outside the measured time."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A solver made for one tolerance; `compile_s` is the time of the C compiler for it [s]."""
+    """Solver built for one tolerance; `compile_s` is the time of the C compiler for it [s]."""
 
     solve: Solve
     compile_s: float = 0.0
@@ -61,7 +61,7 @@ def ours(
     backend: str = "compiled",
     method: str = "auto",
 ) -> Contender:
-    """`simulate`, with everything a user pays for; its step is compiled once for all tolerances."""
+    """Return `simulate` with all its overhead; its step is compiled once for all tolerances."""
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
         run = simulate(
@@ -74,16 +74,16 @@ def ours(
 
 
 def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
-    """The compiled loop of `simulate` alone, from a consistent start to states: as peers run."""
+    """Return the compiled loop of `simulate` alone, from a consistent start to states."""
     whole, inputs = equations(model, float(times[-1]))
     made = Integrator(model, inputs, chosen("bench", "auto", rtol))
-    engine, end = made.compiled(), float(times[-1])
+    engine, end = made.compiled, float(times[-1])
     rows, work = [whole.names.index(name) for name in watched], made.borrow()
     begin = _beginning(model, whole)
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
-        State.begin(work.S, 0.0, first_step(end), begin(**start))
-        Given.begin(work.R, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(0))
+        work.S[:] = State.at(0.0, first_step(end), begin(**start))
+        work.R[:] = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
         work.want(outputs, None)
@@ -108,10 +108,12 @@ def casadi(
     as_c: bool = True,
     explicit: bool = False,
 ) -> Contender:
-    """CasADi's integrator `plugin`, its states scaled by nominal values as ours are.
+    """Return CasADi's integrator `plugin`, with states scaled by nominal values as in symfric.
 
     Args:
-        as_c: compile it whole.
+        model, times, watched, rtol: as in `Solve`, and the relative tolerance.
+        plugin: name of the integrator.
+        as_c: compile the whole integrator.
         explicit: eliminate the accelerations, x' = ode(x, z), instead of solving for them along
             with multipliers and normal forces.
     """
@@ -127,7 +129,10 @@ def casadi(
         options["quad_err_con"] = True
     solver = ca.integrator("peer", plugin, dae, 0.0, times.tolist(), options)
     run, seconds = compiled(solver) if as_c else (solver, 0.0)
-    call, find = _from_start_to_states(run)
+    n_x, n_z = run.numel_in("x0"), run.numel_in("z0")
+    x0, z0 = ca.MX.sym("x0", n_x), ca.MX.sym("z0", n_z)
+    whole_run = ca.Function("run", [ca.vertcat(x0, z0)], [run(x0=x0, z0=z0)["xf"]])
+    given, evaluate, ends = buffered(whole_run)
     rows = [whole.names.index(name) for name in watched]
     begin = _beginning(model, whole)
 
@@ -138,45 +143,29 @@ def casadi(
         return np.concatenate([y0[: whole.nx] / scale[: whole.nx], z0])
 
     def solve(**start: float) -> tuple[Array, Callable[[], int]]:
-        given = scaled(**start)
+        given[:] = scaled(**start)
 
         def count() -> int:
             if as_c:
-                solver(x0=given[: whole.nx], z0=given[whole.nx :])
+                solver(x0=given[:n_x], z0=given[n_x:])
             stats = solver.stats()
             return int(stats.get("n_steps", stats.get("nsteps", 0)))
 
-        states = call(given) if as_c else find(given)
-        return states.reshape(times.size, -1).T[rows] * scale[rows, None], count
+        if as_c:
+            evaluate()
+            states = ends.reshape(times.size, -1).T
+        else:
+            states = solver(x0=given[:n_x], z0=given[n_x:])["xf"].full()
+        return states[rows] * scale[rows, None], count
 
     return Contender(solve, seconds)
 
 
-def _from_start_to_states(
-    solver: ca.Function,
-) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-    """An integrator from (x0, z0) to all states at the times: through buffers, and as it is."""
-    n_x, n_z = solver.numel_in("x0"), solver.numel_in("z0")
-    x, z = ca.MX.sym("x0", n_x), ca.MX.sym("z0", n_z)
-    whole = ca.Function("start_to_states", [ca.vertcat(x, z)], [solver(x0=x, z0=z)["xf"]])
-    given, evaluate, ends = buffered(whole)
-
-    def call(start: Array) -> Array:
-        given[:] = start
-        evaluate()
-        return ends.copy()
-
-    def find(start: Array) -> Array:
-        return solver(x0=start[:n_x], z0=start[n_x:])["xf"].full().ravel("F")
-
-    return call, find
-
-
 def idas(model: Model, times: Array, watched: Watched, rtol: float, name: str) -> Contender:
-    """SUNDIALS' idas, which cannot be compiled: "sundials" for index 1, "ggl" for index 2.
+    """Return SUNDIALS' idas, which cannot be compiled: "sundials" for index 1, "ggl" for index 2.
 
     Raises:
-        RuntimeError: it fails.
+        RuntimeError: the integrator fails.
     """
     whole, inputs = equations(model, float(times[-1]))
     problem = peer(whole, inputs, np.zeros(0), tolerances(whole, rtol), name)
@@ -195,7 +184,7 @@ def idas(model: Model, times: Array, watched: Watched, rtol: float, name: str) -
 
 
 def scipy(model: Model, times: Array, watched: Watched, rtol: float, method: str) -> Contender:
-    """SciPy's `solve_ivp` with right-hand side and exact Jacobian from CasADi buffers.
+    """Return SciPy's `solve_ivp` with right-hand side and exact Jacobian from CasADi buffers.
 
     Raises:
         ModuleNotFoundError: SciPy is not installed.
@@ -241,22 +230,22 @@ MECHANISMS: dict[str, tuple[str, Callable[..., Contender]]] = {
     "idas absolute": ("absolute", partial(idas, name="sundials")),
     "idas joint": ("joint", partial(idas, name="sundials")),
 }
-"""Name -> formulation, and how a solver is made of its model; "ode": accelerations eliminated."""
+"""Name -> formulation, and function that makes a contender; "ode": accelerations eliminated."""
 
 
 def equations(model: Model, end: float) -> tuple[System, InputData]:
-    """The equations of a model without inputs, from 0 to `end` [s]."""
+    """Return the equations of a model without inputs, from 0 to `end` [s]."""
     inputs = input_data(model, None, 0.0, end)
     return system(model, inputs), inputs
 
 
 def tolerances(whole: System, rtol: float) -> Tolerances:
-    """Return absolute tolerances of the others: a tenth of the relative one times nominal."""
+    """Return the tolerances of other integrators: absolute ones are 0.1 rtol times nominal."""
     return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
 
 
 def _beginning(model: Model, whole: System) -> Callable[..., Array]:
-    """Start values by keyword -> all unknowns, consistent; kept, as it is not what is measured."""
+    """Return a cached function from start values by keyword to all consistent unknowns."""
 
     @cache
     def begin(**start: float) -> Array:
@@ -267,13 +256,13 @@ def _beginning(model: Model, whole: System) -> Callable[..., Array]:
 
 
 def buffered(function: ca.Function) -> tuple[Array, Callable[[], None], Array]:
-    """First argument, call and first result of a Function, without conversions."""
+    """Return buffer of the first argument, call and buffer of the first result of a Function."""
     given, found = np.zeros(function.numel_in(0)), np.zeros(function.numel_out(0))
     return given, bound(function, (given,), (found,)), found
 
 
 def compiled(function: ca.Function) -> tuple[ca.Function, float]:
-    """`function` from generated C, and the time of the compiler [s]; never from a cache.
+    """Return `function` from generated C, and the time of the compiler [s]; never from a cache.
 
     Raises:
         CompileError: no compiler.
@@ -286,62 +275,42 @@ def compiled(function: ca.Function) -> tuple[ca.Function, float]:
         return ca.external(function.name(), str(shared)), seconds
 
 
-class ByHand:
-    """Rabinowicz's stick-slip with Brown-McPhee friction in C by hand: a bound for general codes.
+def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
+    """Return Rabinowicz's stick-slip with Brown-McPhee friction in C: a bound for general codes.
 
     RADAU5 (Hairer and Wanner, IV.8) for this one equation of two states: derivatives by hand, 2 by
     2 systems in closed form, derivatives kept while Newton's method converges fast, the collocation
-    polynomial as dense output and first guess, Gustafsson's controller. Nothing is checked.
+    polynomial as dense output and first guess, Gustafsson's controller. It checks nothing. Scene
+    and law have their default parameters; only `watched` = ("x",) is returned.
 
     Raises:
-        CompileError: there is no compiler, or it failed.
+        CompileError: no compiler, or an error of the compiler.
     """
-
-    def __init__(self, scene: Rabinowicz) -> None:
-        law = scene.law
-        if not isinstance(law, BrownMcPhee) or law.mu_v:
-            raise ValueError(f"by_hand: expected BrownMcPhee without viscous part, got {law!r}")
-        given = {name: getattr(law, name) for name in ("mu_s", "mu_d", "v_t")}
-        given |= {name: getattr(scene, name) for name in ("m", "k", "v_belt", "g")}
-        numbers = [f"#define P_{n} {float(x)!r}\n" for n, x in (given | collocation()).items()]
-        source = "".join(numbers) + Path(__file__).with_name("by_hand.c").read_text("utf-8")
-        self._run = ctypes.CDLL(str(library(source, "by_hand", flags=FASTEST))).by_hand
-        self._run.restype = ctypes.c_longlong
-        self._run.argtypes = [
-            *[ctypes.c_double] * 3, ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 2,
-        ]  # fmt: skip
-
-    def __call__(self, v: float, times: Array, rtol: float) -> tuple[Array, int]:
-        """Position [m] and velocity [m/s] at `times` > 0 [s], shape (2, times), and steps.
-
-        Args:
-            v: velocity at the start [m/s]; the position is 0.
-            times: increasing.
-            rtol: relative tolerance; absolute ones are 0.1 rtol times 0.1 m and 0.1 m/s.
-        """
-        found, steps = np.empty((2, times.size)), np.zeros(1, dtype=np.int64)
-        if self._run(
-            v, rtol, 0.01 * rtol, times.ctypes.data, times.size, found.ctypes.data,
-            steps.ctypes.data,
-        ):  # fmt: skip
-            raise RuntimeError("by_hand: expected a solution, got steps that shrink to nothing")
-        return found, int(steps[0])
-
-
-def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
-    """`ByHand` with the default numbers of scene and law, of which `model` is made."""
-    del model, watched  # its position
-    run = ByHand(Rabinowicz(BrownMcPhee()))
+    del model, watched
+    scene, law = Rabinowicz(BrownMcPhee()), BrownMcPhee()
+    numbers = {name: getattr(law, name) for name in ("mu_s", "mu_d", "v_t")}
+    numbers |= {name: getattr(scene, name) for name in ("m", "k", "v_belt", "g")} | collocation()
+    defined = "".join(f"#define P_{n} {float(x)!r}\n" for n, x in numbers.items())
+    source = defined + Path(__file__).with_name("by_hand.c").read_text("utf-8")
+    run = ctypes.CDLL(str(library(source, "by_hand", flags=FASTEST))).by_hand
+    run.restype = ctypes.c_longlong
+    run.argtypes = [
+        *[ctypes.c_double] * 3, ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 2,
+    ]  # fmt: skip
+    found, steps = np.empty((2, times.size)), np.zeros(1, dtype=np.int64)
 
     def solve(v: float) -> tuple[Array, Callable[[], int]]:
-        found, steps = run(v, times, rtol)
-        return found[:1], lambda: steps
+        steps[:] = 0
+        where = (times.ctypes.data, times.size, found.ctypes.data, steps.ctypes.data)
+        if run(v, rtol, 0.01 * rtol, *where):
+            raise RuntimeError("by_hand: expected a solution, got steps that shrink to zero")
+        return found[:1].copy(), lambda: int(steps[0])
 
     return Contender(solve)
 
 
 def collocation() -> dict[str, float]:
-    """Constants of the three-stage method of Radau: T^-1 A^-1 T is one real and one complex block.
+    """Return constants of the three-stage Radau method: T^-1 A^-1 T is a real and a complex block.
 
     Source: Hairer and Wanner, IV.8.
     """

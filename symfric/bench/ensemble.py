@@ -1,19 +1,15 @@
 """Benchmarks of ensembles in SIMD lanes, on threads and on a graphics processor."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import partial
 from os import cpu_count
-from time import perf_counter
-from typing import NamedTuple, final
-from warnings import catch_warnings, simplefilter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench import table
-from symfric.bench.contenders import Solve, casadi
-from symfric.bench.table import best_time, interleaved
+from symfric.bench.contenders import casadi
+from symfric.bench.report import Found, Progress, Report, best_time, interleaved, unwarned
 from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda import on_device
 from symfric.integrator.cuda.device import DeviceError
@@ -21,7 +17,7 @@ from symfric.integrator.equations.initial import first_guess, first_step, smalle
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.program import program
 from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
@@ -32,139 +28,43 @@ from symfric.scenes import FourBar, Pendulum, SliderCrank, rabinowicz
 Array = NDArray[np.float64]
 RTOL, MOST = 1e-6, 10_000_000
 MEMBERS = 400
+LANES = "Processor time of an ensemble and of the same runs one by one, on one core"
+CUDA = "Ensembles on a graphics processor and on all cores"
+THREADS = "Ensembles on threads, and a Python loop over cvodes at the same rtol"
 
 
-class LaneRow(NamedTuple):
-    """Ensemble over a start value, on one core.
-
-    Attributes:
-        case: scene and law.
-        members: number of members.
-        lanes: number of members per SIMD vector.
-        member_us: time per member of a whole call of `simulate_many` [us].
-        alone_us: the same for the compiled loop of `simulate`, which writes no results here.
-        ratio: alone_us over member_us.
-        again_ms: repeated call for one member and one millisecond [ms].
-        attempts: mean number of attempts per member.
-        equal: fraction of members with equal attempts in both; the others differ because vector
-            versions of exp, tanh, sin ... differ from libm in the last digit.
-        difference: median over members of the largest difference of a state at the end, relative to
-            the largest state of all members.
-    """
-
-    case: str
-    members: int
-    lanes: int
-    member_us: float
-    alone_us: float
-    ratio: float
-    again_ms: float
-    attempts: float
-    equal: float
-    difference: float
-
-
-@final
-@dataclass(frozen=True)
-class CudaRow:
-    """Ensemble over a start value on a graphics processor.
+class Case(NamedTuple):
+    """Ensemble over the start value of the first velocity.
 
     Attributes:
-        case: scene and law.
-        real: floating point type.
-        rtol: relative tolerance of both.
-        device: name of the device; "no GPU" if there is none, and nothing is measured.
-        members: number of members.
-        first_s: time of the first call for a few members, with compilation by NVRTC [s].
-        per_second: members per second of a whole call.
-        cores_per_second: the same for compiled code on all cores, on a sample of the members.
-        ratio: per_second over cores_per_second.
-        equal: fraction of the sample with equal attempts on both.
-        difference: median over the sample of the largest difference of a state at the end, relative
-            to the largest state of all members.
-        why: reason why nothing was measured.
+        name: scene and law.
+        make: function that returns the model.
+        t_end: end time [s].
+        fewer: divisor of the number of members.
     """
 
-    case: str
-    real: str
-    rtol: float
-    device: str = "no GPU"
-    members: int = 0
-    first_s: float = 0.0
-    per_second: float = 0.0
-    cores_per_second: float = 0.0
-    ratio: float = 0.0
-    equal: float = 0.0
-    difference: float = 0.0
-    why: str = ""
+    name: str
+    make: Callable[[], Model]
+    t_end: float
+    fewer: int
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class LaneBenchmark(table.Report):
-    """Results on one core, and on a graphics processor."""
-
-    rows: tuple[LaneRow, ...]
-    cuda: tuple[CudaRow, ...]
-
-    def shown(self) -> Iterator[table.Table | str]:
-        """Yield tables of ensembles and single runs."""
-        yield table.of(
-            "Processor time of an ensemble and of the same runs one by one, on one core",
-            self.rows,
-            {"case": "case", "lanes": "lanes",
-             "time per member [us]": table.rounded("member_us", 1),
-             "one by one [us]": table.rounded("alone_us", 1),
-             "ratio to the ensemble": table.rounded("ratio", 2),
-             "attempts per member": table.rounded("attempts")},
-        )  # fmt: skip
-        yield table.of(
-            "Overhead of a call, and agreement of the ensemble with single runs",
-            self.rows,
-            {"case": "case", "members": "members",
-             "repeated call, one member [ms]": table.rounded("again_ms", 2),
-             "members with equal attempts": lambda r: f"{r.equal:.0%}",
-             "relative difference at the end": table.shortened("difference")},
-        )  # fmt: skip
-        yield from on_graphics_processor(self.cuda)
-
-
-def on_graphics_processor(rows: Sequence[CudaRow]) -> Iterator[table.Table | str]:
-    """Yield the table of members per second, and devices or the reasons why nothing was run."""
-    yield table.Table(
-        "Ensembles on a graphics processor and on all cores",
-        ["case", "type", "members per second", "members per second, all cores",
-         "ratio to all cores", "relative difference at the end"],
-        [
-            [r.case, r.real, r.device, "", "", ""] if r.why else
-            [r.case, r.real, round(r.per_second), round(r.cores_per_second), round(r.ratio, 1),
-             table.short(r.difference)]
-            for r in rows
-        ],
-    )  # fmt: skip
-    yield from dict.fromkeys(r.why or f"{r.device}, {r.members} members" for r in rows)
-
-
-Case = tuple[str, Callable[[], Model], float, int]
-CASES: tuple[Case, ...] = (
-    ("rabinowicz/brown_mcphee", lambda: rabinowicz(BrownMcPhee()), 20.0, 1),
-    ("rabinowicz/lugre", lambda: rabinowicz(LuGre()), 20.0, 1),
-    ("pendulum/brown_mcphee", lambda: Pendulum(BrownMcPhee()).model(), 5.0, 2),
-    ("slider_crank/brown_mcphee", lambda: SliderCrank(BrownMcPhee()).model(), 1.0, 4),
-    ("four_bar/brown_mcphee", lambda: FourBar(BrownMcPhee()).model(), 0.5, 4),
+CASES = (
+    Case("rabinowicz/brown_mcphee", lambda: rabinowicz(BrownMcPhee()), 20.0, 1),
+    Case("rabinowicz/lugre", lambda: rabinowicz(LuGre()), 20.0, 1),
+    Case("pendulum/brown_mcphee", lambda: Pendulum(BrownMcPhee()).model(), 5.0, 2),
+    Case("slider_crank/brown_mcphee", lambda: SliderCrank(BrownMcPhee()).model(), 1.0, 4),
+    Case("four_bar/brown_mcphee", lambda: FourBar(BrownMcPhee()).model(), 0.5, 4),
 )
-"""Name, model, end time [s], and divisor of the number of members; the start value of the first
-velocity varies."""
 
 
-def bench_ensemble(*, quick: bool = False, progress: table.Progress = None) -> LaneBenchmark:
+def bench(quick: bool = False, progress: Progress = None) -> Report:
     """Measure all cases; `quick`: two, with few members."""
-    cases = CASES[:2] if quick else CASES
-    rows = tuple(
-        _lane_row(name, make(), end, 20 if quick else MEMBERS // fewer)
-        for name, make, end, fewer in table.each(cases, progress, lambda case: case[0])
-    )
-    return LaneBenchmark(rows, measure_cuda(quick=quick))
+    tasks: dict[str, Callable[[], Iterator[Found]]] = {
+        case.name: partial(_lanes, case, 20 if quick else MEMBERS // case.fewer)
+        for case in (CASES[:2] if quick else CASES)
+    }
+    return Report().collect(tasks | {"graphics processor": partial(cuda, quick)}, progress)
 
 
 def _starts(model: Model, members: int) -> tuple[str, Array]:
@@ -180,11 +80,19 @@ def _ends(model: Model, many: Ensemble) -> Array:
 
 
 def _difference(y: Array, x: Array) -> float:
-    """Return the median over members of the largest relative difference of a state."""
+    """Return the median over members of the largest difference of a state, relative to the largest
+    state of all members.
+    """
     return float(np.median((np.abs(y - x) / (np.abs(x).max(axis=0) + 1e-300)).max(axis=1)))
 
 
-def _lane_row(name: str, model: Model, end: float, members: int) -> LaneRow:
+def _lanes(case: Case, members: int) -> Iterator[Found]:
+    """Measure `simulate_many` and the compiled loop of `simulate`, which writes no results here.
+
+    Attempts may differ between both because vector versions of exp, tanh, sin ... differ from libm
+    in the last digit.
+    """
+    model, end = case.make(), case.t_end
     state, values = _starts(model, members)
 
     def together(count: int = members, t_end: float = end) -> Ensemble:
@@ -199,23 +107,18 @@ def _lane_row(name: str, model: Model, end: float, members: int) -> LaneRow:
     )
     many, (S, attempts) = together(), alone()
     y = _ends(model, many)
-    return LaneRow(
-        case=name,
-        members=members,
-        lanes=_lanes(model, end),
-        member_us=1e6 * best["together"] / members,
-        alone_us=1e6 * best["alone"] / members,
-        ratio=best["alone"] / best["together"],
-        again_ms=1e3 * best["again"],
-        attempts=float(attempts.mean()),
-        equal=float((attempts == many.attempts).mean()),
-        difference=_difference(y, S[:, State.Y][:, : y.shape[1]]),
-    )
-
-
-def _lanes(model: Model, end: float) -> int:
     integrator, _ = built(model, input_data(model, None, 0.0, end), ADAPTIVE["rodas5p"])
-    return int(getattr(program(integrator, True).load(), "lanes", 1))
+    yield LANES, {
+        "case": case.name, "members": members,
+        "lanes": int(getattr(program(integrator, True).load(), "lanes", 1)),
+        "time per member [us]": 1e6 * best["together"] / members,
+        "one by one [us]": 1e6 * best["alone"] / members,
+        "ratio to the ensemble": best["alone"] / best["together"],
+        "repeated call, one member [ms]": 1e3 * best["again"],
+        "attempts per member": float(attempts.mean()),
+        "members with equal attempts [%]": 100.0 * float((attempts == many.attempts).mean()),
+        "relative difference at the end": _difference(y, S[:, State.Y][:, : y.shape[1]]),
+    }  # fmt: skip
 
 
 def _one_by_one(
@@ -224,7 +127,7 @@ def _one_by_one(
     """Return a function that runs all members in the compiled loop; it returns states, attempts."""
     inputs = input_data(model, None, 0.0, end)
     integrator, _ = built(model, inputs, ADAPTIVE["rodas5p"])
-    engine, members = integrator.compiled(), next(iter(x0.values())).size
+    engine, members = integrator.compiled, next(iter(x0.values())).size
     x, p = model.initial_states(x0, {}, members)
     data = np.tile(inputs.values[:, 0], (members, 1))
     y, d = first_guess(integrator.system, model, x), np.hstack([p, data])
@@ -251,144 +154,98 @@ def _one_by_one(
     return run
 
 
-Array = NDArray[np.float64]
+# ---- on threads; measured by `symfric bench integrator` ----
+
 THREAD_END = 20.0
 THREADED, SAMPLED, REPEATS = 10_000, 200, 3
 
 
-class EnsembleRow(NamedTuple):
-    """Ensemble over start velocities, on threads.
+def threads(case: str, law: Law, quick: bool) -> Iterator[Found]:
+    """Measure ensembles over the start velocity on one thread, two, four ... and all cores.
 
-    Attributes:
-        case: scene and law.
-        rtol: relative tolerance of both integrators.
-        members: number of runs.
-        workers: number of threads.
-        time_s: shortest wall time of the call [s].
-        member_s: time per member [s].
-        efficiency: time on one thread over (workers * time).
-        error: median relative position error at the end, on a sample of members.
-        cvodes_member_s: time per member [s] of a Python loop over cvodes, on the sample.
-        cvodes_error: error of cvodes on the sample.
-        ratio: cvodes_member_s over member_s.
+    Errors are medians of the relative position error at the end on a sample of members, on which
+    cvodes runs as well. The parallel efficiency is the time on one thread over (threads * time).
     """
-
-    case: str
-    rtol: float
-    members: int
-    workers: int
-    time_s: float
-    member_s: float
-    efficiency: float
-    error: float
-    cvodes_member_s: float
-    cvodes_error: float
-    ratio: float
-
-
-def measure_ensemble(case: str, law: Law, quick: bool) -> list[EnsembleRow]:
-    """Measure ensembles on one thread, two, four ... and all cores."""
     members, sample = (40, 4) if quick else (THREADED, SAMPLED)
     model, velocities = rabinowicz(law), np.linspace(-0.1, 0.1, members)
     picked = np.linspace(0, members - 1, sample).astype(int)
-    exact = np.array([_end(model, v) for v in velocities[picked]])
-    cvodes = casadi(model, np.array([THREAD_END]), ("x",), RTOL, "cvodes", as_c=False).solve
+    some = velocities[picked]
+    at_end = {"t_eval": [THREAD_END], "rtol": 1e-11}
+    exact = np.array([simulate(model, THREAD_END, x0={"v": v}, **at_end)["x"][0] for v in some])
+
+    def error(found: Array) -> float:
+        return float(np.median(np.abs(found - exact)) / np.abs(exact).max())
+
+    def ensemble(v: Array, workers: int) -> Ensemble:
+        chunk = max(1, min(500, v.size // (4 * workers)))
+        return simulate_many(
+            model, THREAD_END, x0={"v": v}, rtol=RTOL, workers=workers, chunk=chunk
+        )
+
+    solve = casadi(model, np.array([THREAD_END]), ("x",), RTOL, "cvodes", as_c=False).solve
     cvodes_s, found = best_time(
-        partial(_loop, cvodes, velocities[picked]), budget=0.0 if quick else 1.0, most=REPEATS
-    )
-    rows: list[EnsembleRow] = []
-    _on_threads(model, velocities[:1], 1)  # compiles
-    for workers in _workers():
-        time, result = best_time(
-            partial(_on_threads, model, velocities, workers),
-            budget=0.0 if quick else np.inf,
-            most=REPEATS,
+        lambda: np.array([solve(v=float(v))[0][0, -1] for v in some]),
+        budget=0.0 if quick else 1.0, most=REPEATS,
+    )  # fmt: skip
+    cores, alone = cpu_count() or 1, 0.0
+    ensemble(velocities[:1], 1)  # compiles
+    for workers in sorted({2**k for k in range(cores.bit_length()) if 2**k < cores} | {cores}):
+        time_s, many = best_time(
+            partial(ensemble, velocities, workers), budget=0.0 if quick else np.inf, most=REPEATS
         )
-        alone = rows[0].time_s if rows else time
-        rows.append(
-            EnsembleRow(
-                case=case,
-                rtol=RTOL,
-                members=members,
-                workers=workers,
-                time_s=time,
-                member_s=time / members,
-                efficiency=alone / (workers * time),
-                error=_off(result["x"][picked, 0], exact),
-                cvodes_member_s=cvodes_s / sample,
-                cvodes_error=_off(found, exact),
-                ratio=(cvodes_s / sample) / (time / members),
-            )
-        )
-    return rows
+        alone = alone or time_s
+        yield THREADS, {
+            "case": case, "rtol": RTOL, "members": members, "threads": workers,
+            "time per member [us]": 1e6 * time_s / members,
+            "parallel efficiency": alone / (workers * time_s),
+            "relative error": error(many["x"][picked, 0]),
+            "cvodes, time per member [us]": 1e6 * cvodes_s / sample,
+            "cvodes, relative error": error(found),
+            "ratio of cvodes to symfric": (cvodes_s / sample) / (time_s / members),
+        }  # fmt: skip
 
 
-def _workers() -> list[int]:
-    cores = cpu_count() or 1
-    return sorted({2**k for k in range(cores.bit_length()) if 2**k < cores} | {cores})
+# ---- on a graphics processor ----
 
-
-def _on_threads(model: Model, velocities: Array, workers: int) -> Ensemble:
-    chunk = max(1, min(500, velocities.size // (4 * workers)))
-    return simulate_many(
-        model, THREAD_END, x0={"v": velocities}, rtol=RTOL, workers=workers, chunk=chunk
-    )
-
-
-def _loop(solve: Solve, velocities: Array) -> Array:
-    return np.array([solve(v=float(v))[0][0, -1] for v in velocities])
-
-
-def _end(model: Model, v: float) -> float:
-    return simulate(model, THREAD_END, x0={"v": v}, rtol=1e-11, t_eval=[THREAD_END])["x"][0]
-
-
-def _off(found: Array, exact: Array) -> float:
-    return float(np.median(np.abs(found - exact)) / np.abs(exact).max())
-
-
-Array = NDArray[np.float64]
 ON_DEVICE, SAMPLE = 1_000_000, 2000
 CUDA_CASES = tuple(
-    (name, make, end, 1 if name.startswith("rabinowicz") else 10)
-    for name, make, end, _ in (*CASES[:2], CASES[3])
+    case._replace(fewer=1 if case.name.startswith("rabinowicz") else 10)
+    for case in (*CASES[:2], CASES[3])
 )
 TOLERANCES = {"double": 1e-6, "float": 1e-4}
 
 
-def measure_cuda(*, quick: bool = False) -> tuple[CudaRow, ...]:
-    """Measure all cases in both types; `quick`: one case, a hundredth of the members."""
-    members, cases = ON_DEVICE // (100 if quick else 1), CUDA_CASES[:1] if quick else CUDA_CASES
-    return tuple(_cuda_row(case, real, members) for case in cases for real in TOLERANCES)
+def cuda(quick: bool = False) -> Iterator[Found]:
+    """Measure all cases in both types; `quick`: one case, a hundredth of the members.
 
-
-def _cuda_row(case: Case, real: str, members: int) -> CudaRow:
-    (name, make, end, fewer), rtol = case, TOLERANCES[real]
+    The compiled code runs on all cores, on a sample of the members.
+    """
     try:
         device = on_device.find_device().name
     except DeviceError as error:
-        return CudaRow(name, real, rtol, why=str(error))
-    model, members = make(), members // fewer
-    state, values = _starts(model, members)
-
-    def run(x0: Array, backend: str) -> tuple[Ensemble, float]:
-        began = perf_counter()
-        with catch_warnings():
-            simplefilter("ignore", UserWarning)  # the tolerance of single precision is loose
-            found = simulate_many(
-                model, end, x0={state: x0}, rtol=rtol, backend=backend,
-                real=real if backend == "cuda" else "double",
-            )  # fmt: skip
-        return found, perf_counter() - began
-
-    picked = np.unique(np.linspace(0, members - 1, SAMPLE).astype(int))
-    _, first = run(values[:100], "cuda")
-    many, spent = run(values, "cuda")
-    run(values[:100], "compiled")
-    own, on_cores = run(values[picked], "compiled")
-    ours, theirs = members / spent, picked.size / on_cores
-    return CudaRow(
-        name, real, rtol, device, members, first, ours, theirs, ours / theirs,
-        float((many.attempts[picked] == own.attempts).mean()),
-        _difference(_ends(model, many)[picked], _ends(model, own)),
-    )  # fmt: skip
+        yield f"Graphics processor: not run, {error}"
+        return
+    once = partial(best_time, most=1)
+    for case in CUDA_CASES[:1] if quick else CUDA_CASES:
+        model, members = case.make(), ON_DEVICE // (100 if quick else 1) // case.fewer
+        state, values = _starts(model, members)
+        picked = np.unique(np.linspace(0, members - 1, SAMPLE).astype(int))
+        for real, rtol in TOLERANCES.items():
+            call = partial(simulate_many, model, case.t_end, rtol=rtol)
+            gpu, cores = partial(call, backend="cuda", real=real), partial(call, backend="compiled")
+            with unwarned():  # the tolerance of single precision is loose
+                first, _ = once(partial(gpu, x0={state: values[:100]}))
+                spent, many = once(partial(gpu, x0={state: values}))
+                cores(x0={state: values[:100]})
+                on_cores, own = once(partial(cores, x0={state: values[picked]}))
+            ours, theirs = members / spent, picked.size / on_cores
+            yield CUDA, {
+                "case": case.name, "type": real, "rtol": rtol, "device": device,
+                "members": members, "first call, with compilation [s]": first,
+                "members per second": ours, "members per second, all cores": theirs,
+                "ratio to all cores": ours / theirs,
+                "members with equal attempts [%]":
+                    100.0 * float((many.attempts[picked] == own.attempts).mean()),
+                "relative difference at the end":
+                    _difference(_ends(model, many)[picked], _ends(model, own)),
+            }  # fmt: skip

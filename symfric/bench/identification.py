@@ -1,146 +1,83 @@
-"""Identification and its goals: who finds the truth, from where, and at what cost."""
+"""Identification and its goals: convergence to the true parameters, from which starts, at what
+cost.
+"""
 
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from importlib import import_module
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from time import process_time
-from typing import Any, NamedTuple, final
+from typing import NamedTuple
 
 from identification import Dataset, Fit, Fitted, InverseDynamics
-from symfric.bench import table
-from symfric.bench.file_campaign import File, campaign
-from symfric.bench.table import Goal
+from symfric.bench.identification_files import File, campaign
+from symfric.bench.identification_measured import emps, franka, laws
+from symfric.bench.identification_memory import gms, lugre
+from symfric.bench.identification_repeats import coverage, starts
+from symfric.bench.report import GOALS, Found, Progress, Report, goal, plot_goals, timed
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import SolveError
 
-CASES = {
-    "lugre": "_memory",
-    "coverage": "_repeats",
-    "emps": "_measured",
-    "laws": "_measured",
-    "franka": "_measured",
-    "starts": "_repeats",
-    "gms": "_memory",
-    "files": "",
-}
-"""Case -> end of the name of the module `symfric.bench.identification...`, whose function
-`case(quick)` yields the rows."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class IdentificationBenchmark(table.Report):
-    """Measurements by case."""
-
-    rows: tuple[Goal, ...]
-
-    def shown(self) -> Iterator[table.Table | str]:
-        """Numbers and their goals."""
-        yield table.of(
-            "Identification: measured numbers and goals", self.rows,
-            {"case": "case", "quantity": "what", "measured": table.shortened("value"),
-             "goal": lambda r: f"{r.better} {r.goal:g}",
-             "met": lambda r: "yes" if r.met else "no",
-             "processor time [s]": table.rounded("seconds", 1), "note": "note"},
-        )  # fmt: skip
-
-    def drawn(self) -> tuple[Any, ...]:
-        """The distance of each number from its goal; right of the line it is worse."""
-        return "goals", ((f"{row.case}: {row.what}", row) for row in self.rows)
-
-
-def bench_identification(
-    *,
-    quick: bool = False,
-    cases: Sequence[str] = tuple(CASES),
-    progress: table.Progress = None,
-) -> IdentificationBenchmark:
-    """Measure `cases`; `quick` takes fewer seeds. Ctrl-C returns the rows so far.
-
-    Raises:
-        ValueError: an unknown case.
-    """
-    check_names("bench identification: cases", cases, CASES)
-    every = table.each(cases, progress, str)
-    rows = (replace(row, case=case) for case in every for row in _measure_of(case)(quick))
-    return IdentificationBenchmark(table.until_stopped(rows))
-
-
-def _measure_of(case: str) -> Callable[[bool], Iterator[Goal]]:
-    return getattr(import_module(f"symfric.bench.identification{CASES[case]}"), case)
-
-
 TRUTH = {"m": 95.0, "offset": -3.0, "mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
+"""Parameters of the stage of `identification_files`."""
 CLOSE = 0.05
 """Relative error of a parameter that counts as right."""
 EVERY = 5
-"""Of so many files one is tried where it has to be quick."""
+"""Quick runs read one of so many files."""
 
 
 class Outcome(NamedTuple):
-    """The outcome for one file.
+    """Outcome for one file.
 
     Attributes:
-        file: its name.
+        file: name of the file.
         truth: "good", "bad" or "hidden".
         kind: "refused", "flagged", "right", "silent" or "crashed".
-        sentence: what was said.
+        message: message to the user.
     """
 
     file: str
     truth: str
     kind: str
-    sentence: str
+    message: str
 
 
-def outcomes(quick: bool = False, seed: int = 3) -> Iterator[Outcome]:
-    """Every file of the campaign, one after the other."""
-    with tempfile.TemporaryDirectory() as folder:
-        for k, file in enumerate(campaign(seed)):
-            if not quick or k % EVERY == 0:
-                yield outcome(file, Path(folder))
-
-
-def outcome(file: File, folder: Path) -> Outcome:
+def outcome(file: File) -> Outcome:
     """Read, check and fit one file."""
-    path = folder / f"log{file.suffix}"
-    path.write_bytes(file.content)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            kind, sentence = _judged(path, file)
-    except (ValueError, SolveError) as error:
-        kind, sentence = "refused", str(error)
-    except Exception as error:  # noqa: BLE001  (whatever it is, it is counted and shown)
-        kind, sentence = "crashed", f"{type(error).__name__}: {error}"
-    return Outcome(file.name, file.truth, kind, sentence)
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        path = Path(folder) / f"log{file.suffix}"
+        path.write_bytes(file.content)
+        try:
+            kind, message = _judged(path, file)
+        except (ValueError, SolveError) as error:
+            kind, message = "refused", str(error)
+        except Exception as error:  # noqa: BLE001  (any error is counted and shown)
+            kind, message = "crashed", f"{type(error).__name__}: {error}"
+    return Outcome(file.name, file.truth, kind, message)
 
 
 def _judged(path: Path, file: File) -> tuple[str, str]:
-    data = Dataset.read(path, **file.said)
+    data = Dataset.read(path, **file.options)
     findings = data.check()
     if findings.errors:
         return "refused", findings.errors[0].sentence
-    if {"gap", "irregular"} & set(findings.kinds):  # as the findings say
+    if {"gap", "irregular"} & set(findings.kinds):  # as the findings advise
         data = data.resampled()
     fit = Fit(InverseDynamics(), "stribeck", data).solve()
-    wrong = [name for name in TRUTH if not _is_close(fit, name)]
+    wrong = [f"{name} {fit.values[name]:.4g}" for name in TRUTH if not _is_close(fit, name)]
     if not fit.verdict.good:
         return "flagged", fit.message
     if not wrong:
         return "right", fit.message
     if findings.warnings:
         return "flagged", f"{findings.warnings[0].sentence} Wrong: {', '.join(wrong)}."
-    told = ", ".join(f"{name} {fit.values[name]:.4g}" for name in wrong)
-    return "silent", f"{fit.message} Wrong: {told}."
+    return "silent", f"{fit.message} Wrong: {', '.join(wrong)}."
 
 
 def _is_close(fit: Fitted, name: str) -> bool:
-    """True if a parameter is right, or is reported as not identifiable."""
+    """Return True if a parameter is right, or its interval includes the truth."""
     estimate = fit.parameters[name]
     error = abs(estimate.value - TRUTH[name])
     low, high = estimate.low, estimate.high
@@ -148,37 +85,64 @@ def _is_close(fit: Fitted, name: str) -> bool:
     return error <= CLOSE * abs(TRUTH[name]) or inside
 
 
-def files(quick: bool = False) -> Iterator[Goal]:
-    """Rows of the bench: files answered wrongly in silence, crashes, good files that are right.
+def files(quick: bool = False) -> Iterator[Found]:
+    """Measure silent errors and crashes on damaged files, and right results on intact ones.
 
-    Each file of `symfric.bench.file_campaign` is read, checked and fitted by inverse dynamics with
-    a Stribeck law, as a stranger would. It ends as
+    Each file of `identification_files` is read, checked and fitted by inverse dynamics with a
+    Stribeck law, with default settings. It ends as
 
-        refused   the reader, the fit or the status says in a sentence why there is no result,
-        flagged   there is a result, but the data or the residuals say that it is not to be trusted,
+        refused   the reader, the fit or the status explains why there is no result,
+        flagged   there is a result, with a warning about the data or the residuals,
         right     every parameter within 5 % or its 95 % interval of the truth,
-        silent    a wrong result without a word,
-        crashed   an error that is no sentence.
+        silent    a wrong result without a warning,
+        crashed   an error without an explanation.
 
-    Of good files all must be right, of bad ones none silent. What no file can show is listed in
-    `file_campaign` and counted apart.
+    All good files must be right, and no bad one silent. Files whose defects leave no trace are
+    counted separately.
     """
-    begun = process_time()
-    found = list(outcomes(quick))
-    seconds = process_time() - begun
+    chosen = [*campaign()][:: EVERY if quick else 1]
+    seconds, found = timed(lambda: [outcome(file) for file in chosen])
     counts = Counter((o.truth, o.kind) for o in found)
-    silent = [o.file for o in found if o.truth == "bad" and o.kind == "silent"]
-    good = [o for o in found if o.truth == "good"]
-    lost = [o.file for o in good if o.kind != "right"]
-    bad = sum(o.truth == "bad" for o in found)
-    hidden = sum(o.truth == "hidden" for o in found)
-    refused, flagged = counts["bad", "refused"], counts["bad", "flagged"]
-    note = f"{bad} bad: {refused} refused, {flagged} flagged, {counts['bad', 'right']} right"
-    note = "; ".join([note, *silent])
-    yield Goal("bad files with a wrong result and no warning", len(silent), 0, "<=", seconds, note)
-    share = (len(good) - len(lost)) / max(len(good), 1)
-    yield Goal("fraction of good files with a right result", share, 1.0, ">=", note=", ".join(lost))
+    total = Counter(o.truth for o in found)
+    silent = [o.file for o in found if (o.truth, o.kind) == ("bad", "silent")]
+    note = f"{total['bad']} bad: {counts['bad', 'refused']} refused, {counts['bad', 'flagged']} "
+    note = "; ".join([note + f"flagged, {counts['bad', 'right']} right", *silent])
+    yield goal("bad files with a wrong result and no warning", len(silent), 0, "<=", seconds, note)
+    lost = ", ".join(o.file for o in found if o.truth == "good" and o.kind != "right")
+    share = counts["good", "right"] / max(total["good"], 1)
+    yield goal("fraction of good files with a right result", share, 1.0, ">=", note=lost)
     crashed = [o.file for o in found if o.kind == "crashed"]
-    yield Goal("crashes", len(crashed), 0, note=", ".join(crashed))
-    note = f"{hidden} with defects that the file cannot reveal"
-    yield Goal("files", len(found), 20 if quick else 100, ">=", note=note)
+    yield goal("crashes", len(crashed), 0, note=", ".join(crashed))
+    note = f"{total['hidden']} with defects that the file cannot reveal"
+    yield goal("files", len(found), 20 if quick else 100, ">=", note=note)
+
+
+CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
+    "lugre": lugre,
+    "coverage": coverage,
+    "emps": emps,
+    "laws": laws,
+    "franka": franka,
+    "starts": starts,
+    "gms": gms,
+    "files": files,
+}
+
+
+def bench(
+    quick: bool = False, cases: Sequence[str] = tuple(CASES), progress: Progress = None
+) -> Report:
+    """Measure `cases`; `quick` takes fewer seeds.
+
+    Raises:
+        ValueError: an unknown case.
+    """
+    check_names("bench identification: cases", cases, CASES)
+    tasks = {case: partial(_named, case, quick) for case in cases}
+    return Report((GOALS, plot_goals)).collect(tasks, progress)
+
+
+def _named(case: str, quick: bool) -> Iterator[Found]:
+    """Yield the rows of a case with its name in front."""
+    for item in CASES[case](quick):
+        yield item if isinstance(item, str) else (item[0], {"case": case, **item[1]})

@@ -1,28 +1,28 @@
-"""A move with friction by users of Opti, rockit and do-mpc; a block under CasADi's integrators.
+"""Moves with friction in Opti, rockit and do-mpc; a block under CasADi's integrators.
 
     min  integral of u^2,   0.1 m in 1 s from rest to rest,   |u| <= 20 N,   50 intervals
 
-of a drive of 1 kg pressed by 10 N. The law goes in as the right-hand side of the model
-("collocation") or inside `flow` as a discrete step ("flow"). The referee is `simulate` with the
-very law under the control that was found: `miss` is how far from rest at the goal that ends.
+of a drive of 1 kg pressed by 10 N. The law is part of the right-hand side of the model
+("collocation") or of a discrete step by `flow` ("flow"). All controls are verified by `simulate`
+with the original law: `miss` is the final distance from rest at the goal.
 """
 
 import contextlib
 import io
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from math import hypot
 from time import process_time
-from typing import Any, NamedTuple, final
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench import table
+from symfric.bench.report import Found, Progress, Report, Row
 from symfric.integrator import Hold, flow, simulate
 from symfric.laws import GMS, BrownMcPhee, ElastoPlastic, Law, LuGre
 from symfric.model import Model
@@ -31,7 +31,7 @@ from symfric.scenes import drive, rabinowicz
 Array = NDArray[np.float64]
 GOAL, T, N, LIMIT, LOAD = 0.1, 1.0, 50, 20.0, 10.0
 STEPS = 10
-"""Of the flow, in each interval: 2 ms, which resolves the bristles."""
+"""Steps of `flow` in each interval: 2 ms, which resolves the bristles."""
 IPOPT = {
     "print_time": False,
     "ipopt.print_level": 0,
@@ -46,154 +46,76 @@ LAWS: dict[str, Callable[[], Law]] = {
     "gms": GMS,
 }
 QUICK = ("brown_mcphee", "lugre")
+MOVES = "Move of 0.1 m in 1 s with friction; the miss is that of `simulate` with the law"
+RUNS = "20 s of stick-slip with CasADi's integrators and with symfric without a compiler"
 
 
-class Move(NamedTuple):
-    """The move as one tool solved it.
-
-    Attributes:
-        tool, route, law: who, how, with what.
-        answer: the word of Ipopt, or why there is none.
-        iterations: of Ipopt.
-        cost: integral of u^2 [N^2 s].
-        miss: distance from the goal [m] and speed there times 1 s [m], together, in `simulate`.
-        time_s: processor time [s] of building and solving.
-    """
-
-    tool: str
-    route: str
-    law: str
-    answer: str
-    iterations: int
-    cost: float
-    miss: float
-    time_s: float
-
-
-@final
-@dataclass(frozen=True)
-class Run:
-    """One integrator of CasADi on 20 s of stick-slip, compared with `simulate` at rtol 1e-10.
-
-    Attributes:
-        integrator: of `casadi.integrator`, or "symfric".
-        law: what rubs.
-        error: of the elongation [m], the largest at 401 times.
-        ratio: processor time of the call over that of symfric's in its virtual machine.
-        answer: "" or why there is none.
-    """
-
-    integrator: str
-    law: str
-    error: float
-    ratio: float
-    answer: str = ""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class InteropBenchmark(table.Report):
-    """Moves, integrators and what is not installed."""
-
-    moves: tuple[Move, ...]
-    runs: tuple[Run, ...]
-    absent: tuple[str, ...]
-
-    def shown(self) -> Iterator[table.Table | str]:
-        """Moves by tool, route and law; CasADi's integrators; what is absent."""
-        yield table.of(
-            "Move of 0.1 m in 1 s with friction; the miss is that of `simulate` with the law",
-            self.moves,
-            {"tool": "tool", "route": "route", "law": "law",
-             "cost J [N^2 s]": lambda m: f"{m.cost:.3f}", "miss [m]": table.shortened("miss"),
-             "iterations": "iterations", "processor time [s]": lambda m: f"{m.time_s:.1f}",
-             "status": lambda m: _word(m.answer)},
-        )  # fmt: skip
-        yield table.of(
-            "20 s of stick-slip with CasADi's integrators and with symfric without a compiler",
-            self.runs,
-            {"integrator": "integrator", "law": "law",
-             "largest error [m]": table.shortened("error"),
-             "ratio of time to symfric": table.shortened("ratio"), "status": "answer"},
-        )  # fmt: skip
-        yield from (f"{tool} is not installed: no rows" for tool in self.absent)
-
-
-def _word(answer: str) -> str:
-    """The words of Ipopt, shorter; nothing where it solved the problem."""
-    known = {
-        "Solve_Succeeded": "",
-        "Maximum_CpuTime_Exceeded": "out of time",
-        "Search_Direction_Becomes_Too_Small": "gave up",
-    }
-    return known.get(answer, answer.replace("_", " ").lower())
-
-
-def bench_interop(*, quick: bool = False, progress: table.Progress = None) -> InteropBenchmark:
-    """Measure all tools that are installed; `quick`: two laws. Ctrl-C returns the rows so far."""
-    absent = tuple(tool for tool in ("rockit", "do_mpc") if find_spec(tool) is None)
-    tasks = [
-        (tool, route, law)
+def bench(quick: bool = False, progress: Progress = None) -> Report:
+    """Measure all tools that are installed; `quick`: two laws."""
+    absent = [tool for tool in ("rockit", "do_mpc") if find_spec(tool) is None]
+    tasks: dict[str, Callable[[], Iterator[Found]]] = {
+        f"{tool}, {route}, {law}": lambda t=tool, r=route, k=law: iter([(MOVES, move(t, r, k))])
         for law in (QUICK if quick else LAWS)
         for tool, route in ROUTES
         if tool not in absent
-    ]
-
-    def measured() -> Iterator[Move | Run]:
-        for task in table.each(tasks, progress, ", ".join):
-            yield move(*task)
-        for law in QUICK:
-            yield from integrators(law)
-
-    found = table.until_stopped(measured())
-    moves = tuple(row for row in found if isinstance(row, Move))
-    return InteropBenchmark(moves, tuple(row for row in found if isinstance(row, Run)), absent)
+    }
+    tasks |= {f"integrators, {law}": partial(integrators, law) for law in QUICK}
+    report = Report(notes=[f"{tool} is not installed: no rows" for tool in absent])
+    return report.collect(tasks, progress)
 
 
-def move(tool: str, route: str, law: str) -> Move:
-    """The move with one law, by one tool on one route."""
+STATUS = {
+    "Solve_Succeeded": "",
+    "Maximum_CpuTime_Exceeded": "out of time",
+    "Search_Direction_Becomes_Too_Small": "gave up",
+}
+"""Status of Ipopt -> shorter text."""
+
+
+def move(tool: str, route: str, law: str) -> Row:
+    """Solve the move with one law by one tool on one route; return its row.
+
+    The miss combines the distance from the goal [m] and the speed there times 1 s [m]. The time
+    includes building.
+    """
     begin = process_time()
     model = drive(LAWS[law](), m=1.0, N=LOAD)
-    start = np.array([GOAL / 2, GOAL / T, *_steady(model)])
+    sliding = model.contacts[0].law.steady_state(GOAL / T, LOAD)
+    start = np.array([GOAL / 2, GOAL / T, *map(float, ca.DM(sliding).nz)])
+    iterations, cost, miss = 0, np.nan, np.nan
     try:
         with contextlib.redirect_stderr(io.StringIO()):
-            controls, answer, iterations = ROUTES[tool, route](model, start)
+            controls, status, iterations = ROUTES[tool, route](model, start)
     except (RuntimeError, ValueError) as error:
-        answer = " ".join(str(error).split())[:60]
-        return Move(tool, route, law, answer, 0, np.nan, np.nan, process_time() - begin)
-    spent = process_time() - begin
-    cost = float(np.sum(controls**2) * T / N)
-    return Move(tool, route, law, answer, iterations, cost, miss(model, controls), spent)
+        status, spent = " ".join(str(error).split())[:60], process_time() - begin
+    else:
+        spent = process_time() - begin
+        cost, miss = float(np.sum(controls**2) * T / N), missed(model, controls)
+    return {
+        "tool": tool, "route": route, "law": law, "cost J [N^2 s]": cost, "miss [m]": miss,
+        "iterations": iterations, "processor time [s]": spent,
+        "status": STATUS.get(status, status.replace("_", " ").lower()),
+    }  # fmt: skip
 
 
-def miss(model: Model, controls: Array) -> float:
-    """Distance of the model's end from rest at the goal under `controls`."""
+def missed(model: Model, controls: Array) -> float:
+    """Return the distance of the simulated end from rest at the goal; NaN if a run fails."""
     held = Hold(np.linspace(0.0, T, N + 1)[:-1], controls)
     rest = {v.name: 0.0 for v in model.x}
     run = simulate(model, T, u={"force": held}, x0=rest, rtol=1e-8, throw=False)
     return hypot(run.final["x"] - GOAL, run.final["v"] * T) if run.status.ok else np.nan
 
 
-def _steady(model: Model) -> list[float]:
-    """States of the law in steady sliding, where the solvers start."""
-    return [float(z) for c in model.contacts for z in ca.DM(c.law.steady_state(GOAL / T, LOAD)).nz]
-
-
 def right_hand_side(model: Model) -> ca.Function:
-    """(x, u) -> dx/dt: all that other tools want of an explicit model."""
+    """Return (x, u) -> dx/dt, all that other tools need of an explicit model."""
     if model.ode is None:
         raise ValueError(f"bench interop: expected an explicit model, got '{model.name}'")
     return ca.Function("f", [model.vector("x"), model.vector("u")], [model.ode])
 
 
-def step(model: Model) -> ca.Function:
-    """(x, u, p, h) -> x after an interval, by fixed steps of `flow`."""
-    return flow(model, steps=STEPS)
-
-
 def opti_flow(model: Model, start: Array) -> tuple[Array, str, int]:
-    """Multiple shooting with `flow`."""
-    o, advance, nx = ca.Opti(), step(model), len(model.x)
+    """Solve by multiple shooting with `flow`."""
+    o, advance, nx = ca.Opti(), flow(model, steps=STEPS), len(model.x)
     x, u = o.variable(nx, N + 1), o.variable(1, N)
     o.subject_to(x[:, 0] == 0)
     for k in range(N):
@@ -203,7 +125,7 @@ def opti_flow(model: Model, start: Array) -> tuple[Array, str, int]:
 
 
 def opti_collocation(model: Model, start: Array) -> tuple[Array, str, int]:
-    """Radau collocation of degree 3, as in CasADi's own example."""
+    """Solve by Radau collocation of degree 3, as in CasADi's own example."""
     o, f, nx, degree = ca.Opti(), right_hand_side(model), len(model.x), 3
     tau = ca.collocation_points(degree, "radau")
     slopes, ends, _ = ca.collocation_coeff(tau)
@@ -239,7 +161,7 @@ def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, 
     o = rockit.Ocp(T=T)
     x, u = o.state(len(model.x)), o.control()
     if by_flow:
-        o.set_next(x, step(model)(x, u, [], T / N))
+        o.set_next(x, flow(model, steps=STEPS)(x, u, [], T / N))
         o.method(rockit.MultipleShooting(N=N))
         o.add_objective(o.sum(u**2) * T / N)
     else:
@@ -262,13 +184,13 @@ def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, 
 def do_mpc_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, int]:
     """Solve with do-mpc: the first plan of a controller whose horizon is the whole move."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it tells at once of all extras that are not installed
+        warnings.simplefilter("ignore")  # do-mpc warns about all extras that are not installed
         do_mpc: Any = import_module("do_mpc")
     nx = len(model.x)
     plant = do_mpc.model.Model("discrete" if by_flow else "continuous", "MX")
     x, u = plant.set_variable("_x", "x", (nx, 1)), plant.set_variable("_u", "u")
-    rate = step(model)(x, u, [], T / N) if by_flow else right_hand_side(model)(x, u)
-    plant.set_rhs("x", rate)
+    advance = flow(model, steps=STEPS)(x, u, [], T / N) if by_flow else None
+    plant.set_rhs("x", right_hand_side(model)(x, u) if advance is None else advance)
     plant.setup()
     control = do_mpc.controller.MPC(plant)
     control.settings.n_horizon, control.settings.t_step = N, T / N
@@ -286,40 +208,53 @@ def do_mpc_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, 
     control.opt_x_num["_x"] = ca.DM(start)
     control.make_step(np.zeros((nx, 1)))
     plan = np.array([float(control.opt_x_num["_u", k, 0][0]) for k in range(N)])
-    said = control.solver_stats
-    return plan, str(said["return_status"]), int(said["iter_count"])
+    stats = control.solver_stats
+    return plan, str(stats["return_status"]), int(stats["iter_count"])
 
 
 ROUTES: dict[tuple[str, str], Callable[[Model, Array], tuple[Array, str, int]]] = {
     ("opti", "flow"): opti_flow,
     ("opti", "collocation"): opti_collocation,
-    ("rockit", "flow"): lambda model, start: rockit_move(model, start, by_flow=True),
-    ("rockit", "collocation"): lambda model, start: rockit_move(model, start, by_flow=False),
-    ("do_mpc", "flow"): lambda model, start: do_mpc_move(model, start, by_flow=True),
-    ("do_mpc", "collocation"): lambda model, start: do_mpc_move(model, start, by_flow=False),
+    ("rockit", "flow"): partial(rockit_move, by_flow=True),
+    ("rockit", "collocation"): partial(rockit_move, by_flow=False),
+    ("do_mpc", "flow"): partial(do_mpc_move, by_flow=True),
+    ("do_mpc", "collocation"): partial(do_mpc_move, by_flow=False),
 }
-"""(tool, route) -> what its user writes."""
+"""(tool, route) -> what a user of the tool writes: model and start -> controls, status of Ipopt,
+iterations."""
 
+SUNDIALS = {"reltol": 1e-8, "abstol": 1e-10, "max_num_steps": 100_000}
 INTEGRATORS: dict[str, dict[str, Any]] = {
-    "cvodes": {"reltol": 1e-8, "abstol": 1e-10, "max_num_steps": 100_000},
-    "idas": {"reltol": 1e-8, "abstol": 1e-10, "max_num_steps": 100_000},
+    "cvodes": SUNDIALS,
+    "idas": SUNDIALS,
     "collocation": {"number_of_finite_elements": 100},
     "rk": {"number_of_finite_elements": 100},
 }
-"""Options that a user gives who wants 1e-5; of the last two, steps between two results."""
+"""Options for an accuracy of 1e-5; elements are those between two results."""
 
 
-def integrators(law: str) -> Iterator[Run]:
-    """CasADi's integrators on the block on a belt with `law`."""
+def integrators(law: str) -> Iterator[Found]:
+    """Compare CasADi's integrators of the block on a belt with `simulate` at rtol 1e-10.
+
+    The error is the largest of the elongation at 401 times; times are processor times relative to
+    `simulate` in its virtual machine.
+    """
     model = rabinowicz(LAWS[law]())
     times = np.linspace(0.0, 20.0, 401)
     exact = simulate(model, 20.0, samples=401, rtol=1e-10)
-    start = {v.name: exact[v.name][0] for v in model.x}
-    simulate(model, 20.0, samples=401, backend="vm")  # builds, as `ca.integrator` does below
-    begin = process_time()
-    ours = simulate(model, 20.0, samples=401, backend="vm")
-    spent = process_time() - begin
-    yield Run("symfric", law, float(np.abs(ours["x"] - exact["x"]).max()), 1.0)
+    start = [exact[v.name][0] for v in model.x]
+    spent = 0.0
+
+    def row(name: str, x: Array | None, ratio: float, status: str = "") -> Found:
+        error = np.nan if x is None else float(np.abs(x - exact["x"]).max())
+        return RUNS, {"integrator": name, "law": law, "largest error [m]": error,
+                      "ratio of time to symfric": ratio, "status": status}  # fmt: skip
+
+    for _ in range(2):  # the first call builds, as `ca.integrator` does below
+        begin = process_time()
+        ours = simulate(model, 20.0, samples=401, backend="vm")
+        spent = process_time() - begin
+    yield row("symfric", ours["x"], 1.0)
     x = model.vector("x")
     dae = {"x": x, "ode": ca.SX(right_hand_side(model)(x, []))}
     for name, options in INTEGRATORS.items():
@@ -327,10 +262,8 @@ def integrators(law: str) -> Iterator[Run]:
         begin = process_time()
         try:
             with contextlib.redirect_stderr(io.StringIO()):
-                found: Any = made(x0=[start[v.name] for v in model.x])["xf"].toarray()
+                found: Any = made(x0=start)["xf"].toarray()
         except RuntimeError as error:
-            why = str(error).splitlines()[-1].partition(": ")[2]
-            yield Run(name, law, np.nan, np.nan, why)
-            continue
-        error = float(np.abs(found[0] - exact["x"]).max())
-        yield Run(name, law, error, (process_time() - begin) / spent)
+            yield row(name, None, np.nan, str(error).splitlines()[-1].partition(": ")[2])
+        else:
+            yield row(name, found[0], (process_time() - begin) / spent)

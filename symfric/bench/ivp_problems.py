@@ -28,7 +28,6 @@ class Problem:
         model: function that builds the equations.
         t_end: end time; the problem starts at 0.
         reference: signal -> published value at the end.
-        source: source of equations and reference.
         digits: rtol -> required correct digits.
         drift: outputs that are zero on the exact solution: constraints of a problem of higher
             index in its index-reduced form.
@@ -39,7 +38,6 @@ class Problem:
     model: Callable[[], Model]
     t_end: float
     reference: Mapping[str, float]
-    source: str = TEST_SET
     digits: Mapping[float, int] = field(default_factory=lambda: {1e-6: 5, 1e-10: 9})
     drift: tuple[str, ...] = ()
     laborious: tuple[str, ...] = ()
@@ -152,7 +150,6 @@ def transistor_amplifier() -> Model:
     Node voltages; currents at each node sum to zero. The equations stay implicit in y'.
     """
     SUPPLY, THERMAL, ALPHA, BETA, R0, R = 6.0, 0.026, 0.99, 1e-6, 1e3, 9e3
-    capacities = tuple(k * 1e-6 for k in range(1, 6))
     x = unknowns([0, 3, 3, 6, 3, 3, 6, 0], [1] * 8, "V")
     y1, y2, y3, y4, y5, y6, y7, y8 = (v.symbol for v in x)
     t, rates = ca.SX.sym("t"), ca.SX.sym("rates", 8)
@@ -168,22 +165,12 @@ def transistor_amplifier() -> Model:
         (y7 - SUPPLY) / R + ALPHA * second,
         y8 / R,
     )
-    return Model(
-        "transistor_amplifier",
-        x=x,
-        xdot=rates,
-        residual=_capacities(capacities) @ rates - currents,
-        t=t,
-    )
-
-
-def _capacities(capacities: Sequence[float]) -> ca.DM:
-    """Return M for capacitors C1, C3, C5 between two nodes each, C2 and C4 to ground."""
-    C1, C2, C3, C4, C5 = capacities
+    C1, C2, C3, C4, C5 = (k * 1e-6 for k in range(1, 6))  # C2 and C4 to ground
     M = np.diag([-C1, -C1, -C2, -C3, -C3, -C4, -C5, -C5])
     for i, C in ((0, C1), (3, C3), (6, C5)):
         M[i, i + 1] = M[i + 1, i] = C
-    return ca.DM(M)
+    residual = ca.DM(M) @ rates - currents
+    return Model("transistor_amplifier", x=x, xdot=rates, residual=residual, t=t)
 
 
 def pleiades() -> Model:

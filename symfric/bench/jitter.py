@@ -1,24 +1,23 @@
-"""Does an acceleration jitter: its total variation against law, step and transition velocity.
+"""Jitter of accelerations: total variation over law, step size and transition velocity.
 
     TV = sum |a(t_k+1) - a(t_k)|,   t_k every millisecond
 
-Of the four-mass system over 4 s. The source of `SelfTuning` reports that one law jitters where the
-other does not. At equal velocity of the peak both have the same variation wherever the step
-resolves the transition, and where a fixed explicit step does not, h mu'(0) N / m > 2.8, both
-jitter.
+The mechanism is the four-mass system over 4 s. The source of `SelfTuning` reports that one law
+jitters and the other does not. At equal velocity of the peak of friction, both have the same
+variation if the step resolves the transition, and both jitter if a fixed explicit step does not
+resolve it, h mu'(0) N / m > 2.8.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, final
+from dataclasses import replace
+from functools import partial
+from typing import final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench import table
-from symfric.figures import FigureData
-from symfric.figures.data import Curve
+from symfric.bench.report import Found, Progress, Report, curves
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
@@ -38,84 +37,54 @@ LAWS: dict[str, Callable[[float], Law]] = {
     "self_tuning": lambda v: SelfTuning.from_peak_velocity(v, mu_s=0.12, mu_d=0.1),
 }
 FIXED_MS = (2.0, 1.0, 0.25)
-"""Fixed steps [ms]."""
-TOLERANCES = (1e-9,)
+"""Step sizes of the explicit method [ms]."""
+RTOL = 1e-9
 SIGNALS = ("x1", "x4")
+SLIDERS = tuple(f"TV of {s}'' [m/s^2]" for s in SIGNALS)
 T_END = 4.0
+TITLE = "Total variation of the accelerations of sliders 1 and 4 of the four-mass system"
 
 
-def jitter(
+def bench(
+    quick: bool = False,
     scales: Sequence[float] = SCALES,
     fixed_ms: Sequence[float] = FIXED_MS,
-    tolerances: Sequence[float] = TOLERANCES,
+    rtol: float = RTOL,
     t_end: float = T_END,
-    progress: table.Progress = None,
-) -> FigureData:
-    """Total variation of the accelerations of sliders 1 and 4.
+    progress: Progress = None,
+) -> Report:
+    """Measure both laws at all velocities, with error control and with fixed steps.
 
-    Columns v_t [m/s], TV of x1'' and TV of x4'' [m/s^2]; NaN where a run leaves all bounds. A curve
-    for each law and each of: rtol (adaptive Rodas5P), Runge-Kutta of order 4 and Rodas5P with fixed
-    steps, which divide 1 ms or are multiples of it.
+    Variations are NaN if a run is not finite.
+
+    Args:
+        quick: every other velocity.
+        scales: velocities of the peak of friction [m/s].
+        fixed_ms: steps of RK4 [ms], which divide 1 ms or are multiples of it.
+        rtol: relative tolerance of Rodas5P with error control.
+        t_end: end time [s].
+        progress: called with the current item and the fraction done.
     """
-    curves: list[Curve] = []
-    for number, (name, law) in enumerate(LAWS.items()):
-        found: dict[str, list[tuple[float, ...]]] = {}
-        for k, v_t in enumerate(scales):
-            if progress is not None:
-                progress(name, (number + k / len(scales)) / len(LAWS))
-            runs = _Runs(FourMass(law(v_t)).model(), t_end)
-            for rtol in tolerances:
-                found.setdefault(f"rtol = {rtol:g}", []).append(runs.adaptive(rtol))
-            for ms in fixed_ms:
-                found.setdefault(f"RK4, h = {ms:g} ms", []).append(runs.explicit(ms * 1e-3))
-            found.setdefault("Rodas5P, h = 1 ms", []).append(runs.implicit(1e-3))
-        for case, values in found.items():
-            table = np.array(values).T
-            columns = {"v_t": np.array(scales)}
-            columns |= {f"TV of {s}''": row for s, row in zip(SIGNALS, table, strict=True)}
-            curves.append(Curve(name, case, columns))
-    units = {"v_t": "m/s"} | {f"TV of {s}''": "m/s^2" for s in SIGNALS}
-    return FigureData(
-        "jitter",
-        f"total variation of accelerations, four-mass system, {t_end:g} s",
-        units,
-        tuple(("v_t", f"TV of {s}''") for s in SIGNALS),
-        tuple(curves),
-        log=tuple(units),
-        dots=True,
-    )
+    tasks = {
+        f"{name}, {v_t:g} m/s": partial(_rows, name, v_t, fixed_ms, rtol, t_end)
+        for name in LAWS
+        for v_t in (scales[1::2] if quick else scales)
+    }
+    draw = curves("law", ("step control",), "v_t [m/s]", *SLIDERS)
+    return Report((TITLE, draw)).collect(tasks, progress)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class JitterBenchmark(table.Report):
-    """Total variations of accelerations, see `jitter`."""
-
-    data: FigureData
-
-    def to_dict(self) -> dict[str, Any]:
-        """The figure as plain data."""
-        return self.data.to_dict()
-
-    def shown(self) -> Iterator[table.Table | str]:
-        """A line for each law, way of stepping and velocity."""
-        units = self.data.units
-        rows = [
-            [c.law, c.case, *(table.short(float(c[name][k])) for name in units)]
-            for c in self.data.curves
-            for k in range(c[next(iter(units))].size)
-        ]
-        head = ["law", "step control", *(f"{name} [{unit}]" for name, unit in units.items())]
-        yield table.Table(self.data.title, head, rows)
-
-    def drawn(self) -> tuple[Any, ...]:
-        """A panel per slider, a colour per way of stepping, the laws by line and marker."""
-        return "jitter", self.data
-
-
-def bench_jitter(*, quick: bool = False, progress: table.Progress = None) -> JitterBenchmark:
-    """Measure both laws at all velocities; `quick`: at every other one."""
-    return JitterBenchmark(jitter(SCALES[1::2] if quick else SCALES, progress=progress))
+def _rows(
+    name: str, v_t: float, fixed_ms: Sequence[float], rtol: float, t_end: float
+) -> Iterator[Found]:
+    runs = _Runs(FourMass(LAWS[name](v_t)).model(), t_end)
+    rk4, rodas = runge_kutta_4(runs.whole), build_fixed(runs.whole, METHODS["rodas5p"])
+    methods = {f"rtol = {rtol:g}": partial(runs.adaptive, rtol)}
+    methods |= {f"RK4, h = {h:g} ms": partial(runs.fixed, rk4, h * 1e-3) for h in fixed_ms}
+    methods["Rodas5P, h = 1 ms"] = partial(runs.fixed, rodas, 1e-3)
+    for method, run in methods.items():
+        variations = zip(SLIDERS, run(), strict=True)
+        yield TITLE, {"law": name, "step control": method, "v_t [m/s]": v_t, **dict(variations)}
 
 
 @final
@@ -137,20 +106,13 @@ class _Runs:
         y = first_guess(self.whole, model, model.initial_state())
         self.y0 = consistent(self.whole, "jitter", y, np.zeros(0))
 
-    def adaptive(self, rtol: float) -> tuple[float, ...]:
-        """Total variation of the accelerations of a run with error control."""
+    def adaptive(self, rtol: float) -> list[float]:
+        """Run with error control."""
         run = simulate(self.model, self.t_end, rtol=rtol, t_eval=self.times)
-        return tuple(variation(run[f"{s}_a"]) for s in SIGNALS)
+        return [variation(run[f"{s}_a"]) for s in SIGNALS]
 
-    def explicit(self, h: float) -> tuple[float, ...]:
-        """Runge-Kutta of order 4, constraints restored after every stage."""
-        return self._fixed(runge_kutta_4(self.whole), h)
-
-    def implicit(self, h: float) -> tuple[float, ...]:
-        """Rodas5P without error control."""
-        return self._fixed(build_fixed(self.whole, METHODS["rodas5p"]), h)
-
-    def _fixed(self, step: ca.Function, h: float) -> tuple[float, ...]:
+    def fixed(self, step: ca.Function, h: float) -> list[float]:
+        """Run `step` at the fixed step size `h` [s]."""
         count = round(self.t_end / h)
         d = np.zeros((self.whole.d.numel(), count))
         y = step.mapaccum("run", count)(self.y0, np.full((1, count), h), d).full()
@@ -158,11 +120,13 @@ class _Runs:
         samples = np.hstack([self.y0[:, None], y[:, every - 1 :: every]])
         accelerations = refinement(self.whole).map(samples.shape[1])(samples, 0).full()
         offset = self.whole.nx - len(self.model.x) // 2
-        return tuple(variation(accelerations[offset + i]) for i in self.rows)
+        return [variation(accelerations[offset + i]) for i in self.rows]
 
 
 def runge_kutta_4(whole: System) -> ca.Function:
-    """The step (y, h, d) -> y_next of the classical method, on the constraints at every stage."""
+    """Return the step (y, h, d) -> y_next of the classical method, on the constraints at each
+    stage.
+    """
     y, h, d = ca.SX.sym("y", whole.n), ca.SX.sym("h"), ca.SX.sym("d", whole.d.numel())
     refine, f = refinement(whole), ca.Function("f", [whole.y, whole.d], [whole.f])
     nx = whole.nx
@@ -179,6 +143,6 @@ def runge_kutta_4(whole: System) -> ca.Function:
 
 
 def variation(a: Array) -> float:
-    """Total variation of samples; NaN where they are not finite."""
+    """Return the total variation of samples; NaN if they are not finite."""
     total = float(np.abs(np.diff(a)).sum())
     return total if np.isfinite(total) else float("nan")

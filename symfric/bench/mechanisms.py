@@ -1,78 +1,50 @@
-"""Needs and accuracy of mechanisms: counts, compilation, chains, reference numbers.
+"""Size and accuracy of mechanisms: counts, compilation, chains, reference values.
 
-Source: Haug's spatial four-mass system and slider-crank; the reference numbers are our own
-solutions in minimal coordinates (`tests/mechanics.py`).
+Source: Haug's spatial four-mass system and slider-crank; the reference values are solutions of
+symfric in minimal coordinates (`tests/mechanics.py`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from time import perf_counter
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.table import best_time, compile_time
+from symfric.bench.report import Found, Row, best_time, compile_time
 from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import c_source
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import c_source
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
 from symfric.laws import BrownMcPhee, Law, SelfTuning, Viscous
 from symfric.model import Model
 from symfric.model.kinds import RATE
 from symfric.multibody import JointFriction, Mechanism, Revolute
-from symfric.results.trajectory import Trajectory
 from symfric.scenes import DoublePendulum, FourMass, MechanismScene, SliderCrank
 
+Array = NDArray[np.float64]
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 ALL = ("x1", "y2", "z3", "x4")
 METHOD = METHODS["rodas5p"]
-
-
-class CountRow(NamedTuple):
-    """Counts of one variant of a mechanism.
-
-    Attributes:
-        states, algebraic: of the model; coordinates and rates, multipliers and normal forces.
-        ode: CasADi instructions of the explicit accelerations.
-        step: CasADi instructions of an adaptive step.
-        nonzeros: of the derivatives of the right-hand side by the unknowns.
-    """
-
-    mechanism: str
-    variant: str
-    formulation: str
-    states: int
-    algebraic: int
-    ode: int
-    step: int
-    nonzeros: int
-
-
-class CompileRow(NamedTuple):
-    """Cost of the step of a mechanism as machine code.
-
-    Attributes:
-        build_s: time [s] to write its expressions.
-        lines: of generated C.
-        compile_s: processor time [s] of the C compiler.
-    """
-
-    mechanism: str
-    formulation: str
-    build_s: float
-    lines: int
-    compile_s: float
+BOTH = ("joint", "absolute")
+"""Coordinates in which mechanisms are built."""
+COUNTS = "Size of the equations of mechanisms; CasADi instructions"
+COMPILED = "Step of symfric as machine code, compiled once for all tolerances and parameters"
+CHAINS = "Step of a chain in the virtual machine"
+FACTS = "Reference values and differences from them"
+NORMS = "Largest norms of the constraints"
+DRIFTS = "Energy of frictionless mechanisms"
 
 
 def four_mass(joints: tuple[str, ...] = (), friction: JointFriction | None = None) -> Mechanism:
-    """The four-mass system with friction in `joints` alone, that of the scene by default."""
+    """Return the four-mass system with friction in `joints` only, by default that of the scene."""
     m = FourMass(LAW).mechanism()
     m.joints = [
         replace(j, friction=(friction or j.friction) if j.name in joints else None)
@@ -82,7 +54,7 @@ def four_mass(joints: tuple[str, ...] = (), friction: JointFriction | None = Non
 
 
 def turned_pendulum() -> Mechanism:
-    """The double pendulum with its second hinge turned, so that it leaves the plane."""
+    """Return the double pendulum with its second hinge turned, which makes the motion spatial."""
     m = DoublePendulum(LAW).mechanism()
     m.frame("upper.turned", at=(0.0, 0.0, -0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
     m.frame("lower.turned", at=(0.0, 0.0, 0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
@@ -92,86 +64,67 @@ def turned_pendulum() -> Mechanism:
     return m
 
 
-VARIANTS: tuple[tuple[str, str, Mechanism], ...] = (
-    ("four_mass", "frictionless", four_mass()),
-    ("four_mass", "constant normal", four_mass(ALL, JointFriction(LAW, normal=50.0))),
-    ("four_mass", "reactions in one", four_mass(("x1",))),
-    ("four_mass", "reactions in all", four_mass(ALL)),
-    ("double_pendulum", "planar", DoublePendulum(LAW).mechanism()),
-    ("double_pendulum", "spatial", turned_pendulum()),
-)
-COMPILED: tuple[tuple[str, Mechanism], ...] = (
-    ("slider_crank", SliderCrank(LAW).mechanism()),
-    ("four_mass", four_mass(ALL)),
-)
+VARIANTS: dict[tuple[str, str], Callable[[], Mechanism]] = {
+    ("four_mass", "frictionless"): four_mass,
+    ("four_mass", "constant normal"): lambda: four_mass(ALL, JointFriction(LAW, normal=50.0)),
+    ("four_mass", "reactions in one"): lambda: four_mass(("x1",)),
+    ("four_mass", "reactions in all"): lambda: four_mass(ALL),
+    ("double_pendulum", "planar"): lambda: DoublePendulum(LAW).mechanism(),
+    ("double_pendulum", "spatial"): turned_pendulum,
+}
+BUILT: dict[str, Callable[[], Mechanism]] = {
+    "slider_crank": lambda: SliderCrank(LAW).mechanism(),
+    "four_mass": lambda: four_mass(ALL),
+}
 
 
 def integrator(model: Model) -> Integrator:
-    """The adaptive integrator of a model without inputs."""
+    """Return the adaptive integrator of a model without inputs."""
     return Integrator(model, input_data(model, None, 0.0, 1.0), METHOD)
 
 
-def count(mechanism: str, variant: str, formulation: str, of: Mechanism) -> CountRow:
-    """Count one variant in "joint" or "absolute" coordinates."""
-    model = of.build(formulation=formulation)
+@cache
+def count(mechanism: str, variant: str, coordinates: str) -> Row:
+    """Count unknowns, CasADi instructions and nonzeros of one of `VARIANTS`."""
+    model = VARIANTS[mechanism, variant]().build(formulation=coordinates)
     made = integrator(model)
-    whole = made.system
-    return CountRow(
-        mechanism=mechanism,
-        variant=variant,
-        formulation=formulation,
-        states=len(model.x),
-        algebraic=len(model.z),
-        ode=model.function("ode").n_instructions(),
-        step=made.instructions,
-        nonzeros=ca.jacobian(whole.f, whole.y).nnz(),
-    )
+    return {
+        "mechanism": mechanism, "variant": variant, "coordinates": coordinates,
+        "states": len(model.x), "algebraic variables": len(model.z),
+        "instructions, accelerations": model.function("ode").n_instructions(),
+        "instructions, step": made.instructions,
+        "nonzeros of the Jacobian": ca.jacobian(made.system.f, made.system.y).nnz(),
+    }  # fmt: skip
 
 
-def counts(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[CountRow]:
-    """All variants in the given formulations."""
-    return [count(name, variant, f, of) for f in formulations for name, variant, of in VARIANTS]
+def counts(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
+    """Count all variants."""
+    yield from ((COUNTS, count(*key, c)) for c in coordinates for key in VARIANTS)
 
 
-def compile_rows(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[CompileRow]:
-    """Times for building and compiling a step; empty without a compiler."""
-    rows: list[CompileRow] = []
-    for formulation in formulations if find_compiler() else ():
-        for name, mechanism in COMPILED:
+def compilation(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
+    """Measure times for building and compiling a step, if there is a compiler."""
+    for c in coordinates if find_compiler() else ():
+        for name, mechanism in BUILT.items():
             begin = perf_counter()
-            made = integrator(mechanism.build(formulation=formulation))
+            made = integrator(mechanism().build(formulation=c))
             source = c_source(made.step, METHOD.H.shape[0])
-            build_s = perf_counter() - begin
-            seconds = compile_time(source)
-            rows.append(CompileRow(name, formulation, build_s, source.count("\n"), seconds))
-    return rows
+            yield COMPILED, {
+                "mechanism": name, "coordinates": c, "build time [s]": perf_counter() - begin,
+                "lines of C": source.count("\n"), "compile time [s]": compile_time(source),
+            }  # fmt: skip
 
 
-Array = NDArray[np.float64]
 SIZES = (2, 4, 8, 16, 32, 64)
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 BUDGET = 120.0
-"""A chain that took longer to build [s] is the last one."""
-
-
-class ChainRow(NamedTuple):
-    """One size.
-
-    Attributes:
-        links: how many.
-        build_s: time [s] from nothing to the step.
-        instructions: of the step.
-        step_s: time [s] of an attempt in the virtual machine.
-    """
-
-    links: int
-    build_s: float
-    instructions: int
-    step_s: float
+"""Build time [s] above which no longer chain is measured."""
 
 
 def chain(links: int, law: Law | None = None) -> Model:
-    """A hanging chain of equal rods, its hinges about x and y by turns; friction from reactions."""
+    """Return a hanging chain of equal rods with hinges about x and y in turn; friction from
+    reactions.
+    """
     m, length = Mechanism("chain"), 1.0
     m.frame("ground.end", z=Y)
     last = "ground"
@@ -186,41 +139,37 @@ def chain(links: int, law: Law | None = None) -> Model:
     return m.build()
 
 
-def scaling(
-    make: Callable[[int], Model],
-    sizes: Sequence[int] = SIZES,
-    budget: float = BUDGET,
-) -> list[ChainRow]:
-    """Measure the step of `make(n)` for every n of `sizes`, until one takes longer than `budget`.
-
-    Args:
-        make: number of links -> model.
-        sizes: increasing.
-        budget: time for building [s].
-    """
-    rows: list[ChainRow] = []
+def chains(
+    make: Callable[[int], Model], sizes: Sequence[int] = SIZES, budget: float = BUDGET
+) -> Iterator[Found]:
+    """Measure the step of `make(n)` for each n of `sizes`, until building exceeds `budget` [s]."""
+    rows: list[Row] = []
     for n in sizes:
         begin = perf_counter()
         made = integrator(make(n))
         build_s = perf_counter() - begin
-        rows.append(ChainRow(n, build_s, made.instructions, step_time(made)))
+        rows.append(
+            {"links": n, "build time [s]": build_s, "instructions": made.instructions,
+             "time per step [us]": 1e6 * step_time(made)}
+        )  # fmt: skip
+        yield CHAINS, rows[-1]
         if build_s > budget:
             break
-    return rows
+    if len(rows) > 1:
+        growth = [f"{c} {exponent(rows, c):.2f}" for c in ("instructions", "time per step [us]")]
+        yield f"Growth exponents of a chain: {', '.join(growth)}"
 
 
-def exponent(rows: Sequence[ChainRow], column: str, smallest: int = 8) -> float:
-    """Slope of the logarithm of a column over that of the links, from `smallest` links on."""
-    used = [row for row in rows if row.links >= smallest]
-    if len(used) < 2:
-        used = list(rows[-2:])
-    links = np.log([row.links for row in used])
-    values = np.log([float(getattr(row, column)) for row in used])
+def exponent(rows: Sequence[Row], column: str, smallest: int = 8) -> float:
+    """Return the slope of the logarithm of a column over that of the links, from `smallest` on."""
+    used = [row for row in rows if float(row["links"]) >= smallest]
+    used = used if len(used) > 1 else rows[-2:]
+    links, values = (np.log([float(row[c]) for row in used]) for c in ("links", column))
     return float(np.polyfit(links, values, 1)[0])
 
 
 def step_time(made: Integrator) -> float:
-    """Time [s] of an attempt from the start, in the virtual machine."""
+    """Return the time [s] of an attempt from the start, in the virtual machine."""
     whole, model = made.system, made.model
     y = first_guess(whole, model, model.initial_state())
     d = np.zeros(whole.d.numel())
@@ -234,52 +183,7 @@ def step_time(made: Integrator) -> float:
 SMOOTH = Viscous(sigma_2=0.0)
 RTOL = 1e-10
 DRIFT_S = 100.0
-"""Time [s] over which the energy of a frictionless mechanism is watched."""
-
-
-class Fact(NamedTuple):
-    """A reference number, from own solutions in other coordinates, and ours.
-
-    Attributes:
-        digits: what the reference is good for; the difference should be below it.
-    """
-
-    case: str
-    t: float
-    signal: str
-    value: float
-    reference: float
-    digits: float
-
-
-class NormRow(NamedTuple):
-    """Largest norms of the constraints over a run.
-
-    Attributes:
-        phi: on positions [m].
-        phi_dot: on velocities, over the largest rate.
-        phi_ddot: on accelerations, over the largest acceleration.
-    """
-
-    case: str
-    formulation: str
-    phi: float
-    phi_dot: float
-    phi_ddot: float
-
-
-class DriftRow(NamedTuple):
-    """Energy of a frictionless mechanism over a long time.
-
-    Attributes:
-        relative: largest change of the energy over its largest part.
-    """
-
-    case: str
-    rtol: float
-    t_end: float
-    steps: int
-    relative: float
+"""Duration [s] of the run over which the energy of a frictionless mechanism is checked."""
 
 
 def _tuned(mu_s: float, mu_d: float) -> Law:
@@ -315,52 +219,57 @@ REFERENCES: tuple[tuple[str, float, tuple[str, ...], tuple[float, ...], tuple[fl
     ("slider_crank self_tuning", 0.25, ("crank_rate", "crank", "energy"),
      (84.3534, 25.2698, 741.108), (1e-4, 1e-4, 1e-3)),
 )  # fmt: skip
-"""Case, time [s], signals, their values, and what these are good for."""
+"""Case, time [s], signals, their values, and the accuracy of each value."""
 
 
-def facts() -> list[Fact]:
-    """All reference numbers and ours at rtol 1e-10."""
-    rows: list[Fact] = []
-    for case in FACT_CASES:
+def facts() -> Iterator[Found]:
+    """Compare all reference values with runs at rtol 1e-10."""
+    for case, scene in FACT_CASES.items():
         own = [row[1:] for row in REFERENCES if row[0] == case]
         times = [t for t, *_ in own]
-        run = simulate(FACT_CASES[case].model(), times[-1], rtol=RTOL, t_eval=times)
+        run = simulate(scene.model(), times[-1], rtol=RTOL, t_eval=times)
         for k, (t, *columns) in enumerate(own):
-            rows += [
-                Fact(case, t, name, float(run[name][k]), value, digits)
-                for name, value, digits in zip(*columns, strict=True)
-            ]
-    return rows
+            for name, value, accuracy in zip(*columns, strict=True):
+                yield FACTS, {
+                    "case": case, "time [s]": t, "signal": name, "reference": f"{value:.9g}",
+                    "difference": float(run[name][k]) - value,
+                    "accuracy of the reference": accuracy,
+                }  # fmt: skip
 
 
-def norms(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[NormRow]:
-    """Constraints of both mechanisms with friction over their runs, at the default tolerance."""
-    rows: list[NormRow] = []
+def norms(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
+    """Measure constraints of both mechanisms with friction at the default tolerance.
+
+    Velocities are relative to the largest rate, accelerations to the largest acceleration.
+    """
     for case in ("four_mass brown_mcphee", "slider_crank brown_mcphee"):
-        for formulation in formulations:
-            model = FACT_CASES[case].mechanism().build(formulation=formulation)
+        for c in coordinates:
+            model = FACT_CASES[case].mechanism().build(formulation=c)
             run = simulate(model, max(t for name, t, *_ in REFERENCES if name == case))
-            rates = _largest(run, [v.name for v in model.x if v.kind == RATE])
-            steepest = max(float(np.abs(np.gradient(run[n], run.t)).max()) for n in rates)
-            fastest = max(rates.values())
+            rates = [run[v.name] for v in model.x if v.kind == RATE]
+            fastest = max(float(np.abs(v).max()) for v in rates)
+            steepest = max(float(np.abs(np.gradient(v, run.t)).max()) for v in rates)
             phi, phi_dot, phi_ddot = (
-                float(run[n].max())
-                for n in ("constraint_position", "constraint_velocity", "constraint_acceleration")
+                float(run[f"constraint_{level}"].max())
+                for level in ("position", "velocity", "acceleration")
             )
-            rows.append(NormRow(case, formulation, phi, phi_dot / fastest, phi_ddot / steepest))
-    return rows
+            yield NORMS, {
+                "case": case, "coordinates": c, "positions [m]": phi,
+                "velocities, relative": phi_dot / fastest,
+                "accelerations, relative": phi_ddot / steepest,
+            }  # fmt: skip
 
 
-def drifts(t_end: float = DRIFT_S) -> list[DriftRow]:
-    """Energy of both frictionless mechanisms over `t_end` seconds."""
-    rows: list[DriftRow] = []
+def drifts(t_end: float = DRIFT_S) -> Iterator[Found]:
+    """Measure the change of energy of both frictionless mechanisms over `t_end` [s].
+
+    It is relative to the largest kinetic energy, or to the energy at the start if that is larger.
+    """
     for case in ("four_mass frictionless", "slider_crank frictionless"):
         run = simulate(FACT_CASES[case].model(), t_end, rtol=RTOL)
         energy, kinetic = run["energy"], run["kinetic"]
         relative = float(np.abs(energy - energy[0]).max() / max(kinetic.max(), abs(energy[0])))
-        rows.append(DriftRow(case, RTOL, t_end, run.statistics.steps, relative))
-    return rows
-
-
-def _largest(run: Trajectory, names: list[str]) -> dict[str, float]:
-    return {name: float(np.abs(run[name]).max()) for name in names}
+        yield DRIFTS, {
+            "case": case, "rtol": RTOL, "end time [s]": t_end, "steps": run.statistics.steps,
+            "relative change of energy": relative,
+        }  # fmt: skip

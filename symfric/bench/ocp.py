@@ -1,17 +1,17 @@
-"""Optimal control: what is found from many starts, whether it holds, and what it takes.
+"""Optimal control: solutions from many starts, their verification, and their cost.
 
-Beside `ocp.solve` stand Radau collocation by CasADi's Opti and, where it is installed, rockit, on
-the same models from the same starts with the same Ipopt. The referee is the same for all: the model
-with layers of 1e-5 under the controls, and exact Coulomb friction with stiction. Times are
-processor time of a whole call, building and checking included.
+`ocp.solve` is compared with Radau collocation by CasADi's Opti and, if installed, by rockit, on the
+same models from the same starts with the same Ipopt. All controls are verified alike: by the model
+with layers of 1e-5, and by exact Coulomb friction with stiction. Times are processor times of a
+whole call, with building and verification.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from math import isfinite, nan
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from math import inf, isfinite, nan
 from statistics import median
 from time import process_time
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,9 @@ from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
-from symfric.bench import table
 from symfric.bench.ocp_contenders import Attempt, has_rockit, opti, rockit
-from symfric.bench.ocp_costs import MpcRow, SizeRow, mpc_rows, size_rows
+from symfric.bench.ocp_costs import controllers, program_sizes
+from symfric.bench.report import Found, Progress, Report, curves
 from symfric.integrator import Hold, simulate
 
 Array = NDArray[np.float64]
@@ -36,165 +36,79 @@ STARTS, RANDOM = 12, 50
 NEAR, FAR = 0.1, 0.5
 """Scales of the starts, see `perturbed`: near the default guess, and anywhere in the bounds."""
 WANTED = 1e-4
-"""Relative miss up to which a motion counts as landed."""
+"""Largest relative miss of a verified motion."""
 BEST = 1e-3
-"""Relative cost above the best one found up to which it counts as found."""
+"""Largest relative difference from the best cost that counts as equal."""
 WIDTHS = (1e-1, 1e-2, 1e-3)
-"""Layers [m/s] on which the others solve."""
+"""Layers [m/s] of the problems for other tools."""
 INTERVALS = 100
+TITLE = (
+    "Optimal control: medians over the starts; verified solutions miss no end condition by more "
+    "than 1e-4, with the model and with exact Coulomb friction"
+)
+EXACT = "relative miss, exact friction"
 
 
-@final
-@dataclass(frozen=True)
-class OcpRow:
-    """One solver on one problem, medians over its starts.
-
-    Attributes:
-        case, solver: names; of the others with the layer they solve on.
-        starts: near the default guess ("near") or far from it ("far"), and their number.
-        solved: share in which the solver says so.
-        landed: share that misses by no more than 1e-4, in the model itself and with exact friction.
-        best: share within 0.1 % of the best known cost, or of the best one of this run.
-        cost: median J; `optimum`: best known one, NaN where there is none.
-        off: (cost - optimum) / |optimum|.
-        miss, exact: relative miss of the model, and with exact friction (NaN without friction).
-        iterations: of the solver.
-        time_s: processor time of a call [s].
-    """
-
-    case: str
-    solver: str
-    starts: str
-    count: int
-    solved: float
-    landed: float
-    best: float
-    cost: float
-    optimum: float
-    off: float
-    miss: float
-    exact: float
-    iterations: float
-    time_s: float
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class OcpBenchmark(table.Report):
-    """All rows of one run of the benchmark.
-
-    Attributes:
-        rows: problems by solvers.
-        sizes: what derivatives of large programs take.
-        mpc: controllers on plants of other laws.
-        skipped: who was left out -> why.
-    """
-
-    rows: tuple[OcpRow, ...]
-    sizes: tuple[SizeRow, ...]
-    mpc: tuple[MpcRow, ...]
-    skipped: dict[str, str]
-
-    def shown(self) -> Iterator[table.Table | str]:
-        """Problems by solvers, sizes of programs, controllers."""
-        yield table.of(
-            "Optimal control: medians over the starts; verified solutions miss no end condition "
-            "by more than 1e-4, with the model and with exact Coulomb friction",
-            self.rows,
-            {"case": "case", "solver": "solver", "starts": lambda r: f"{r.count} {r.starts}",
-             "verified": lambda r: f"{r.landed:.0%}",
-             "best cost reached": lambda r: f"{r.best:.0%}", "cost J": "cost",
-             "cost above the best [%]": table.shortened("off", 100, 2),
-             "relative miss": table.shortened("miss", digits=2),
-             "relative miss, exact friction": table.shortened("exact", digits=2),
-             "iterations": table.rounded("iterations"),
-             "processor time [s]": table.shortened("time_s", digits=2)},
-        )  # fmt: skip
-        if self.sizes:
-            yield table.of(
-                "Derivatives of the program of a cart-pendulum in the virtual machine", self.sizes,
-                {"intervals": "intervals", "unknowns": "unknowns", "nonzeros": "nonzeros",
-                 "build time [s]": table.shortened("build_s"),
-                 "Jacobian [ms]": table.shortened("jacobian_ms"),
-                 "Hessian [ms]": table.shortened("hessian_ms"),
-                 "growth exponent": table.shortened("exponent")},
-            )  # fmt: skip
-        if self.mpc:
-            yield table.of(
-                "Model predictive controller of a drive", self.mpc,
-                {"plant": "plant", "cycles": "cycles",
-                 "median time per cycle [ms]": table.shortened("median_ms"),
-                 "largest time [ms]": table.shortened("worst_ms"),
-                 "largest processor time [ms]": table.shortened("worst_cpu_ms"),
-                 "most QPs per cycle": "iterations", "failed cycles": "unconverged",
-                 "unreported failures": "unreported",
-                 "distance from the goal [mm]": table.shortened("off_mm")},
-            )  # fmt: skip
-        yield from table.not_run(self.skipped)
-
-    def drawn(self) -> tuple[Any, ...]:
-        """Miss against time, a panel for each problem with friction."""
-        return "ocp", self.rows
-
-
-def bench_ocp(
-    *,
-    quick: bool = False,
-    cases: Sequence[str] | None = None,
-    progress: table.Progress = None,
-) -> OcpBenchmark:
-    """Measure all problems on this machine; some minutes, `quick` one.
+def bench(
+    quick: bool = False, cases: Sequence[str] | None = None, progress: Progress = None
+) -> Report:
+    """Measure all problems on this machine in some minutes, or one minute with `quick`.
 
     Args:
-        quick: 3 starts, no far ones, the others on one layer.
-        cases: names of ready problems; all of them if none.
+        quick: 3 starts, no far ones, other tools on one layer only.
+        cases: names of ready problems; default: all, and program sizes and controllers.
+        progress: called with the current item and the fraction done.
     """
-    ready = [READY[name] for name in cases or READY]
-    rows = [
-        row for one in table.each(ready, progress, lambda r: r.name) for row in _case(one, quick)
-    ]
-    skipped = {} if has_rockit() else {"rockit": "not installed"}
-    sizes, mpc = ((), ()) if cases else (tuple(size_rows(quick)), tuple(mpc_rows(quick)))
-    return OcpBenchmark(tuple(rows), sizes, mpc, skipped)
+    tasks: dict[str, Callable[[], Iterator[Found]]] = {
+        name: partial(_case, READY[name], quick) for name in cases or READY
+    }
+    if not cases:
+        tasks["program sizes"] = partial(program_sizes, quick)
+        tasks["controllers"] = partial(controllers, quick)
+    draw = curves("case", ("solver",), "processor time [s]", EXACT)
+    report = Report((TITLE, draw))
+    if not has_rockit():
+        report.notes.append("rockit: not run, not installed")
+    return report.collect(tasks, progress)
 
 
 def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, Array]]:
-    """Guesses of all states and inputs by name; the first one of near starts is the default."""
+    """Yield guesses of all states and inputs by name; the first of near starts is the default."""
     into = discretise(problem, Radau()).on(make_meshes(problem, 50))
     points = initial_points(into)
+    model = problem.spans[0].model
     for seed in range(count):
         moved = points if seed == 0 and scale == NEAR else perturbed(into, points, scale, seed)
-        names = [v.name for v in problem.spans[0].model.x]
-        inputs = [v.name for v in problem.spans[0].model.u]
         lengths = np.array([span.T for span in moved.spans])
         begins = np.concatenate([[0.0], np.cumsum(lengths)])
         at = np.concatenate(
             [b + T * m for b, T, m in zip(begins, lengths, into.meshes, strict=False)]
         )
-        looks = np.linspace(0.0, begins[-1], 201)
         nodes = np.hstack([span.nodes for span in moved.spans])
         held = np.hstack([np.hstack([span.u, span.u[:, -1:]]) for span in moved.spans])
-        yield {n: np.interp(looks, at, row) for n, row in zip(names, nodes, strict=True)} | {
-            n: np.interp(looks, at, row) for n, row in zip(inputs, held, strict=True)
-        }
+        times = np.linspace(0.0, begins[-1], 201)
+        rows = zip((*model.x, *model.u), (*nodes, *held), strict=True)
+        yield {v.name: np.interp(times, at, row) for v, row in rows}
 
 
-def _case(ready: Ready, quick: bool) -> Iterator[OcpRow]:
+def _case(ready: Ready, quick: bool) -> Iterator[Found]:
+    """Solve one problem by all tools; those without homotopy solve it with smooth layers."""
     problem = ready.make()
+    row = partial(_row, ready, problem)
     near = list(starts_of(problem, 3 if quick else STARTS, NEAR))
-    yield _row(ready, "symfric", "near", [_ours(problem, guess) for guess in near], problem)
-    if ready.friction and not quick:
-        far = starts_of(problem, RANDOM, FAR)
-        yield _row(ready, "symfric", "far", [_ours(problem, guess) for guess in far], problem)
+    yield row("symfric", "near", [_ours(problem, guess) for guess in near])
     if not ready.friction:
-        yield _others(ready, "Opti", problem, near, nan)
+        yield row("Opti", "near", [opti(problem, INTERVALS, guess) for guess in near[:3]])
         return
+    if not quick:
+        far = starts_of(problem, RANDOM, FAR)
+        yield row("symfric", "far", [_ours(problem, guess) for guess in far])
     for width in WIDTHS[:1] if quick else WIDTHS:
         smooth = ready.make(v_t=width)
-        yield _others(ready, "Opti", smooth, near, width)
+        found = [opti(smooth, INTERVALS, guess) for guess in near[:3]]
+        yield row(f"Opti {width:g}", "near", found)
         if has_rockit():
-            found = [rockit(smooth, INTERVALS)]
-            yield _row(ready, f"rockit {width:g}", "default", found, problem)
+            yield row(f"rockit {width:g}", "default", [rockit(smooth, INTERVALS)])
 
 
 def _ours(problem: Problem, guess: Start) -> Attempt:
@@ -203,20 +117,13 @@ def _ours(problem: Problem, guess: Start) -> Attempt:
     return attempt_of(found, process_time() - begin)
 
 
-def _others(
-    ready: Ready, name: str, smooth: Problem, starts: Sequence[dict[str, Array]], width: float
-) -> OcpRow:
-    found = [opti(smooth, INTERVALS, guess) for guess in starts[:3]]
-    label = f"{name} {width:g}" if isfinite(width) else name
-    return _row(ready, label, "near", found, ready.make())
-
-
 SOLVED = ("SOLVED", "ACCEPTABLE", "SUCCESS", "Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 def _row(
-    ready: Ready, solver: str, starts: str, found: Sequence[Attempt], problem: Problem
-) -> OcpRow:
+    ready: Ready, problem: Problem, solver: str, starts: str, found: Sequence[Attempt]
+) -> Found:
+    """Return medians over the starts; the best cost is the known one or the best of this run."""
     misses = [landed(problem, a) for a in found]
     exact = [landed(problem, a, exact=True) if ready.friction else nan for a in found]
     holds = [
@@ -225,43 +132,32 @@ def _row(
     ]
     held = [a.cost for a, good in zip(found, holds, strict=True) if good]
     known = ready.optimum if isfinite(ready.optimum) else min(held, default=nan)
-    cost = median(a.cost for a in found)
-    size = abs(known) or 1.0
-    return OcpRow(
-        case=ready.name,
-        solver=solver,
-        starts=starts,
-        count=len(found),
-        solved=_share([a.answer in SOLVED for a in found]),
-        landed=_share(holds),
-        best=_share([good and a.cost <= known + BEST * size
-                for a, good in zip(found, holds, strict=True)]),
-        cost=cost,
-        optimum=ready.optimum,
-        off=(cost - known) / size,
-        miss=_middle(misses),
-        exact=_middle(exact),
-        iterations=median(a.iterations for a in found),
-        time_s=median(a.time_s for a in found),
-    )  # fmt: skip
-
-
-def _share(flags: Sequence[bool]) -> float:
-    return sum(flags) / len(flags)
+    cost, size = median(a.cost for a in found), abs(known) or 1.0
+    share = 100.0 / len(found)
+    return TITLE, {
+        "case": ready.name, "solver": solver, "starts": f"{len(found)} {starts}",
+        "reported as solved [%]": share * sum(a.status in SOLVED for a in found),
+        "verified [%]": share * sum(holds),
+        "best cost reached [%]": share * sum(c <= known + BEST * size for c in held),
+        "cost J": cost, "best known J": ready.optimum,
+        "cost above the best [%]": 100.0 * (cost - known) / size,
+        "relative miss": _middle(misses), EXACT: _middle(exact),
+        "iterations": median(a.iterations for a in found),
+        "processor time [s]": median(a.time_s for a in found),
+    }  # fmt: skip
 
 
 def _middle(values: Sequence[float]) -> float:
-    """The median, in which a motion that could not be simulated counts as infinitely far off."""
-    if not isfinite(values[0]) and all(v != v for v in values):
-        return nan
-    return median(v if v == v else float("inf") for v in values)
+    """Return the median; a motion that could not be simulated counts as infinitely far off."""
+    known = [v if v == v else inf for v in values]
+    return median(known) if min(known) < inf else nan
 
 
-# ---- how far motions are off what a problem asks for, whoever found the controls ----
+# ---- verification of controls, whatever tool found them ----
 
 
 def attempt_of(solution: Solution, time_s: float) -> Attempt:
-    """The solution of `ocp.solve` as an `Attempt`."""
+    """Return the solution of `ocp.solve` as an `Attempt`."""
     motion, meshes, controls = solution.motions[0], [], []
     for stretch in motion.phases:
         inside = (motion.t_control >= stretch.begin - 1e-12) & (motion.t_control < stretch.end)
@@ -270,7 +166,7 @@ def attempt_of(solution: Solution, time_s: float) -> Attempt:
     return Attempt(
         cost=solution.cost,
         iterations=solution.iterations,
-        answer=solution.status.name,
+        status=solution.status.name,
         time_s=time_s,
         durations=tuple(stretch.T for stretch in motion.phases),
         controls=tuple(controls),
@@ -279,26 +175,36 @@ def attempt_of(solution: Solution, time_s: float) -> Attempt:
 
 
 def landed(problem: Problem, attempt: Attempt, *, exact: bool = False, rtol: float = 1e-9) -> float:
-    """Largest relative miss of ends and middle points under the controls, simulated.
+    """Return the largest relative miss of end and middle conditions under the simulated controls.
 
-    Of a state relative to its range, or its nominal value; NaN where the motion cannot be
-    simulated.
+    The miss of a state is relative to its range or nominal value; NaN if the simulation fails.
 
     Args:
-        exact: with exact Coulomb friction and stiction in place of the laws.
+        problem, attempt: problem and its solution.
+        exact: use exact Coulomb friction with stiction in place of the laws.
+        rtol: relative tolerance of the simulation.
     """
     state: dict[str, float] = {}
     modes: dict[str, int] = {}
     worst, clock = 0.0, 0.0
     for span, T, controls in zip(problem.spans, attempt.durations, attempt.controls, strict=True):
-        mesh = attempt.meshes[span.phase] if attempt.meshes else None
-        looks = sorted({*span.nodes, *np.linspace(0, 1, 101).tolist()})
+        N = next(iter(controls.values())).size
+        mesh = attempt.meshes[span.phase] if attempt.meshes else np.arange(N) / N
+        held_from = clock + T * np.array(mesh)
+        held_from[0] = clock
+        linked = {link.state for link in span.links}
+        times = sorted({*span.nodes, *np.linspace(0, 1, 101).tolist()})
         how: dict[str, Any] = {
             "t_start": clock,
-            "x0": _begin(span, state),
-            "u": _held_controls(span, controls, mesh, clock, T),
+            "x0": {
+                v.name: state[v.name]
+                if v.name in linked
+                else float(np.mean(span.nodes[0.0][v.name]))
+                for v in span.model.x
+            },
+            "u": {n: Hold(held_from, np.clip(u, *span.box(n))) for n, u in controls.items()},
             "p": {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)},
-            "t_eval": clock + T * np.array(looks),
+            "t_eval": clock + T * np.array(times),
             "rtol": rtol,
             "throw": False,
         }
@@ -309,35 +215,18 @@ def landed(problem: Problem, attempt: Attempt, *, exact: bool = False, rtol: flo
             run = simulate(span.model, clock + T, **how)
         if not run.status.ok:
             return nan
-        worst = max(worst, _miss(span, {n: run[n] for n in span.nodes[1.0]}, looks))
+        worst = max(worst, _miss(span, {n: run[n] for n in span.nodes[1.0]}, times))
         state, clock = {n: float(run[n][-1]) for n in span.nodes[1.0]}, clock + T
     return worst
 
 
-def _begin(span: Span, before: Mapping[str, float]) -> dict[str, float]:
-    linked = {link.state for link in span.links}
-    return {
-        v.name: before[v.name] if v.name in linked else float(np.mean(span.nodes[0.0][v.name]))
-        for v in span.model.x
-    }
-
-
-def _held_controls(
-    span: Span, controls: Mapping[str, Array], mesh: Array | None, clock: float, T: float
-) -> dict[str, Hold]:
-    N = next(iter(controls.values())).size
-    at = clock + T * (np.arange(N) / N if mesh is None else mesh)
-    at[0] = clock
-    return {n: Hold(at, np.clip(u, *span.box(n))) for n, u in controls.items()}
-
-
-def _miss(span: Span, signals: Mapping[str, Array], looks: Sequence[float]) -> float:
+def _miss(span: Span, signals: Mapping[str, Array], times: Sequence[float]) -> float:
     nominal = {v.name: v.nominal for v in span.model.x}
     worst = 0.0
     for s, boxes in span.nodes.items():
         for name, (low, high) in boxes.items():
             if s > 0 and isfinite(low) and isfinite(high):
-                x = float(signals[name][looks.index(s)])
+                x = float(signals[name][times.index(s)])
                 size = max(float(np.abs(signals[name]).max()), nominal[name])
                 worst = max(worst, (low - x) / size, (x - high) / size)
     return worst

@@ -1,6 +1,6 @@
-"""Optimal control problems by others: what a user of CasADi's Opti or of rockit writes.
+"""Optimal control problems in other tools, as users of CasADi's Opti or of rockit write them.
 
-Both get the same model, mesh, start and Ipopt; none refines its mesh or looks at its result.
+Both get the same model, mesh, start and Ipopt; neither refines its mesh or verifies its result.
 """
 
 import contextlib
@@ -34,21 +34,21 @@ DEGREE = 3
 @final
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """The solution of a solver.
+    """Result of a solver.
 
     Attributes:
-        cost: J as the solver says.
-        iterations: of Ipopt.
-        answer: its word.
+        cost: J as the solver reports it.
+        iterations: number of iterations.
+        status: status that the solver reports.
         time_s: processor time [s] of building and solving.
-        durations: of each phase [s].
-        controls: of each phase: input -> values held on the intervals.
-        meshes: starts of the intervals as fractions of the phase; None: they are equal.
+        durations: duration of each phase [s].
+        controls: for each phase, input -> values held on the intervals.
+        meshes: for each phase, starts of the intervals as fractions; None: equal intervals.
     """
 
     cost: float
     iterations: int
-    answer: str
+    status: str
     time_s: float
     durations: tuple[float, ...]
     controls: tuple[Mapping[str, Array], ...]
@@ -60,25 +60,29 @@ Guesses = Mapping[str, Array]
 
 
 def opti(problem: Problem, intervals: int, guess: Guesses | None = None) -> Attempt:
-    """Radau collocation written in a Python loop with CasADi's Opti, `intervals` in all.
+    """Solve by Radau collocation written in a Python loop with CasADi's Opti.
 
     Args:
-        problem: of one scenario, without chosen parameters and joins.
-        guess: where states start; straight lines where it says nothing.
+        problem: problem of one scenario, without chosen parameters and periodic states.
+        intervals: number of all intervals.
+        guess: start of the states; straight lines for missing ones.
     """
+    if problem.periodic or problem.choose or problem.scenarios:
+        raise ValueError("opti: expected one motion with given ends and parameters")
     begin = process_time()
     o = ca.Opti()
     each = max(1, intervals // len(problem.spans))
     cost, before, clock = ca.MX(0), None, ca.MX(0)
     parts: list[tuple[Span, ca.MX, list[ca.MX]]] = []
     for span in problem.spans:
-        T = _duration(o, span.T)
+        T = ca.MX(span.T) if not isinstance(span.T, Free) else o.variable()
+        if isinstance(span.T, Free):
+            o.subject_to(o.bounded(span.T.lower, T, span.T.upper))
+            o.set_initial(T, span.T.start)
         start = start_of(problem, span, guess)
         share, end, inputs = _collocated(o, span, T, each, clock, before, start)
         cost, before, clock = cost + share, end, clock + T
         parts.append((span, T, inputs))
-    if problem.periodic or problem.choose or problem.scenarios:
-        raise ValueError("opti: expected one motion with given ends and parameters")
     o.minimize(cost)
     o.solver("ipopt", IPOPT)
     try:
@@ -99,41 +103,29 @@ def opti(problem: Problem, intervals: int, guess: Guesses | None = None) -> Atte
     )
 
 
-def _duration(o: ca.Opti, T: float | Free) -> ca.MX:
-    if not isinstance(T, Free):
-        return ca.MX(T)
-    unknown = o.variable()
-    o.subject_to(o.bounded(T.lower, unknown, T.upper))
-    o.set_initial(unknown, T.start)
-    return unknown
-
-
 def _named(span: Span, rows: Array) -> dict[str, Array]:
     return {v.name: rows[:, i] for i, v in enumerate(span.model.u)}
 
 
 def straight(span: Span) -> Callable[[float], Array]:
-    """Straight lines through what is asked of each state, with the slopes of coordinates."""
-    fractions = sorted(span.nodes)
+    """Return straight lines through the conditions on each state; rates are slopes of them."""
     duration = span.T.start if isinstance(span.T, Free) else span.T
     names = [v.name for v in span.model.x]
-    rows: dict[str, Array] = {}
-    for name in names:
-        boxes = [span.nodes[s][name] for s in fractions]
-        known = [(s, (a + b) / 2) for s, (a, b) in zip(fractions, boxes, strict=True)
-                 if isfinite(a) and isfinite(b)]  # fmt: skip
-        at = [s for s, _ in known] or [0.0]
-        rows[name] = np.array([at, [x for _, x in known] or [0.0]])
-    rates = {"v": "x"} | {f"{name}_rate": name for name in names} | {"v1": "x1"}
+    points = {
+        name: [(s, sum(box) / 2) for s in sorted(span.nodes)
+               if np.isfinite(box := span.nodes[s][name]).all()] or [(0.0, 0.0)]
+        for name in names
+    }  # fmt: skip
+    coordinates = {"v": "x", "v1": "x1"} | {f"{name}_rate": name for name in names}
+
+    def line(name: str, s: float) -> float:
+        return float(np.interp(s, *np.transpose(points[name])))
 
     def at_fraction(s: float) -> Array:
-        def value(name: str, s: float) -> float:
-            return float(np.interp(s, *rows[name]))
-
+        low, high = max(s - 1e-3, 0.0), min(s + 1e-3, 1.0)
         return np.array([
-            (value(rates[n], min(s + 1e-3, 1.0)) - value(rates[n], max(s - 1e-3, 0.0)))
-            / (min(s + 1e-3, 1.0) - max(s - 1e-3, 0.0)) / duration
-            if rates.get(n) in rows else value(n, s)
+            (line(q, high) - line(q, low)) / (high - low) / duration
+            if (q := coordinates.get(n)) in points else line(n, s)
             for n in names
         ])  # fmt: skip
 
@@ -141,7 +133,7 @@ def straight(span: Span) -> Callable[[float], Array]:
 
 
 def start_of(problem: Problem, span: Span, guess: Guesses | None) -> Callable[[float], Array]:
-    """Fraction of a phase -> states to start from."""
+    """Return the guess of the states as a function of the fraction of a phase."""
     lines = straight(span)
     if not guess:
         return lines
@@ -168,11 +160,10 @@ def _collocated(
     before: ca.MX | None,
     guess: Callable[[float], Array],
 ) -> tuple[ca.MX, ca.MX, list[ca.MX]]:
-    """Equations of a phase; its cost, its end and its inputs."""
+    """Add the equations of a phase; return its cost, its end and its inputs."""
     model = span.model
-    point = ca.Function(
-        "point", span.symbols, [_ode(span), model.alg, span.running, _stack(span.path)]
-    )
+    path = ca.vertcat(ca.SX(0, 1), *(row.expression for row in span.path))
+    point = ca.Function("point", span.symbols, [_ode(span), model.alg, span.running, path])
     at_end = ca.Function("end", span.symbols, [span.end])
     tau = [0.0, *ca.collocation_points(DEGREE, "radau")]
     C, _, B = ca.collocation_coeff(tau[1:])
@@ -202,11 +193,11 @@ def _collocated(
         nodes = [x, *(state((k + s) / N) for s in tau[1:])]
         for j in range(1, DEGREE + 1):
             z = o.variable(len(model.z)) if model.z else ca.MX(0, 1)
-            rate, alg, running, path = point(clock + (k + tau[j]) * h, nodes[j], z, u, p)
+            rate, alg, running, limited = point(clock + (k + tau[j]) * h, nodes[j], z, u, p)
             o.subject_to(ca.horzcat(*nodes) @ C[:, j - 1] == h * rate)
             if model.z:
                 o.subject_to(alg == 0)
-            for row, value in zip(span.path, ca.vertsplit(path), strict=False):
+            for row, value in zip(span.path, ca.vertsplit(limited), strict=False):
                 _bound(o, value, row.lower, row.upper)
             cost += float(B[j - 1]) * h * running
         x = nodes[-1]
@@ -220,10 +211,6 @@ def _ode(span: Span) -> ca.SX:
     return span.model.function("ode")(*span.symbols)
 
 
-def _stack(rows: Sequence[Any]) -> ca.SX:
-    return ca.vertcat(ca.SX(0, 1), *(row.expression for row in rows))
-
-
 def _bound(o: ca.Opti, x: ca.MX, low: float, high: float) -> None:
     if low == high:
         o.subject_to(x == low)
@@ -235,6 +222,7 @@ def _bound(o: ca.Opti, x: ca.MX, low: float, high: float) -> None:
 
 
 def _meet(o: ca.Opti, span: Span, s: float, x: ca.MX) -> None:
+    """Add the conditions on states at the fraction `s` of a phase."""
     linked = {link.state for link in span.links} if s == 0.0 else set[str]()
     for i, v in enumerate(span.model.x):
         low, high = span.nodes[s][v.name]
@@ -243,49 +231,42 @@ def _meet(o: ca.Opti, span: Span, s: float, x: ca.MX) -> None:
 
 
 def has_rockit() -> bool:
-    """True if rockit is installed."""
+    """Return True if rockit is installed."""
     return find_spec("rockit") is not None
 
 
-def rockit(problem: Problem, intervals: int, substeps: int = 0) -> Attempt:
-    """Collocation, or multiple shooting with so many Runge-Kutta steps, by rockit.
+def rockit(problem: Problem, intervals: int) -> Attempt:
+    """Solve by collocation with rockit.
 
     Limits: explicit models without algebraic variables; bounds of states and inputs; phases of
     given durations.
     """
     other: Any = import_module("rockit")
-
     begin = process_time()
     master, clock = other.Ocp(), 0.0
     each = max(1, intervals // len(problem.spans))
     stages: list[tuple[Span, Any, ca.MX, ca.MX]] = []
     for span in problem.spans:
-        if isinstance(span.T, Free) or span.model.z or _follows_time(span):
+        model, equations = span.model, [_ode(span), span.running]
+        if isinstance(span.T, Free) or model.z or ca.depends_on(ca.vertcat(*equations), model.t):
             raise ValueError(
                 "rockit: expected given durations, no algebraic variables and no time in equations"
             )
         stage = master.stage(t0=clock, T=span.T)
-        x, u = stage.state(len(span.model.x)), stage.control(len(span.model.u))
-        p = ca.MX(ca.DM(span.p))
-        point = ca.Function("point", span.symbols, [_ode(span), span.running])
-        # its clock is no input of what it integrates
-        rate, running = point(0.0, x, ca.MX(0, 1), u, p)
+        x, u = stage.state(len(model.x)), stage.control(len(model.u))
+        point = ca.Function("point", span.symbols, equations)
+        rate, running = point(0.0, x, ca.MX(0, 1), u, ca.MX(ca.DM(span.p)))
         stage.set_der(x, rate)
         stage.add_objective(stage.integral(running))
-        for name, symbol in _symbols(span, x, u):
-            low, high = span.box(name)
+        for v, symbol in zip((*model.x, *model.u), ca.vertsplit(ca.vertcat(x, u)), strict=True):
+            low, high = span.box(v.name)
             if isfinite(low) and isfinite(high):
                 stage.subject_to(low <= (symbol <= high))
-        guess = straight(span)
-        at = np.linspace(0, 1, each + 1)
+        guess, at = straight(span), np.linspace(0, 1, each + 1)
         samples = np.array([guess(s) for s in at.tolist()])
         line = ca.interpolant("line", "linear", [clock + span.T * at], samples.ravel())
         stage.set_initial(x, line(stage.t))
-        stage.method(
-            other.MultipleShooting(N=each, M=substeps, intg="rk")
-            if substeps
-            else other.DirectCollocation(N=each)
-        )
+        stage.method(other.DirectCollocation(N=each))
         stages.append((span, stage, x, u))
         clock += span.T
     _join(master, stages)
@@ -293,43 +274,31 @@ def rockit(problem: Problem, intervals: int, substeps: int = 0) -> Attempt:
     with contextlib.redirect_stdout(io.StringIO()):
         try:
             found = master.solve_limited()
-        except RuntimeError:  # it gave up, and has its last iterate
+        except RuntimeError:  # without convergence, the last iterate is used
             found = master.non_converged_solution
+    controls = [found(stage).sample(u, grid="control")[1] for _, stage, _, u in stages]
     return Attempt(
         float(sum(found(stage).value(stage.objective) for _, stage, *_ in stages)),
         int(found.stats["iter_count"]),
         str(found.stats["return_status"]),
         process_time() - begin,
-        tuple(float(span.T) for span, *_ in stages if not isinstance(span.T, Free)),
+        tuple(float(span.T) for span in problem.spans if not isinstance(span.T, Free)),
         tuple(
-            _named(span, _sampled(found(stage).sample(u, grid="control")[1], each))
-            for span, stage, _, u in stages
+            _named(span, np.asarray(u, dtype=float).reshape(each + 1, -1)[:-1])
+            for span, u in zip(problem.spans, controls, strict=True)
         ),
     )
 
 
-def _follows_time(span: Span) -> bool:
-    return bool(ca.depends_on(ca.vertcat(_ode(span), span.running), span.model.t))
-
-
-def _symbols(span: Span, x: ca.MX, u: ca.MX) -> list[tuple[str, ca.MX]]:
-    pairs = [(v.name, x[i]) for i, v in enumerate(span.model.x)]
-    return pairs + [(v.name, u[i]) for i, v in enumerate(span.model.u)]
-
-
-def _sampled(values: Any, count: int) -> Array:
-    return np.asarray(values, dtype=float).reshape(count + 1, -1)[:-1]
-
-
 def _join(master: Any, stages: Sequence[tuple[Span, Any, ca.MX, ca.MX]]) -> None:
-    """Ends, links and middle points."""
+    """Add end conditions and links between phases."""
     for number, (span, stage, x, _) in enumerate(stages):
         linked = {link.state for link in span.links}
         if number:
             _, old, y, _ = stages[number - 1]
             master.subject_to(old.at_tf(y) == stage.at_t0(x))
-        for s, place in ((0.0, stage.at_t0), (1.0, stage.at_tf)):
+        for s, at_end in ((0.0, stage.at_t0), (1.0, stage.at_tf)):
             for i, v in enumerate(span.model.x):
                 low, high = span.nodes[s][v.name]
                 if low == high and not (s == 0.0 and v.name in linked):
-                    master.subject_to(place(x)[i] == low)
+                    master.subject_to(at_end(x)[i] == low)

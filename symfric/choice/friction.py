@@ -1,4 +1,4 @@
-"""Friction that all candidates describe, and each law with the numbers that describe it."""
+"""Friction that all candidates describe, and the numbers with which each law describes it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -39,16 +39,16 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction, as far as every law is to have it.
+    """Dry friction that every law is to describe.
 
         F = mu_d N sign(v) sliding,  |F| <= mu_s N at rest
         F = N [mu_d + (mu_s - mu_d) exp(-(v/v_s)^2)] sign(v)      with v_s
 
     Attributes:
         mu_s, mu_d: static and dynamic coefficient.
-        v_s: Stribeck velocity [m/s], over which friction falls after break-away. None: it falls at
-            once, or it has not been measured; then the velocities of that fall are as free as other
-            widths, and only their limit is compared.
+        v_s: Stribeck velocity [m/s], over which friction falls after break-away; None if it falls
+            at once or was not measured. Then the velocities of that fall are scaled as other
+            widths, and only the limit is compared.
     """
 
     mu_s: float = 0.15
@@ -74,18 +74,17 @@ class Friction:
         return self.mu_d + (self.mu_s - self.mu_d) * fall
 
     def __str__(self) -> str:
-        """Its numbers."""
+        """Return its numbers."""
         falls = "falling at once" if self.v_s is None else f"v_s = {self.v_s:g} m/s"
         return f"mu_s = {self.mu_s:g}, mu_d = {self.mu_d:g}, {falls}"
 
 
 def friction_of(law: Law) -> Friction:
-    """Return the levels of `law` where it has mu_s and mu_d; else those of the defaults."""
-    known = parameters(law)
-    given = {n: float(known[n].value) for n in ("mu_s", "mu_d") if n in known}
-    start = Friction()
-    mu_d = given.get("mu_d", start.mu_d * given.get("mu_s", start.mu_s) / start.mu_s)
-    return Friction(given.get("mu_s", start.mu_s * mu_d / start.mu_d), mu_d)
+    """Return the friction with mu_s and mu_d of `law`; a missing one in the default ratio."""
+    known, default = parameters(law), Friction()
+    levels = {n: float(known[n].value) for n in ("mu_s", "mu_d") if n in known}
+    mu_d = levels.get("mu_d", default.mu_d * levels.get("mu_s", default.mu_s) / default.mu_s)
+    return Friction(levels.get("mu_s", default.mu_s * mu_d / default.mu_d), mu_d)
 
 
 FALL: dict[type[Law], str] = {
@@ -96,15 +95,13 @@ FALL: dict[type[Law], str] = {
     PoppStelter: "d",
     MakkarDixon: "gamma_3",
 }
-"""Names of the Stribeck velocity, or of its inverse, other than v_s."""
+"""Law -> its Stribeck velocity, or the inverse, if it is not called v_s."""
 NO_FALL = (VelocityBased, StickSlip)
 """Laws whose v_s is the width of the transition."""
 
 
 def fall_of(law: Law) -> str | None:
-    """Return the parameter of `law` that is its Stribeck velocity or the inverse; None without
-    one.
-    """
+    """Return the name of the Stribeck velocity of `law`, or of the inverse; None without one."""
     if isinstance(law, NO_FALL):
         return None
     name = FALL.get(type(law), "v_s")
@@ -115,7 +112,7 @@ Levels = Callable[[Friction, float], Mapping[str, float]]
 
 
 def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
-    """mu_1 - mu_2 is the level of sliding; mu_2 makes the peak."""
+    """Return mu_1 and mu_2 with the level mu_1 - mu_2 of sliding and the peak mu_s."""
     eta = BlimanSorine().eta
 
     def peak(mu_2: float) -> float:
@@ -130,11 +127,10 @@ def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
 
 
 def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
-    """Elements that carry `total` together, in the shares that they come with."""
-    own = {n: p.value for n, p in parameters(law()).items() if n[:3] == "mu_" and n[3:].isdigit()}
-    whole = sum(own.values())
-    least = getattr(law(), "mu_s", whole)  # Leuven's carry more than mu_s, or its bristle runs away
-    return lambda f, _: {n: value * getattr(f, total) / least for n, value in own.items()}
+    """Return the levels of default elements that carry `total` together, in the same shares."""
+    mu = {n: p.value for n, p in parameters(law()).items() if n[:3] == "mu_" and n[3:].isdigit()}
+    least = getattr(law(), "mu_s", sum(mu.values()))  # those of Leuven carry more than mu_s
+    return lambda f, _: {n: value * getattr(f, total) / least for n, value in mu.items()}
 
 
 LEVELS: dict[type[Law], Levels] = {
@@ -153,23 +149,22 @@ LEVELS: dict[type[Law], Levels] = {
     RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
     MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
 }
-"""Levels of laws that call them otherwise than mu_s and mu_d; those in newton at a load N."""
+"""Law -> its levels if they are not mu_s and mu_d; those in newton at a load N."""
 
 
 def alike(law: Law, friction: Friction, load: float | None) -> Law:
-    """Return `law` with the levels, and where it has one the Stribeck velocity, of `friction`.
+    """Return `law` with the levels and, if it has one, the Stribeck velocity of `friction`.
 
     Args:
-        load: normal force [N] where it is one number.
+        load: normal force [N] if it is one number.
 
     Raises:
-        ValueError: a law with forces for levels where the load is not one number.
+        ValueError: a law with levels in newton if the load is not one number.
     """
-    known, make = parameters(law), LEVELS.get(type(law))
-    same = {"mu_s": friction.mu_s, "mu_d": friction.mu_d}
-    values = {name: value for name, value in same.items() if name in known}
-    if make is not None:
-        values |= make(friction, 1.0 if load is None else load)
+    known = parameters(law)
+    values = {name: getattr(friction, name) for name in ("mu_s", "mu_d") if name in known}
+    if type(law) in LEVELS:
+        values |= LEVELS[type(law)](friction, 1.0 if load is None else load)
     in_newton = [
         n for n, p in known.items()
         if p.role == "level" and p.unit in ("N", "N m") and values.get(n) != 0.0
@@ -186,10 +181,10 @@ def alike(law: Law, friction: Friction, load: float | None) -> Law:
 
 
 def peaked(law: Law, mu_s: float, load: float | None) -> Law:
-    """Return a static law with the highest force of steady sliding at mu_s N; any other as it is.
+    """Return a static law with the highest force mu_s N of steady sliding; any other unchanged.
 
-    The product of a rise over one velocity and a fall over another stays below the static level
-    that it is written with, by 0.05 % to 7 %. What is measured is the peak.
+    The product of a rise over one velocity and a fall over another stays 0.05 % to 7 % below the
+    static level of its formula, whereas measurements give the peak.
     """
     known = parameters(law)
     apart = {"mu_s", "F_S", "gamma_1", "F_sl"} & set(known)
@@ -211,13 +206,11 @@ def peaked(law: Law, mu_s: float, load: float | None) -> Law:
 
 
 PASSES = 12
-"""Corrections of a peak; each leaves a few per cent of what was missing."""
+"""Corrections of a peak; each leaves a few per cent of the error."""
 
 
 def _top(law: Law, v: Array, N: float) -> float:
-    """Return the highest force of steady sliding over N: on the grid `v`, then on one around
-    its peak.
-    """
+    """Return the highest force of steady sliding over N, on the grid `v` and one at its peak."""
     F = steady_force(law, v, N)
     k = int(np.argmax(F))
     near = np.geomspace(v[max(k - 1, 0)], v[min(k + 1, v.size - 1)], 201)
@@ -225,9 +218,7 @@ def _top(law: Law, v: Array, N: float) -> float:
 
 
 def _raised(law: Law, factor: float, missing: float, N: float, v: Array) -> dict[str, float]:
-    """Return the parameters of a higher peak: by a factor, or by a coefficient; sliding stays
-    as it is.
-    """
+    """Return the parameters of a peak higher by a `factor`, or by the coefficient `missing`."""
     now = {name: float(p.value) for name, p in parameters(law).items()}
     if isinstance(law, MakkarDixon):  # gamma_1 times a share of itself makes the peak
         share = float((np.tanh(now["gamma_2"] * v) - np.tanh(now["gamma_3"] * v)).max())

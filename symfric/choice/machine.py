@@ -1,4 +1,4 @@
-"""User's machine with any law in it, what one run costs, and references of errors."""
+"""A law in the user's machine, and the reference motion from which errors are measured."""
 
 import warnings
 from collections.abc import Mapping
@@ -24,15 +24,14 @@ from symfric.scenes import Scene
 
 Array = NDArray[np.float64]
 
-
 OVERLOAD = "drier bristles creep too slowly for their v_eps or for the rounding of velocities"
-"""Reason for runs whose friction passes its level."""
+"""Reason for runs whose friction exceeds its static level."""
 FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError)
-"""Errors that a law, or a function of the user that makes a machine of it, may raise."""
+"""Errors of a law, or of a function of the user that puts it into a machine."""
 
 
 def quiet_run(machine: Machine, model: Model, law: Law, rtol: float, most: int) -> Sample:
-    """One run of `model` without warnings; `most` attempts are allowed.
+    """Return one run of `model` without warnings, with at most `most` attempts of a step.
 
     Raises:
         SolveError: it failed.
@@ -52,10 +51,10 @@ class Candidate:
     """Law in a machine, with numbers that describe the wanted friction, and its smoothing.
 
     Attributes:
-        machine: where it is.
-        law: with its numbers.
-        knobs: place -> what may be scaled of the law there; "" for a function law -> model.
-        scene: that holds the laws; None for a function law -> model.
+        machine: the machine.
+        law: the law with its numbers.
+        knobs: contact -> smoothing of the law there; "" for a function law -> model.
+        scene: scene that holds the laws; None for a function law -> model.
     """
 
     machine: Machine
@@ -65,11 +64,11 @@ class Candidate:
 
     @property
     def power(self) -> float:
-        """Least power of the smoothing that its velocities have; 0 where nothing is smooth."""
+        """Smallest power of the smoothing of its velocities; 0 if nothing is scaled."""
         return min((k.velocities for k in self.knobs.values() if k.powers), default=0.0)
 
     def law_at(self, s: float) -> Law:
-        """Return the law at the smoothing `s`; of several places the first."""
+        """Return the law at the smoothing `s`, with several contacts that of the first."""
         return next(iter(self.knobs.values())).at(s)
 
     def model(self, s: float) -> Model:
@@ -84,12 +83,12 @@ class Candidate:
         return replace(self.scene, **laws).model()
 
     def run(self, model: Model, rtol: float, most: int) -> Sample:
-        """One run of the law in `model`, the machine at some smoothing; see `quiet_run`."""
+        """Return one run of the law in `model`, the machine at some smoothing; see `quiet_run`."""
         return quiet_run(self.machine, model, self.law, rtol, most)
 
     @cached_property
     def first(self) -> Model:
-        """Machine with the law as it comes."""
+        """Machine with the unscaled law."""
         return self.model(1.0)
 
 
@@ -100,22 +99,24 @@ def candidate(
     """Return `law` in `machine`.
 
     Args:
-        frictions: that it is to describe, by the place in the machine; "" for any other place.
-        load: normal force [N] where it is one number.
-        own: it has its numbers already: they were fitted, nothing is to be scaled.
-        bristles: the power of the velocities of a law with states, see `smoothing`.
+        frictions: contact -> friction to describe; "" for any other contact.
+        load: normal force [N] if it is one number.
+        own: True if the law keeps its numbers, because they were fitted, and is not scaled.
+        bristles: power of the velocities of a law with states, see `smoothing`.
 
     Raises:
         ValueError: the machine refuses the law, or no numbers of the law describe the friction.
     """
     same = law if own else alike(law, frictions[""], load)
     made = machine.make(same)
-    scene = made if isinstance(made, Scene) else None
-    held = {"": same} if scene is None else holders(machine, scene, type(same))
-    if not held:
+    scene, laws = None, {"": same}
+    if isinstance(made, Scene):
+        scene, names = made, machine.places or [item.name for item in fields(made)]
+        laws = {n: getattr(made, n) for n in names if isinstance(getattr(made, n), type(same))}
+    if not laws:
         raise ValueError(f"{machine.name} does not hold it")
     knobs: dict[str, Smoothing] = {}
-    for place, there in held.items():
+    for place, there in laws.items():
         friction = frictions.get(place, frictions[""])
         if own:
             knobs[place] = Smoothing(there, {}, friction.mu_s, load)
@@ -124,57 +125,50 @@ def candidate(
     return Candidate(machine, same, knobs, scene)
 
 
-def holders(machine: Machine, scene: Scene, kind: type[Law]) -> dict[str, Law]:
-    """Place -> law of the scene, where the candidate is."""
-    names = machine.places or [item.name for item in fields(scene)]
-    return {n: getattr(scene, n) for n in names if isinstance(getattr(scene, n), kind)}
-
-
 def frictions_of(machine: Machine, given: Friction | None, scene: object) -> dict[str, Friction]:
-    """Place -> friction there, "" for any: as given, else that of the scene as it comes."""
+    """Return contact -> friction, "" for any: `given`, else that of the laws of the scene."""
     if given is not None:
         return {"": given}
     if isinstance(scene, Scene):
         return {"": friction_of(scene.law)}
-    start = Friction()
-    made: object = start
-    for probe in (start.exact, BrownMcPhee()):
+    made: object = None
+    for probe in (Friction().exact, BrownMcPhee()):
         with suppress(*FAILURES):
             made = machine.make(probe)
             break
     if machine.places is not None or not isinstance(made, Scene):
-        return {"": start}
-    held = {f.name: getattr(made, f.name) for f in fields(made)}
-    found = {name: friction_of(law) for name, law in held.items() if isinstance(law, Law)}
-    return {"": found["law"]} | found
+        return {"": Friction()}
+    laws = {f.name: getattr(made, f.name) for f in fields(made)}
+    frictions = {name: friction_of(law) for name, law in laws.items() if isinstance(law, Law)}
+    return {"": frictions["law"]} | frictions
 
 
 def load_of(model: Model) -> float | None:
-    """Return the normal force [N] of all contacts where it is one number; else None."""
+    """Return the normal force [N] of all contacts if it is one number, else None."""
     loads = [contact.N for contact in model.contacts]
-    if not loads or not all(is_number(N) and np.isfinite(float(N)) for N in loads):
+    if not all(is_number(N) and np.isfinite(float(N)) for N in loads):
         return None
-    found = {float(N) for N in loads}  # pyright: ignore[reportArgumentType]
-    return found.pop() if len(found) == 1 else None
+    values = {float(N) for N in loads}  # pyright: ignore[reportArgumentType]
+    return values.pop() if len(values) == 1 else None
 
 
 FINE = 1e-10
 """Relative tolerance of references."""
 ATTEMPTS = 400_000
 RATIO, SHARPEST = 4.0, 12
-"""Widths of the sharpest law fall by this factor, so many times at most."""
+"""Ratio of successive widths of the sharpest law, and their largest number."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Motion that errors are measured from.
+    """Motion from which errors are measured.
 
     Attributes:
-        about: what it is.
-        motion, size: rows of numbers, and what their errors are relative to.
-        uncertain: how far it may be from dry friction itself; 0 of data.
-        mean: errors are root mean squares: of data, which hold noise.
+        about: its description.
+        motion, size: rows of numbers, and the sizes to which errors are relative.
+        uncertain: its distance from dry friction; 0 for data.
+        mean: True if errors are root mean squares, for data with noise.
     """
 
     about: str
@@ -184,22 +178,18 @@ class Reference:
     mean: bool = False
 
     def off(self, motion: Array) -> float:
-        """Error of a motion; infinite where it does not compare."""
+        """Return the error of a motion; infinite for one of another shape."""
         return apart(motion, self.motion, self.size, self.mean)
 
 
 OWN = Reference("its own fine run", np.zeros((0, 0)), np.zeros(0), 0.0)
-"""Stands for the fine run of each law itself: only the integrator is judged."""
+"""Stands for the fine run of each law itself, which judges the integrator only."""
 
 
 def reference_of(
-    where: str,
-    machine: Machine,
-    given: object,
-    frictions: Mapping[str, Friction],
-    load: float | None,
-    accuracy: float,
-) -> tuple[Reference, Machine]:
+    where: str, machine: Machine, given: object, frictions: Mapping[str, Friction],
+    load: float | None, accuracy: float,
+) -> tuple[Reference, Machine]:  # fmt: skip
     """Return the reference, and the machine compared at its times.
 
     Raises:
@@ -207,73 +197,58 @@ def reference_of(
         SolveError: no law comes near dry friction in this machine.
     """
     if isinstance(given, Trajectory):
-        names = (
-            machine.of
-            if machine.of and not callable(machine.of)
-            else positions(given.model, BrownMcPhee())
-        )
+        signals = machine.of if machine.of and not callable(machine.of) else None
+        names = tuple(signals or positions(given.model, BrownMcPhee()))
         rows = np.array([given[name] for name in names])
-        own = replace(machine, of=tuple(names), times=given.t, t_end=float(given.t[-1]))
-        return Reference("the run that was given", rows, _size(rows), 0.0), own
+        return _known("the run that was given", machine, names, given.t, rows, mean=False)
     if isinstance(given, Mapping):
-        return _of_data(where, machine, checks.named(where, given))
+        data = checks.named(where, given)
+        times = checks.times(f"{where}: t", data.pop("t", None), 0.0)
+        if not data:
+            raise ValueError(f"{where}: expected t and at least one signal, got t alone")
+        rows = np.array([checks.array(f"{where}: {name}", data[name]) for name in data])
+        if rows.shape[1] != times.size:
+            raise ValueError(
+                f"{where}: expected a value for each of {times.size} times, got {rows.shape[1]}"
+            )
+        return _known("the data", machine, tuple(data), times, rows, mean=True)
     if isinstance(given, Law):
-        return _of_law(machine, given), machine
+        run = quiet_run(machine, machine.model(given), given, FINE, ATTEMPTS)
+        return Reference(type(given).__name__, run.motion, run.size, FINE), machine
     checks.choice(where, given, ("exact", "sharpest"))
     if given == "exact":
-        try:
+        with suppress(*FAILURES):  # a machine without the applied force, or without events
             return _exact(machine, frictions, load), machine
-        except FAILURES:
-            pass  # a machine without the applied force, or without events: the sharpest law then
     return _sharpest(machine, frictions, load, accuracy), machine
 
 
-def _size(rows: Array) -> Array:
+def _known(
+    about: str, machine: Machine, names: tuple[str, ...], times: Array, rows: Array, mean: bool
+) -> tuple[Reference, Machine]:
+    """Return signals over times as the reference."""
     moved = np.ptp(rows, axis=1)
-    return np.where(moved > 0, moved, 1.0)
-
-
-def _of_data(where: str, machine: Machine, given: Mapping[str, Any]) -> tuple[Reference, Machine]:
-    times = checks.times(f"{where}: t", given.get("t"), 0.0)
-    names = tuple(name for name in given if name != "t")
-    if not names:
-        raise ValueError(f"{where}: expected t and at least one signal, got t alone")
-    rows = np.array([checks.array(f"{where}: {name}", given[name]) for name in names])
-    if rows.shape[1] != times.size:
-        raise ValueError(
-            f"{where}: expected a value for each of {times.size} times, got {rows.shape[1]}"
-        )
-    own = replace(machine, of=names, times=times, t_end=float(times[-1]))
-    return Reference("the data", rows, _size(rows), 0.0, mean=True), own
-
-
-def _of_law(machine: Machine, law: Law) -> Reference:
-    run = quiet_run(machine, machine.model(law), law, FINE, ATTEMPTS)
-    return Reference(type(law).__name__, run.motion, run.size, FINE)
+    size = np.where(moved > 0, moved, 1.0)
+    compared = replace(machine, of=names, times=times, t_end=float(times[-1]))
+    return Reference(about, rows, size, 0.0, mean), compared
 
 
 def _exact(machine: Machine, frictions: Mapping[str, Friction], load: float | None) -> Reference:
     held = candidate(machine, frictions[""].exact, frictions, load, own=False)
     fine, coarse = (held.run(held.first, rtol, ATTEMPTS) for rtol in (FINE, 10 * FINE))
-    uncertain = apart(coarse.motion, fine.motion, fine.size)
-    return Reference(
-        "exact dry friction (ExactCoulomb)", fine.motion, fine.size, max(uncertain, FINE)
-    )
+    uncertain = max(apart(coarse.motion, fine.motion, fine.size), FINE)
+    return Reference("exact dry friction (ExactCoulomb)", fine.motion, fine.size, uncertain)
 
 
 def _sharpest(
     machine: Machine, frictions: Mapping[str, Friction], load: float | None, accuracy: float
 ) -> Reference:
-    """Return the limit of a smooth law, as far as its runs follow each other in a power of the
-    width.
-    """
+    """Return the limit of a smooth law, estimated from the power of the width that runs follow."""
     law = BrownMcPhee() if frictions[""].v_s is None else Stribeck()
     held, runs, gaps = candidate(machine, law, frictions, load, own=False), [], list[float]()
     uncertain = inf
     for k in range(SHARPEST):
-        s = RATIO**-k
         try:
-            runs.append(held.run(held.model(s), max(1e-10, 1e-4 * accuracy), ATTEMPTS))
+            runs.append(held.run(held.model(RATIO**-k), max(1e-10, 1e-4 * accuracy), ATTEMPTS))
         except SolveError:
             if not runs:
                 raise

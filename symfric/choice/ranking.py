@@ -1,10 +1,13 @@
-"""Measurements of laws, and their ranks."""
+"""Measurements of laws, their ranks, and both as text: recommendations and a table."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, nan
+from textwrap import wrap
 from typing import Any, final
 
+from symfric.choice.nature import EVENT
 from symfric.foundation.checks import check_names
 
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
@@ -14,63 +17,64 @@ RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
 that are not decided; lacks a needed phenomenon; cannot run on the machine; its run fails."""
 ORDER = (RANKED, INACCURATE, LACKING, FAILED, REFUSED)
 ALIKE = 1.1
-"""Work within this ratio is the same: attempts differ by so much with a digit of a tolerance."""
+"""Ratio of work up to which laws share a rank: a digit of a tolerance changes it by as much."""
+FASTER = 1.25
+"""Ratio of times above which the verdict mentions that the clock contradicts the work."""
 
 
 @final
 @dataclass(frozen=True)
 class Row:
-    """One law.
+    """Measurements of one law.
 
     Attributes:
         law: its name.
-        form: the form that it has in place of the one that it comes in, such as "event"; "" for
-            that one.
-        standing: one of `ORDER`; `reason` says why it is not the first of these.
-        rank: place among all that run, 1 for the best; the same for ties; 0 for one that does not.
+        form: form of the law if it is not the default one, such as "event".
+        standing: one of `ORDER`; `reason` explains any but the first.
+        rank: rank among all laws that run, from 1; the same for ties; 0 for a law without a run.
         phenomena: codes of `symfric.laws.PHENOMENA`.
         error: largest difference from the reference relative to the motion; NaN without a run.
-        own_error: that from the finest run of the law itself: the integrator's part.
-        smoothing: factor of widths and bristles of the law that was timed.
-        values: what to give the law: all parameters that it does not come with, of several places
-            that rub those of the first.
+        own_error: the same from the finest run of the law itself: the error of the integrator.
+        smoothing: factor of widths and bristles of the measured law.
+        values: parameters that differ from the defaults of the law; with several contacts those of
+            the first.
         rtol, method, attempts, instructions: of the run at equal error: relative tolerance, method,
-            attempts of a step, CasADi instructions of one (`continuation.counted`). Equal are
-            errors from the reference where the law is ranked, and its own where it is not.
+            attempts of a step, CasADi instructions of one (`continuation.counted`). For ranked laws
+            the equal error is that from the reference, for others their own.
         time_s: processor time of that run [s] in CasADi's virtual machine, the shortest of several.
-        fixed_step: largest step [s] at which the plant in fixed steps of backward Euler stays
-            within `control` of the motion; `fixed_why` says what is known where there is none.
-        explicit_step: likewise of an explicit Runge-Kutta method of order 5.
+        fixed_step: largest fixed step [s] of backward Euler with which the plant stays within
+            `control` of the motion; `fixed_why` explains a missing one.
+        explicit_step, explicit_why: the same for an explicit Runge-Kutta method of order 5.
         steepness: largest slope of the force over velocity of the law at equal error, relative to
-            its level [s/m]: the slope that an optimiser meets; NaN where the force jumps.
-        smoothness: class in the velocity, with the widths that it has.
-        parameters, hard: how many parameters have a physical meaning, and which of these need more
-            than a pull and steady sliding.
-        c_operations: of the law's step in C, all parameters constants, single precision;
-            `c_why` where there is none.
-        core: instructions of that step on a Cortex-M4F, in the mean over a day of a drive; NaN, and
-            `core_why`, where it was not measured.
-        spent: its runs used up all that they may cost.
-        states: how many internal ones.
-        curve: (error, work) of the runs on the way, softest first.
+            its level [s/m]; NaN if the force jumps.
+        smoothness: class in the velocity, with the present widths.
+        parameters, hard: number of physical parameters, and names of those that need more than a
+            pull test and steady sliding.
+        c_operations: operations of the law's step in C, all parameters constants, single precision;
+            `c_why` explains a missing number.
+        core: instructions of that step on a Cortex-M4F, averaged over a typical drive; NaN, with
+            `core_why`, if they were not measured.
+        spent: True if its runs used up their budget.
+        states: number of internal states.
+        curve: (error, work) of the runs of the continuation, softest first.
     """
 
     law: str
     standing: str
     reason: str = ""
     phenomena: tuple[str, ...] = ()
-    error: float = float("nan")
+    error: float = nan
     values: dict[str, float] | None = None
-    rtol: float = float("nan")
+    rtol: float = nan
     method: str = ""
     attempts: int = 0
     instructions: int = 0
-    time_s: float = float("nan")
+    time_s: float = nan
     fixed_step: float | None = None
     fixed_why: str = ""
     explicit_step: float | None = None
     explicit_why: str = ""
-    steepness: float = float("nan")
+    steepness: float = nan
     smoothness: str = ""
     parameters: int = 0
     hard: tuple[str, ...] = ()
@@ -80,84 +84,69 @@ class Row:
     curve: tuple[tuple[float, float], ...] = ()
     form: str = ""
     rank: int = 0
-    own_error: float = float("nan")
-    smoothing: float = float("nan")
-    core: float = float("nan")
+    own_error: float = nan
+    smoothing: float = nan
+    core: float = nan
     core_why: str = ""
     spent: bool = False
 
     @property
     def ranked(self) -> bool:
-        """True if the law shows what is needed and keeps the accuracy."""
+        """True if the law shows the needed phenomena and keeps the accuracy."""
         return self.standing == RANKED
 
     @property
     def called(self) -> str:
-        """Law with its form."""
+        """Name of the law with its form."""
         return f"{self.law} (form = {self.form})" if self.form else self.law
 
     @property
     def work(self) -> int:
-        """Instructions of the whole run: what its time is made of, on any machine."""
+        """Instructions of the whole run, which determine its time on any machine."""
         return self.attempts * self.instructions
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data; numbers that are none are null."""
-        found = asdict(self) | {"work": self.work, "curve": [list(pair) for pair in self.curve]}
-        return {
-            n: None if isinstance(v, float) and not isfinite(v) else v for n, v in found.items()
-        }
+        """Return plain data; NaN and infinity are None."""
+        data = asdict(self) | {"work": self.work, "curve": [list(pair) for pair in self.curve]}
+        return {n: None if isinstance(v, float) and not isfinite(v) else v for n, v in data.items()}
 
 
 def ordered(rows: Iterable[Row]) -> list[Row]:
-    """Return the best first, with their ranks: by work what does all that is asked, others by their
-    error.
+    """Return the rows with their ranks, the best first: ranked laws by work, others by error.
 
-    Nothing that a clock says decides: the same rows come in the same order on every run.
+    No measured time enters: the same rows come in the same order in every run.
     """
-    found = list[Row]()
+    result = list[Row]()
     head, rank = None, 0
     for row in sorted(rows, key=place):
-        if not row.attempts:
-            found.append(replace(row, rank=0))
-            continue
-        if head is None or not _tied(head, row):
-            head, rank = row, len(found) + 1
-        found.append(replace(row, rank=rank))
-    return found
-
-
-def best_of(rows: Sequence[Row]) -> Row:
-    """Return the first of them, were they ordered."""
-    return min(rows, key=place)
+        alike = head is not None and place(head)[:2] == place(row)[:2]
+        if row.attempts and not (head and alike and row.work <= ALIKE * head.work):
+            head, rank = row, len(result) + 1
+        result.append(replace(row, rank=rank if row.attempts else 0))
+    return result
 
 
 def place(row: Row) -> tuple[int, float, float, str]:
-    """Key by which rows are ordered: errors to a digit, work to the last."""
+    """Return the key by which rows are sorted: errors to one digit, work to the last."""
     error = float(f"{row.error:.0e}") if isfinite(row.error) else inf
     return ORDER.index(row.standing), 0.0 if row.ranked else error, row.work or inf, row.law
 
 
-def _tied(head: Row, row: Row) -> bool:
-    """Test for a `row` as good as the first of its rank."""
-    return place(head)[:2] == place(row)[:2] and row.work <= ALIKE * head.work
-
-
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Laws on a machine, the best first, and what was asked of them.
+    """Laws on a machine, the best first, and the requirements.
 
     Attributes:
         machine: its name.
-        needs: what the law has to show, words of `NEEDS`.
+        needs: needed phenomena, words of `NEEDS`.
         accuracy: largest error relative to the motion.
-        friction: that all laws describe.
-        reference, uncertain: what errors are measured from, and how far that may be off itself.
+        friction: the friction that all laws describe.
+        reference, uncertain: the motion from which errors are measured, and its own uncertainty.
         control: largest error of fixed steps.
         t_end: length of the motion [s].
         rows: one for each candidate.
-        wall_s: how long it took [s].
-        unmeasured: laws without a row, because it was interrupted.
+        wall_s: duration of the measurements [s].
+        unmeasured: laws without a row because of an interrupt.
     """
 
     machine: str
@@ -174,9 +163,9 @@ class Ranking:
 
     def __getitem__(self, law: str) -> Row:
         """Return the row of a law."""
-        found = {row.law: row for row in self.rows}
-        check_names("choice", [law], found)
-        return found[law]
+        rows = {row.law: row for row in self.rows}
+        check_names("choice", [law], rows)
+        return rows[law]
 
     def __iter__(self) -> Iterator[Row]:
         return iter(self.rows)
@@ -188,21 +177,201 @@ class Ranking:
 
     @property
     def placed(self) -> tuple[Row, ...]:
-        """Rows of all laws that run here, by their rank."""
+        """Rows of all laws that run, by rank."""
         return tuple(row for row in self.rows if row.rank)
 
     @property
     def ranked(self) -> tuple[Row, ...]:
-        """Rows of laws that show what is needed and keep the accuracy, least work first."""
+        """Rows of laws that show the needed phenomena and keep the accuracy, least work first."""
         return tuple(row for row in self.rows if row.ranked)
 
     @property
     def best(self) -> Row | None:
-        """First of them; None where there is none."""
+        """First ranked law, None without any."""
         return next(iter(self.ranked), None)
 
     @property
     def title(self) -> str:
-        """Question in a line."""
-        asked = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
-        return f"{self.machine}: {asked}, {self.accuracy:g} off at most"
+        """Machine and requirements in a line."""
+        laws = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
+        return f"{self.machine}: {laws}, {self.accuracy:g} off at most"
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Recommended laws and reasons, for simulation, optimal control and a controller."""
+        return verdict(self.rows, self.needs, self.accuracy, self.control)
+
+
+def verdict(
+    rows: Sequence[Row], needs: Sequence[str], accuracy: float, control: float
+) -> tuple[str, ...]:
+    """Return sentences on simulation, optimal control, a controller, and the laws left out."""
+    if not rows:
+        return ("Nothing was measured.",)
+    ranked = [row for row in rows if row.ranked]
+    shown = " and ".join(needs) or "friction"
+    if ranked:
+        sentences = [_simulation(ranked, shown), _smooth(ranked), _controller(ranked, control)]
+    else:
+        near = [row for row in rows if row.standing == INACCURATE]
+        best = min(near, key=lambda row: row.error, default=None)
+        nearest = f"; {best.called} comes nearest, {best.reason}" if best else ""
+        sentences = [f"No law shows {shown} and keeps {accuracy:g}{nearest}."]
+    reasons = {
+        LACKING: "for what they show",
+        INACCURATE: "that do not keep the accuracy",
+        FAILED: "whose run fails",
+        REFUSED: "that do not fit into this machine",
+    }
+    counts = {text: sum(row.standing == name for row in rows) for name, text in reasons.items()}
+    out = _listed([f"{count} {text}" for text, count in counts.items() if count])
+    return *sentences, f"Left out of {len(rows)}: {out}." if out else "None is left out."
+
+
+def _simulation(ranked: Sequence[Row], shown: str) -> str:
+    """Recommend the law of the least work; name ties, and a law that is faster by the clock."""
+    best = ranked[0]
+    text = (
+        f"Simulation: take {best.called}, the least work of {len(ranked)} that show {shown} and "
+        f"keep the accuracy: {1e3 * best.time_s:.3g} ms in {best.attempts} attempts by "
+        f"{best.method}, {best.error:.1e} off"
+    )
+    ties = [row.called for row in ranked[1:] if row.rank == best.rank]
+    if ties:
+        text += f"; {_listed(ties)} {'are' if len(ties) > 1 else 'is'} as good"
+    elif len(ranked) > 1:
+        text += f"; {ranked[1].called} takes {ranked[1].work / best.work:.2g} times the work"
+    fastest = min(ranked, key=lambda row: row.time_s)
+    if fastest.rank != best.rank and FASTER * fastest.time_s < best.time_s:
+        text += f". By the clock {fastest.called} is faster, {1e3 * fastest.time_s:.3g} ms"
+    return f"{text}."
+
+
+def _smooth(ranked: Sequence[Row]) -> str:
+    """Recommend the least steep law with second derivatives, else one with bristles."""
+    smooth = [row for row in ranked if row.smoothness in ("C2", "C∞")]
+    if not smooth:
+        first = ranked[0]
+        kind = "switches by events" if first.form == EVENT else f"is {first.smoothness}"
+        return f"Optimal control: none of them has second derivatives; {first.called} {kind}."
+    steep = [row for row in smooth if isfinite(row.steepness)]
+    take = min(steep, key=lambda row: row.steepness, default=smooth[0])
+    text = f"Optimal control: take {take.called} ({take.smoothness})"
+    if not steep:
+        return f"{text}, with {take.states} state{'s' if take.states != 1 else ''}."
+    return (
+        f"{text}: of those with second derivatives its force is the least steep, "
+        f"{take.steepness:.2g} of its level per m/s."
+    )
+
+
+def _controller(ranked: Sequence[Row], control: float) -> str:
+    """Recommend the law with the least operations per second of motion in fixed steps."""
+    if not any(row.fixed_step or row.fixed_why for row in ranked):
+        return "Controller: fixed steps were not measured."
+    able = [row for row in ranked if row.fixed_step is not None and row.c_operations is not None]
+    if not able:
+        return (
+            f"Controller: none of them follows within {control:g} in fixed steps that were tried."
+        )
+    counted = all(isfinite(row.core) for row in able)
+    costs = {row.law: row.core if counted else float(row.c_operations or 0) for row in able}
+    take = min(able, key=lambda row: costs[row.law] / (row.fixed_step or 1.0))
+    unit = "instructions on a Cortex-M4F" if counted else "operations"
+    return (
+        f"Controller: take {take.called}: its C takes {costs[take.law]:.0f} {unit}, and with "
+        f"it the plant stays within {control:g} in steps of {take.fixed_step:g} s (backward "
+        "Euler): the least for a second of motion."
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
+WIDTH = 80
+HEAD = (
+    f"{'':>4}{'law':<19}{'work':>6}{'ms':>6}{'error':>7}{'own':>6}{'h':>6}{'M4F':>5}"
+    f"{'par':>6} {'class':<5} shows"
+)
+LEGEND = (
+    "The first column is the rank; laws with = are alike. work: millions of instructions at equal "
+    "error, which ranks; ms: processor time of the same run. error: from the reference; own: the "
+    "integrator's part. h [s]: largest fixed step; M4F: instructions of the law's step on a "
+    "Cortex-M4F (C: operations, where there are no tools to count); par: parameters / hard to "
+    "measure; class: smoothness, or event: a form whose modes switch by events"
+)
+STANDING_TEXTS = {
+    RANKED: "show what is needed and keep the accuracy, by work:",
+    INACCURATE: "do not keep the accuracy, by their error, timed where their own error does:",
+    LACKING: "do not show what is needed, by their error, timed likewise:",
+}
+"""Standing -> heading of its laws; those of other standings did not run."""
+
+
+def lines(choice: Ranking, most: int | None = None) -> Iterator[str]:
+    """Yield title, reference, table, reasons and verdict; at most `most` rows, of ranked laws."""
+    yield choice.title
+    yield from wrap(
+        f"{choice.friction}; from {choice.reference}, itself known to {choice.uncertain:.0e}", WIDTH
+    )
+    yield ""
+    cores = any(isfinite(row.core) for row in choice.rows)
+    yield HEAD if cores else HEAD.replace("M4F", "  C")
+    shown = choice.rows if most is None else choice.ranked[:most]
+    ranks = [row.rank for row in choice.rows]
+    for standing, text in STANDING_TEXTS.items():
+        group = [row for row in shown if row.standing == standing and row.rank]
+        if group and most is None:
+            yield f"-- {text}"
+        for row in group:
+            yield _line(row, "=" if ranks.count(row.rank) > 1 else " ", cores)
+    if most is not None and most < len(choice.placed):
+        yield f"... and {len(choice.placed) - len(shown)} more that ran"
+    yield ""
+    if most is None:
+        reasons = defaultdict[str, list[str]](list)
+        for row in (row for row in choice.rows if not row.ranked):
+            why = row.reason.removeprefix(f"{row.law} ").removeprefix(f"{row.error:.1e} off: ")
+            reasons[f"{row.standing}, {why}"].append(row.called)
+        for reason, names in reasons.items():
+            text = f"{reason}: {', '.join(names)}"
+            yield from wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+        yield ""
+    for sentence in (*choice.verdict, *interruption(choice)):
+        yield from wrap(sentence, WIDTH)
+
+
+def interruption(choice: Ranking) -> list[str]:
+    """Return a sentence on the laws without a row if the ranking was interrupted."""
+    count, names = len(choice.unmeasured), ", ".join(choice.unmeasured)
+    text = f"Interrupted: {count} of {count + len(choice.rows)} laws were not measured: {names}."
+    return [text] if choice.interrupted else []
+
+
+def _line(row: Row, tie: str, cores: bool) -> str:
+    counts = f"{row.core:.0f}" if isfinite(row.core) else "-"
+    if not cores:
+        counts = "-" if row.c_operations is None else str(row.c_operations)
+    return (
+        f"{row.rank:>2}{tie} {row.law:<19}{number(1e-6 * row.work):>6}"
+        f"{number(1e3 * row.time_s):>6}{short(row.error):>7}{short(row.own_error):>6}"
+        f"{short(row.fixed_step):>6}{counts:>5}{f'{row.parameters}/{len(row.hard)}':>6} "
+        f"{row.smoothness:<5} {''.join(row.phenomena)}"
+    )
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a number >= 0 in five places; a dash for NaN."""
+    if not isfinite(value):
+        return "-"
+    if value >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return f"{value:.{digits}g}" if value >= 0.1 else f"{value:.2f}"
+
+
+def short(value: float | None) -> str:
+    """Return a power of ten with one digit; a dash for None and NaN."""
+    if value is None or not isfinite(value):
+        return "-"
+    return f"{value:.0e}".replace("e-0", "e-").replace("e+00", "")

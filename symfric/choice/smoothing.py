@@ -1,15 +1,17 @@
-"""Smoothing of a law: widths and bristles scaled together until it keeps a wanted error.
+"""Smoothing of a law, and its continuation towards dry friction until it keeps a wanted error.
+
+Widths and bristles of a law are scaled together by a factor s:
 
     static laws      widths and velocities s
     bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities s^p
 
-and dry friction at s = 0: bristles relax only where they creep, with the loading rate over sigma_0,
-faster than v_eps, so that no width is negligible. They break away at mu_s N but for a share of
+s -> 0 is dry friction: bristles relax only if they creep, with the loading rate over sigma_0,
+faster than v_eps, so no width is negligible. They break away at mu_s N except for a share of
 (loading rate / (sigma_0 v_s))^(2/3), and their fall behind it takes v_s^(2/3). Both vanish alike
-with p = 1/2, as s^(1/3); which is the larger one is a matter of the machine, so a smaller p is
-tried, too. The end of all this is where they creep by less than velocities are rounded.
-Limits: where a load turns bristles within their own period they swing past it and break away,
-however stiff they are, unless sigma_1 damps them: that motion is theirs, not that of dry friction.
+for p = 1/2, as s^(1/3); which is larger depends on the machine, so a smaller p is tried, too. The
+limit of all this is a creep below the rounding of velocities.
+Limits: if a load reverses within the period of bristles they overshoot and break away, however
+stiff they are, unless sigma_1 damps them: that is their motion, not that of dry friction.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,11 +32,11 @@ from symfric.laws.base.families import Sticking
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7
-"""Widths of static laws below this only round off a modulus."""
+"""Widths of static laws below this only round off an absolute value."""
 RELATIVE = ("u_eps",)
-"""Widths that are shares of another."""
+"""Widths that are shares of another width."""
 LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
-"""Velocities that say how high friction is, and no width."""
+"""Velocities that determine the level of friction, and are not widths."""
 OF_BRISTLES = 0.45, 0.5
 """Powers of the velocities of laws with states, tried in this order."""
 
@@ -45,8 +47,8 @@ class Smoothing(Regularisation):
     """Parameters that make `law` smooth, scaled together by a factor s.
 
     Attributes:
-        mu_s, load: the peak that static laws are to keep at every s, and the normal force [N].
-        velocities: the power of s for velocities; 0 where nothing is scaled.
+        mu_s, load: peak that static laws keep at every s, and the normal force [N].
+        velocities: power of s for velocities; 0 if nothing is scaled.
     """
 
     mu_s: float
@@ -54,49 +56,42 @@ class Smoothing(Regularisation):
     velocities: float = 0.0
 
     def at(self, s: float) -> Law:
-        """Return the law at the factor `s`.
+        """Return the law at the factor `s`; a width stays within its bounds, as it only rounds off.
 
         Raises:
-            ValueError: beyond a bound of the law.
+            ValueError: another parameter beyond a bound of the law.
         """
-        if not self.powers:
-            return self.law
-        known = parameters(self.law)
-        law = with_values(self.law, {n: _within(known[n], x) for n, x in self.values(s).items()})
-        return peaked(law, self.mu_s, self.load)
-
-
-def _within(p: Parameter, value: float) -> float:
-    """Return a width that is at its bound stays there: it only rounds off."""
-    return min(max(value, p.lower), p.upper) if p.role == "width" else value
+        known, values = parameters(self.law), self.values(s)
+        for name in values:
+            if (p := known[name]).role == "width":
+                values[name] = min(max(values[name], p.lower), p.upper)
+        return peaked(with_values(self.law, values), self.mu_s, self.load) if values else self.law
 
 
 def smoothing(
     law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
 ) -> Smoothing:
-    """Return the scalable parameters of `law`; none of one that rests exactly or has no widths.
+    """Return the scalable parameters of `law`; none for one that rests exactly or has no widths.
 
     Args:
-        law, friction, load: what it describes, and under which load.
-        bristles: the power of the velocities of a law with states.
+        law, friction, load: the law, the friction that it describes, and the load.
+        bristles: power of the velocities of a law with states.
     """
-    known = parameters(law)
     exact = isinstance(law, Sticking) and law.has_mode
     fixed = fall_of(law) if friction.v_s is not None else None
     of_speed = bristles if law.states else 1.0
-    powers = {} if exact else {n: _power(law, p, of_speed) for n, p in known.items() if n != fixed}
-    found = {name: power for name, power in powers.items() if power}
-    return Smoothing(law, found, friction.mu_s, load, of_speed if found else 0.0)
+    known = {n: p for n, p in parameters(law).items() if n != fixed and not exact}
+    powers = {n: power for n, p in known.items() if (power := _power(law, p, of_speed))}
+    return Smoothing(law, powers, friction.mu_s, load, of_speed if powers else 0.0)
 
 
 def _power(law: Law, p: Parameter, of_speed: float) -> float:
-    """Return the power of s for a parameter; 0 for one that makes nothing smooth."""
+    """Return the power of s for a parameter, 0 for one without smoothing."""
     value = float(p.value)  # pyright: ignore[reportArgumentType]  (numbers only)
     if p.name in RELATIVE or p.field in LEVEL_LIKE.get(type(law), ()):
         return 0.0
-    inverse = -1.0 if p.unit in ("s/m", "s/rad") else 1.0
     if p.role == "velocity scale":
-        return inverse * of_speed
+        return -of_speed if p.unit in ("s/m", "s/rad") else of_speed
     if p.role == "width":
         return 1.0 if law.states or (value > NEGLIGIBLE and p.unit != "1") else 0.0
     if not law.states or value == 0.0:
@@ -106,30 +101,30 @@ def _power(law: Law, p: Parameter, of_speed: float) -> float:
 
 
 RATIO, SHORTER = 4.0, 2.0
-"""From one smoothing of the ladder to the next; towards dry friction after a run that failed."""
+"""Ratio of successive smoothings; the shorter one towards dry friction after a failed run."""
 LEAP = 4
-"""Rungs that are left out where errors stay the same."""
+"""Number of such steps in one if errors stay the same."""
 LEAST_ORDER, SAME_ORDER, LONGEST, WITHIN = 0.2, 0.2, 3, 0.8
-"""Errors follow a power of the smoothing if it is so large, and changes by no more than this share;
-then so many levels at most are made in one, to this share of the wanted error."""
+"""Errors follow a power of the smoothing if it is at least this large and changes by at most this
+share; then at most so many steps are made in one, to this share of the wanted error."""
 NARROW = 3e-5
-"""Share of its own velocities at which a law is dry for machines that are not far slower."""
+"""Smoothing of the velocities of a law that counts as dry unless a machine is far slower."""
 ORDERS = 0.05, 4.0
-"""Orders that differences of runs may show; they tend to nothing yet if they fall otherwise."""
+"""Orders of convergence that differences of runs may show."""
 CERTAIN = 0.25
-"""Part of its error that a law may still move by, by the order of its runs, to be another one."""
+"""Largest distance from the limit, relative to the error, of runs that show another motion."""
 MOST, SOFTEST = 24, 5
-"""Rungs in all, and those on the soft side of the law as it comes."""
+"""Largest number of steps towards dry friction, and away from it."""
 MARGIN = 0.7
-"""Part of the wanted error that is left to the law; the rest is the integrator's."""
+"""Share of the wanted error for the law; the rest is for the integrator."""
 ROUNDING = 5e-3
-"""Error that falls by less than this share of it over three levels is the law's own."""
+"""An error that falls by less than this share over three levels counts as constant."""
 
 
 @final
 @dataclass(frozen=True)
 class Smoothed:
-    """Run of the ladder: factor of the widths, error, attempts, tolerance, motion over size."""
+    """Run of the continuation: factor of widths, error, attempts, tolerance, motion over size."""
 
     s: float
     error: float
@@ -144,9 +139,9 @@ class SmoothingStudy:
     """Error against smoothing.
 
     Attributes:
-        levels: softest first.
-        stopped: why it went no further towards dry friction; "" where the wanted error is kept.
-        decided: there is nothing to find out on another way there.
+        levels: runs, softest first.
+        stopped: why the continuation ended; empty if the wanted error is kept.
+        decided: True if other powers of the bristles cannot change the result.
     """
 
     levels: tuple[Smoothed, ...]
@@ -154,54 +149,52 @@ class SmoothingStudy:
     decided: bool = False
 
     def softest(self, wanted: float) -> float | None:
-        """Return the softest factor below which every run keeps the error; None where none does."""
+        """Return the softest factor below which every run keeps the error, None without any."""
         kept = len(self.levels)
         while kept and self.levels[kept - 1].error <= wanted:
             kept -= 1
         if kept == len(self.levels):
             return None
         good = self.levels[kept]
-        if kept == 0 or not good.error > 0.0:
+        if kept == 0 or not good.error > 0.0 or not self.levels[kept - 1].error < inf:
             return good.s
         bad = self.levels[kept - 1]
-        if not bad.error < inf:
-            return good.s
         order = log(bad.error / good.error) / log(bad.s / good.s)
         return min(good.s * (wanted / good.error) ** (1 / order), 0.999 * bad.s)
 
 
 FIXED = "nothing of it is scaled"
 Run = Callable[[float], Smoothed]
-"""s -> the run; raises what a run raises, see `ladder`."""
+"""s -> run; raises one of the `failures` of `study`."""
 
 
-def ladder(
+def study(
     run: Run,
     wanted: float,
     softest: float,
     powers: float,
     failures: tuple[type[Exception], ...],
-    said: Callable[[Exception], str] = str,
+    reason: Callable[[Exception], str] = str,
 ) -> SmoothingStudy:
-    """Runs towards dry friction until two keep the error `wanted`, and away from it to `softest`.
+    """Run towards dry friction until two runs keep the error `wanted`, then away to `softest`.
 
-    A law tends to another motion where its own runs converge, and their limit is off. That is said
-    of runs at `NARROW` and below alone: a law whose widths are far from the speeds of a machine
+    A law tends to another motion if its runs converge to a limit that is off. That is concluded
+    from runs at `NARROW` and below only: a law whose widths are far from the speeds of a machine
     converges to something else first.
 
     Args:
         run: one run.
-        wanted, softest: errors of the driest and of the softest law that are of interest.
-        powers: the least power of s that its velocities have; 0 where nothing is scaled.
-        failures: what a run may raise, which ends the ladder on its side.
-        said: such a failure in words.
+        wanted, softest: largest errors of the driest and of the softest law of interest.
+        powers: smallest power of s of its velocities; 0 if nothing is scaled.
+        failures: exceptions of a run, which end the continuation on its side.
+        reason: such an exception -> text.
 
     Raises:
-        one of `failures`: the law as it comes, s = 1, does not run.
+        one of `failures`: the unscaled law, s = 1, does not run.
     """
     levels, stopped, decided = [run(1.0)], "" if powers else FIXED, not powers
     ratio, leap = RATIO, RATIO**LEAP
-    while not stopped and not _kept(levels, wanted):
+    while not stopped and not (len(levels) > 1 and max(x.error for x in levels[-2:]) <= wanted):
         settled = _settled(levels)
         step = ratio if ratio < RATIO else leap if settled else _stride(levels, wanted)
         order = limit_order(levels) if levels[-1].s ** powers <= NARROW else None
@@ -212,7 +205,7 @@ def ladder(
         try:
             levels += [] if stopped else [run(levels[-1].s / step)]
         except failures as problem:
-            stopped = said(problem) if ratio < RATIO else ""
+            stopped = reason(problem) if ratio < RATIO else ""
             ratio, leap = (SHORTER, SHORTER) if leap == RATIO else (RATIO, RATIO)
     with suppress(*failures):  # softer than the law allows
         while powers and levels[0].error <= softest and levels[0].s < RATIO**SOFTEST:
@@ -221,11 +214,10 @@ def ladder(
 
 
 def limit_order(levels: Sequence[Smoothed]) -> float | None:
-    """Return the order in s with which motions tend to one that is off; None where that is not
-    shown.
+    """Return the order in s of the convergence to a motion that is off; None if it is not shown.
 
-    Three runs show the order q of x_0 + c s^q, whose c s_2^q the limit still is from the last one,
-    if they are leaps apart: at an extremum of their error neighbours are alike, too.
+    Three runs show the order q of x_0 + c s^q, whose limit is c s_2^q from the last one, if they
+    are leaps apart: at an extremum of their error neighbours are similar, too.
 
         |x_0 - x_1| / |x_1 - x_2| = (s_0^q - s_1^q) / (s_1^q - s_2^q)
     """
@@ -248,18 +240,13 @@ def limit_order(levels: Sequence[Smoothed]) -> float | None:
 
 
 def _apart(one: Smoothed, other: Smoothed) -> float:
-    """Largest difference of two motions relative to their size; infinite where unknown."""
+    """Return the largest difference of two motions relative to their size, inf if unknown."""
     a, b = one.motion, other.motion
     return inf if a is None or b is None or a.shape != b.shape else float(np.abs(a - b).max())
 
 
-def _kept(levels: list[Smoothed], wanted: float) -> bool:
-    """Test for two runs in a row that keep the error."""
-    return len(levels) > 1 and max(level.error for level in levels[-2:]) <= wanted
-
-
 def _stride(levels: list[Smoothed], wanted: float) -> float:
-    """Ratio to the next run: to where errors that follow a power are at `wanted`."""
+    """Return the ratio to the next run, at which errors that follow a power are `wanted`."""
     if len(levels) < 3 or not all(0.0 < level.error < inf for level in levels[-3:]):
         return RATIO
     e = [log(level.error) for level in levels[-3:]]
@@ -271,6 +258,6 @@ def _stride(levels: list[Smoothed], wanted: float) -> float:
 
 
 def _settled(levels: list[Smoothed]) -> bool:
-    """Test for four last errors that are the same, or grow."""
+    """Return True if the last four errors are the same, or grow."""
     last = [level.error for level in levels[-4:]]
     return len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]

@@ -1,21 +1,25 @@
 """Command line application: its commands, and conversion of errors to exit statuses.
 
-Typer's messages about invalid command lines name neither the value nor a remedy ("Input should be a
-valid number, unable to parse string as a number"). The classes of its errors tell them apart, but
-are not exported.
+The options of a command are the parameters of its function; `options.toml` has their forms and
+meanings. Typer parses the line, without its conversions and messages. Its conversions load
+pydantic, which takes longer than a simulation. Its messages name neither the value nor a remedy;
+the classes of its errors tell them apart, but are not exported.
 """
 
 import os
 import sys
+import tomllib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from errno import ENOSPC
+from functools import cache, partial, wraps
 from importlib import import_module
-from inspect import cleandoc
+from inspect import Parameter, Signature, cleandoc, signature
 from io import TextIOWrapper
-from re import search
+from pathlib import Path
+from re import search, sub
 from types import TracebackType
-from typing import Annotated, Any, cast, get_type_hints
+from typing import Annotated, Any, cast, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -43,7 +47,6 @@ MODULES = dict.fromkeys(("bench", "gallery", "stress"), "campaigns") | {"report"
 """Commands that are defined in a module of another name."""
 
 SETTINGS: dict[str, Any] = {
-    "add_completion": False,
     "pretty_exceptions_enable": False,
     "rich_markup_mode": None,  # units in brackets are not markup
     "context_settings": {"help_option_names": ["-h", "--help"]},
@@ -54,31 +57,65 @@ WIDTH = 78
 """Largest width of an example [columns]."""
 
 
-TEXTS = (str, str | None, list[str], list[str] | None)
-"""Types of parameters that need no conversion from text."""
+@cache
+def forms() -> dict[str, dict[str, list[str]]]:
+    """Return form, meaning and completion of each parameter of each command."""
+    return tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
 
 
-def convert_as_needed(parameter: Any, is_text: bool) -> Any:
-    """Let a parameter accept texts, its default and an absent value without conversion.
+def declared(function: Callable[..., None]) -> Callable[..., None]:
+    """Return the function of a command with the options that Typer needs, which accept texts."""
+    own, command = forms().get(function.__name__, {}), function.__name__.replace("_", "-")
+    module, hints = vars(sys.modules[function.__module__]), get_type_hints(function)
+    completions = vars(import_module("symfric.cli.completions"))
+    parameters, where = list[Parameter](), dict[str, str]()
+    for p in signature(function).parameters.values():
+        form, meaning, *completion = own.get(p.name) or forms()["all"][p.name]
+        flags = [word for word in form.split() if word.startswith("--")]
+        several = list in (get_origin(hints[p.name]), *map(get_origin, get_args(hints[p.name])))
+        where[p.name] = f"{command}: {flags[0] if flags else form}"
+        default: Any = (typer.Option if flags else typer.Argument)(
+            ... if p.default is p.empty else p.default,
+            *flags,
+            metavar=form.removeprefix(" ".join(flags)).strip() or None,
+            help=sub(
+                r"\{(\w+)\}", lambda name: ", ".join(module[name[1]]), " ".join(meaning.split())
+            ),
+            autocompletion=completions[completion[0]] if completion else None,
+        )
+        kind = list[str] if several else bool if hints[p.name] is bool else str
+        parameters.append(p.replace(default=default, annotation=kind))
 
-    The conversion of Typer loads pydantic, which takes longer than a simulation.
-    """
-    if "process_value" in vars(parameter):
-        return parameter
-    convert = parameter.process_value
-    several = parameter.nargs == -1 or getattr(parameter, "multiple", False)
+    @wraps(function)
+    def call(**texts: Any) -> None:
+        function(**{name: converted(where[name], hints[name], t) for name, t in texts.items()})
 
-    def process_value(ctx: Any, value: Any) -> Any:
-        if parameter.required and not value:
-            return convert(ctx, value)
-        if value is None:
-            return () if several else None
-        if is_text:
-            return list(value) if several else value
-        return value if value is parameter.default else convert(ctx, value)
+    call.__annotations__ = {p.name: p.annotation for p in parameters}
+    vars(call)["__signature__"] = Signature(parameters)
+    return call
 
-    parameter.process_value = process_value
-    return parameter
+
+def converted(where: str, hint: Any, value: Any) -> Any:
+    """Return a text of the command line as a value of the type `hint`."""
+    kind = next((k for k in (int, float, Path) if k in (hint, *get_args(hint))), str)
+    try:
+        return kind(value) if isinstance(value, str) else value
+    except ValueError:
+        what = "a whole number" if kind is int else "a number"
+        raise ValueError(f"{where}: expected {what}, got '{value}'") from None
+
+
+def unconverted(command: Any) -> Any:
+    """Return a command of Typer whose parameters pass their values on without conversion."""
+    for parameter in command.params:
+        parameter.process_value = partial(_processed, parameter, parameter.process_value)
+    return command
+
+
+def _processed(parameter: Any, process: Callable[..., Any], context: Any, value: Any) -> Any:
+    """Return a value as it is; Typer refuses missing values and calls functions of options."""
+    needed = bool(value) if parameter.callback else parameter.required and not value
+    return process(context, value) if needed else value
 
 
 class Commands(TyperGroup):
@@ -89,10 +126,6 @@ class Commands(TyperGroup):
         known: dict[str, Any] = dict.fromkeys(COMMANDS)
         self.commands = known
 
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Return the options before a command."""
-        return [convert_as_needed(p, False) for p in super().get_params(ctx)]
-
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the commands in the order of the help."""
         return [*COMMANDS]
@@ -101,11 +134,11 @@ class Commands(TyperGroup):
         """Return the command of that name, or None if there is none."""
         if cmd_name not in COMMANDS:
             return None
-        one = typer.Typer(**SETTINGS)
+        one = typer.Typer(add_completion=False, **SETTINGS)
         name = cmd_name.replace("-", "_")
-        function = getattr(import_module(f"symfric.cli.{MODULES.get(name, name)}"), name)
-        one.command(cls=Command)(function)
-        return typer.main.get_command(one)
+        module = import_module(f"symfric.cli.{MODULES.get(name, name)}")
+        one.command(cls=Command)(declared(getattr(module, name)))
+        return unconverted(typer.main.get_command(one))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command of the first word; refuse an unknown word with a suggestion."""
@@ -123,12 +156,6 @@ class Commands(TyperGroup):
 
 class Command(TyperCommand):
     """Command whose help ends with examples to copy."""
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Return arguments and options."""
-        hints = get_type_hints(self.callback) if self.callback else {}
-        found = super().get_params(ctx)
-        return [convert_as_needed(p, hints.get(str(p.name)) in TEXTS) for p in found]
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the words of the usage line after the name."""
@@ -169,7 +196,7 @@ def arguments(command: Any) -> list[Any]:
 
 def argument_shown(parameter: Any) -> str:
     """Return an argument as the usage line shows it: SCENE, or [NAME] if it is optional."""
-    name = (parameter.metavar or parameter.name.upper()) + "..." * (parameter.nargs == -1)
+    name = parameter.metavar + "..." * (parameter.nargs == -1)
     return name if parameter.required else f"[{name}]"
 
 
@@ -194,13 +221,12 @@ def continued(line: str, indent: int) -> str:
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 
-COMPLETED: dict[str, Any] = {"add_completion": True}
 app = typer.Typer(
     cls=Commands,
     help="Friction laws from formula to simulation, identification, optimal control and C.",
     epilog="Exit status: 0: success; 1: a solve or a verification failed, partial results are "
     "written; 2: invalid request, nothing is written; 130: interrupted, otherwise as 1.",
-    **SETTINGS | COMPLETED,
+    **SETTINGS,
 )
 
 
@@ -217,59 +243,46 @@ def symfric(
         typer.echo(context.get_help())
 
 
+UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
+"""Base class of all usage errors."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     0: success; 1: a solve failed (partial results are written); 2: bad input; 130: Ctrl-C. Every
     error is one sentence on standard error. If SYMFRIC_DEBUG is set, errors are raised instead.
     """
+    debug = bool(os.environ.get("SYMFRIC_DEBUG"))
     if arguments is None:
-        _prepare_process()
+        prepare_process(debug)
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            command = typer.main.get_command(app)
+            command = unconverted(typer.main.get_command(app))
             status = command.main(arguments, prog_name="symfric", standalone_mode=False)
         if status == INTERRUPTED:  # Typer's silent status after Ctrl-C
-            return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
+            raise KeyboardInterrupt
         return status if isinstance(status, int) else 0
-    except SolveError as error:
-        interrupted = error.status is Status.INTERRUPTED
-        return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
-    except (KeyboardInterrupt, typer.Abort):
-        return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
-    except (ValueError, OSError, MemoryError, ProgramError, UsageError) as error:
-        return _refuse(error, BAD_INPUT)
+    except (
+        KeyboardInterrupt, typer.Abort, SolveError, ValueError, OSError, MemoryError, ProgramError,
+        UsageError,
+    ) as error:  # fmt: skip
+        if debug:
+            raise
+        typer.echo(f"symfric: {sentence(error)}", err=True)
+        if isinstance(error, SolveError):
+            return INTERRUPTED if error.status is Status.INTERRUPTED else FAILED_SOLVE
+        return INTERRUPTED if isinstance(error, KeyboardInterrupt | typer.Abort) else BAD_INPUT
 
 
-def _refuse(error: BaseException, status: int) -> int:
-    """Print `error` as one sentence and return `status`."""
-    if os.environ.get("SYMFRIC_DEBUG"):
-        raise error
-    typer.echo(f"symfric: {sentence(error)}", err=True)
-    return status
-
-
-def sentence(error: BaseException) -> str:
-    """Return the message of `error` on one line."""
-    if isinstance(error, OSError) and error.errno == ENOSPC:
-        place = f" for '{error.filename}'" if error.filename is not None else ""
-        return f"expected free disk space, got none{place}; free some, or set TMPDIR elsewhere"
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"'{error.filename}': {error.strerror}"
-    if isinstance(error, MemoryError):
-        return "expected a task that fits into memory, got a larger one; request fewer --samples"
-    text = usage_sentence(error) if isinstance(error, UsageError) else str(error)
-    return " ".join(text.split()).removesuffix(".")
-
-
-def _prepare_process() -> None:
+def prepare_process(debug: bool) -> None:
     """Configure a process that runs only this command line."""
     os.environ.setdefault("MPLBACKEND", "Agg")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
-    if not os.environ.get("SYMFRIC_DEBUG"):
+    if not debug:
         sys.excepthook = _report_defect
 
 
@@ -288,8 +301,19 @@ def _report_defect(
     )
 
 
-UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
-"""Base class of all usage errors."""
+def sentence(error: BaseException) -> str:
+    """Return the message of `error` on one line."""
+    if isinstance(error, KeyboardInterrupt | typer.Abort):
+        return "interrupted"
+    if isinstance(error, OSError) and error.errno == ENOSPC:
+        place = f" for '{error.filename}'" if error.filename is not None else ""
+        return f"expected free disk space, got none{place}; free some, or set TMPDIR elsewhere"
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"'{error.filename}': {error.strerror}"
+    if isinstance(error, MemoryError):
+        return "expected a task that fits into memory, got a larger one; request fewer --samples"
+    text = usage_sentence(error) if isinstance(error, UsageError) else str(error)
+    return " ".join(text.split()).removesuffix(".")
 
 
 def usage_sentence(error: Any) -> str:
@@ -304,10 +328,9 @@ def usage_sentence(error: Any) -> str:
         return error.format_message()
     where, hint = error.ctx.info_name, f"see {error.ctx.command_path} -h"
     if kind == "MissingParameter":
-        return f"{where}: expected {_parameter_shown(error.param)}, got none; {hint}"
-    if kind == "BadParameter" and error.param is not None:
-        what = "a whole number" if "integer" in error.message else "a number"
-        return f"{where}: {error.param.opts[0]}: expected {what}, got '{_value_given(error)}'"
+        p = error.param
+        missing = f"{p.opts[0]} {p.metavar}" if is_option(p) else argument_shown(p)
+        return f"{where}: expected {missing}, got none; {hint}"
     if kind == "NoSuchOption":
         close = ", ".join(error.possibilities or ())
         offer = f"did you mean {close}?" if close else hint
@@ -317,15 +340,3 @@ def usage_sentence(error: Any) -> str:
         again = "; repeat the option for each NAME=VALUE" if "=" in extra[1] else f"; {hint}"
         return f"{where}: expected no other argument, got {extra[1]}{again}"
     return error.format_message()
-
-
-def _parameter_shown(parameter: Any) -> str:
-    if is_option(parameter):
-        return f"{parameter.opts[0]} {parameter.metavar}"
-    return argument_shown(parameter)
-
-
-def _value_given(error: Any) -> str:
-    """Return the invalid value, from the message or from the underlying error."""
-    found = search(r"^'(.*)' is not", error.message)
-    return found[1] if found else str(error.__cause__.errors()[0]["input"])

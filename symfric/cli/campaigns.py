@@ -6,64 +6,42 @@ other methods.
 """
 
 from collections.abc import Iterable
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from re import split
 from textwrap import shorten
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from symfric.cli import completions, output
+from symfric.bench import PICTURES, SUBJECTS, measure
 from symfric.cli import options as opt
-from symfric.cli.options import argument, option
-from symfric.foundation.files import make_folder
+from symfric.cli import output
+from symfric.foundation.files import check_folder, make_folder
 from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
-    from symfric.bench.table import Table
+    from symfric.bench.report import Table
     from symfric.gallery.rendering import Gallery
     from symfric.stress.campaign import Report
     from symfric.stress.cases import Case
     from symfric.stress.judge import Verdict
 
-SUBJECTS = (
-    "integrator",
-    "calls",
-    "ensemble",
-    "multibody",
-    "ivp",
-    "jitter",
-    "regularisation",
-    "ocp",
-    "interop",
-    "identification",
-    "codegen",
-    "embedded",
-)
-TABLES = ("calls", "ensemble", "embedded", "interop")
-"""Subjects without a picture."""
-
-
-def _completed(incomplete: str) -> list[str]:
-    return [subject for subject in SUBJECTS if subject.startswith(incomplete)]
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
+EVERY = 60.0
+"""Interval between updates of the files of stress tests [s]."""
 
 
 def bench(
-    subject: Annotated[
-        str,
-        argument("SUBJECT", f"Subject, default integrator: {', '.join(SUBJECTS)}.", _completed),
-    ] = "integrator",
-    quick: Annotated[bool, option("--quick", "Fewer points and fewer other tools.")] = False,
-    links: Annotated[
-        str | None, option("--links N,N,...", "Numbers of links of chains; multibody only.")
-    ] = None,
-    plot: opt.PlotOption = None,
-    csv: Annotated[
-        Path | None, option("--csv FILE.csv", "Write the runs; multibody, regularisation only.")
-    ] = None,
-    json: opt.JsonOption = None,
+    subject: str = "integrator",
+    quick: bool = False,
+    links: str | None = None,
+    plot: Path | None = None,
+    csv: Path | None = None,
+    json: str | None = None,
 ) -> None:
     """Compare symfric with other tools in run time and error.
 
@@ -82,23 +60,14 @@ def bench(
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
     check_names("bench", [subject], SUBJECTS)
-    drawn = tuple(name for name in SUBJECTS if name not in TABLES)
-    only = (
-        ("--links", links, ("multibody",)),
-        ("--csv", csv, ("multibody", "regularisation")),
-        ("--plot", plot, drawn),
-    )
+    only = (("--links", links, ("multibody",)), ("--plot", plot, PICTURES))
     given = [o for o, value, where in only if value is not None and subject not in where]
     if given:
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     opt.check_outputs(json, csv, picture=plot)
-    from symfric import bench as measures  # noqa: PLC0415  (for this command only)
-
     sizes = {"links": lengths(links)} if links else {}
     with output.progress("measuring") as tell:
-        result = getattr(measures, f"bench_{subject}")(
-            quick=quick, progress=output.unnamed(tell), **sizes
-        )
+        result = measure(subject, quick, tell, **sizes)
     if plot:
         result.plot(plot)
     if csv:
@@ -127,19 +96,12 @@ def lengths(text: str) -> tuple[int, ...]:
     return tuple(sorted({int(part) for part in parts}))
 
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C."""
-
-
 def gallery(
-    names: Annotated[
-        list[str] | None,
-        argument("NAME", "A figure, or a paper; all if none is given.", completions.plates),
-    ] = None,
-    out: Annotated[Path, option("--out DIR", "Folder for pictures and numbers.")] = Path("gallery"),
-    quick: Annotated[bool, option("--quick", "Reduced size, about a second per figure.")] = False,
-    workers: opt.WorkersOption = None,
-    listed: Annotated[bool, option("--list", "List the figures only.")] = False,
+    names: list[str] | None = None,
+    out: Path = Path("gallery"),
+    quick: bool = False,
+    workers: int | None = None,
+    listed: bool = False,
 ) -> None:
     """Reproduce the figures of the source papers.
 
@@ -153,39 +115,28 @@ def gallery(
 
     Example: symfric gallery self_tuning selection/fig_02 --out figures
     """
-    from symfric.gallery import chosen  # noqa: PLC0415  (for this command only)
+    from symfric.gallery import chosen, short  # noqa: PLC0415  (for this command only)
+    from symfric.gallery.plate import about  # noqa: PLC0415  (likewise)
     from symfric.gallery.rendering import render  # noqa: PLC0415  (likewise)
 
     wanted = tuple(names or ())
+    figures = chosen(wanted)
     if listed:
-        return show_list(chosen(wanted))
+        for paper, group in groupby(figures, lambda name: about(name)["paper"]):
+            output.show(f"\n{paper}")
+            rows = [(short(name), about(name)["title"]) for name in group]
+            output.show_table(["figure", "content"], rows)
+        return
     if workers is not None and workers < 1:
         raise ValueError(f"gallery: expected --workers >= 1, got {workers}")
-    count = len(chosen(wanted))
     make_folder(out)
-    with output.progress(f"{count} figures") as tell:
+    with output.progress(f"{len(figures)} figures") as tell:
         done = render(out, wanted, quick=quick, workers=workers, progress=tell)
     show_gallery(done)
     took = f"{len(done.records)} of {len(done.asked)} figures in {done.seconds:.0f} s"
     output.note(f"{took}, {'at reduced size, ' if quick else ''}wrote {out / 'index.html'}")
-    if done.left:
-        raise typer.Exit(INTERRUPTED)
-    if done.failures:
-        raise typer.Exit(1)
-    return None
-
-
-def show_list(names: tuple[str, ...]) -> None:
-    """Print the figures by paper."""
-    from symfric.gallery import short  # noqa: PLC0415  (for this command only)
-    from symfric.gallery.plate import about  # noqa: PLC0415  (likewise)
-
-    known = [(short(name), about(name)) for name in names]
-    papers = dict.fromkeys(texts["paper"] for _, texts in known)
-    for paper in papers:
-        output.show(f"\n{paper}")
-        rows = [(name, texts["title"]) for name, texts in known if texts["paper"] == paper]
-        output.show_table(["figure", "content"], rows)
+    if done.left or done.failures:
+        raise typer.Exit(INTERRUPTED if done.left else 1)
 
 
 def show_gallery(done: "Gallery") -> None:
@@ -193,13 +144,15 @@ def show_gallery(done: "Gallery") -> None:
     from symfric.gallery import short  # noqa: PLC0415  (for this command only)
 
     for folder, names in groupby(done.records, lambda name: name.partition("/")[0]):
-        records = {name: done.records[name] for name in names}
+        records = {short(name).partition("/")[2]: done.records[name] for name in names}
         paper = next(iter(records.values()))["paper"]
         output.show(f"{folder}: {paper}")
+        # of each comparison the first sentence or clause, shortened to two lines of the table
         rows = [
-            (short(name).partition("/")[2], brief(r["compared"]), r["how_far"], r["seconds"])
+            (name, shorten(split(r"(?<!\.)[.;:](?: |$)", r["compared"])[0], 84, placeholder=" ..."),
+             r["how_far"], r["seconds"])
             for name, r in records.items()
-        ]
+        ]  # fmt: skip
         output.show_table(["figure", "comparison", "distance", "time [s]"], rows)
         output.show()
     for name, why in done.failures.items():
@@ -208,25 +161,14 @@ def show_gallery(done: "Gallery") -> None:
         output.note(f"symfric: {done.left} of {len(done.asked)} figures were not computed")
 
 
-def brief(text: str) -> str:
-    """Return the first sentence or clause, shortened to two lines of the table."""
-    return shorten(split(r"(?<!\.)[.;:](?: |$)", text)[0], 84, placeholder=" ...")
-
-
-EVERY = 60.0
-"""Interval between updates of the files [s]."""
-
-
 def stress(
-    cases: Annotated[int, option("--cases N", "Number of cases.")] = 500,
-    seed: Annotated[int, option("--seed N", "Random seed; equal seeds give equal cases.")] = 1,
-    case: Annotated[Path | None, option("--case FILE", "Rerun one saved case.")] = None,
-    out: Annotated[Path, option("--out DIR", "Folder for failing cases.")] = Path("stress_cases"),
-    workers: opt.WorkersOption = None,
-    limit: Annotated[
-        float, option("--limit SECONDS", "Largest processor time of a case; more counts as a hang.")
-    ] = 120.0,
-    json: opt.JsonOption = None,
+    cases: int = 500,
+    seed: int = 1,
+    case: Path | None = None,
+    out: Path = Path("stress_cases"),
+    workers: int | None = None,
+    limit: float = 120.0,
+    json: str | None = None,
 ) -> None:
     """Verify runs of random laws in random scenes.
 
@@ -248,12 +190,11 @@ def stress(
     if case is not None:
         one = Case.read(case)
         verdict = rerun(one, limit)
-        output.emit_json({"case": one.to_dict(), "verdict": verdict.to_dict()}, json)
-        if json != "-":
-            show_verdict(one, verdict)
-        passed, saved = verdict.kind not in FAILING, []
+        content = {"case": one.to_dict(), "verdict": verdict.to_dict()}
+        output.finish(content, json, partial(show_verdict, one, verdict))
+        passed = verdict.kind not in FAILING
     else:
-        opt.check_folder(out)
+        check_folder(out)
         written = monotonic()
         with output.progress(f"{cases} cases") as show_fraction:
 
@@ -268,10 +209,7 @@ def stress(
 
             report = campaign(cases, seed, workers=workers, limit=limit, progress=progress)
         passed, saved = report.passed, report.save(out)
-        output.emit_json(report.to_dict(), json)
-        if json != "-":
-            show_report(report)
-    output.say_written(json, *saved)
+        output.finish(report.to_dict(), json, partial(show_report, report), *saved)
     if not passed:
         raise typer.Exit(1)
 
@@ -283,14 +221,10 @@ def show_report(report: "Report") -> None:
     rows: list[tuple[str, str, str]] = []
     for kind, count in report.classes.items():
         rows.append((kind, str(count), CLASSES[kind]))
-        groups = report.groups[kind]
-        rows += [("", f"{n}", f"  {group}") for group, n in groups.items()]
+        rows += [("", f"{n}", f"  {group}") for group, n in report.groups[kind].items()]
     done, asked = len(report.verdicts), report.asked
-    output.show_table(
-        ["class", "cases", "meaning and reasons"],
-        rows,
-        title=f"{done} cases of seed {report.seed} in {report.seconds:.0f} s",
-    )
+    title = f"{done} cases of seed {report.seed} in {report.seconds:.0f} s"
+    output.show_table(["class", "cases", "meaning and reasons"], rows, title)
     errors = ", ".join(f"{name} {e:.3g}" for name, e in report.errors().items())
     output.show(f"Verified by the independent reference solver: {report.refereed}.")
     output.show(f"Errors of right and loose cases, in tolerances: {errors}.")
@@ -300,7 +234,8 @@ def show_report(report: "Report") -> None:
 
 def show_verdict(case: "Case", verdict: "Verdict") -> None:
     """Print one case and its verdict."""
+    group = f" ({verdict.group})" if verdict.group else ""
     output.show(
-        f"{case.law} in {case.scene}, rtol {case.rtol:g}, {case.method}: {verdict.kind}"
-        f"{f' ({verdict.group})' if verdict.group else ''}. {verdict.reason}"
+        f"{case.law} in {case.scene}, rtol {case.rtol:g}, {case.method}: {verdict.kind}{group}. "
+        f"{verdict.reason}"
     )

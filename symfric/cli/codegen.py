@@ -1,125 +1,114 @@
 """`symfric codegen`: generate C99 for a friction law or a plant and verify it on this machine."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from textwrap import fill
+from typing import Any, NamedTuple
 
 import typer
 
-from symfric.cli import codegen_subject as subjects
-from symfric.cli import completions, output
+from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import options as opt
-from symfric.cli.machines import LawOfOption, PresetOption, kind_of
-from symfric.cli.options import argument, option
-from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
+from symfric.cli import output
+from symfric.cli.machines import formed, forms, kind_of
+from symfric.codegen import (
+    Block,
+    Generated,
+    Verification,
+    generate,
+    inverse_dynamics_block,
+    plant_block,
+    verify,
+)
 from symfric.codegen.generated import with_cores
 from symfric.codegen.verification import Check
+from symfric.compensation import Compensation, settings_from_text
+from symfric.compensation import compensator as compensator_block
 from symfric.embedded import CORES, Measured, measure
 from symfric.foundation import checks
-from symfric.foundation.parameters import check_names
+from symfric.foundation.files import check_folder
+from symfric.foundation.parameters import check_names, parameters
 from symfric.foundation.programs import find_compiler
+from symfric.foundation.status import Status
 from symfric.laws import AnyLaw
+from symfric.multibody import Mechanism, read_urdf
+from symfric.scenes import Drive, Scene
+from symfric.scenes.linkages import MechanismScene
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
+COMPENSATION = [item.name for item in fields(Compensation)]
+LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
+PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
+
+APPLIES = {
+    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
+    "--method": (PLANT,),
+    "--free": (LAW, FUNCTION, PLANT),
+    "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
+    "--turning": (LAW, FUNCTION, COMPENSATOR),
+    "--payload": (INVERSE,),
+    "--tunable-gravity": (INVERSE,),
+    "--compensation": (COMPENSATOR,),
+    "--preset": (PLANT,),
+    "--law-of": (PLANT,),
+}
+"""Options that apply to some subjects only -> these subjects."""
+
+WHY = {
+    "--step-size": "which has no step",
+    "--method": "whose step is fixed by the law",
+    "--turning": "which defines the units",
+}
+
+
+class Chosen(NamedTuple):
+    """Law given by name or by a fit.
+
+    Attributes:
+        text: name of the law.
+        law: law with its parameters.
+        drive: drive of the fit.
+        forces: coefficients that are forces because the load is unknown.
+    """
+
+    text: str
+    law: AnyLaw
+    drive: Drive | None = None
+    forces: tuple[str, ...] = ()
+
+    @property
+    def turning(self) -> bool:
+        """True if the law was fitted to a rotating axis."""
+        return self.drive is not None and self.drive.turning
 
 
 def codegen(
-    out: Annotated[Path, option("--out DIR", "Folder for the files.")],
-    fit: Annotated[
-        Path | None,
-        argument(
-            "FIT.json|ROBOT.urdf",
-            "Output of `symfric identify --json`; or a robot, with --inverse-dynamics.",
-        ),
-    ] = None,
-    law: Annotated[
-        str | None,
-        option("--law NAME", "Friction law, such as lugre; or FIT.json.", completions.laws),
-    ] = None,
-    settings: opt.SetOption = None,
-    preset: PresetOption = None,
-    law_of: LawOfOption = None,
-    scene: Annotated[
-        str | None,
-        option(
-            "--scene NAME",
-            "Plant: this scene, or FILE.urdf, with the law.",
-            completions.scenes,
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        option(
-            "--method NAME",
-            "Method of a plant; default rodas3, for mechanisms with friction backward_euler.",
-        ),
-    ] = None,
-    real: Annotated[
-        str | None,
-        option(
-            "--real",
-            "Floating point type; default both, for a plant double.",
-            metavar="|".join(REALS),
-        ),
-    ] = None,
-    step_size: Annotated[
-        float | None,
-        option("--step-size SECONDS", "Constant step, for plants and laws with states."),
-    ] = None,
-    name: Annotated[
-        str | None, option("--name NAME", "C identifier; default: that of the law.")
-    ] = None,
-    fold: Annotated[
-        bool, option("--fold", "Make all parameters constants; default: all are variable.")
-    ] = False,
-    free: Annotated[
-        list[str] | None,
-        option("--free NAME", "Keep this parameter variable; others are constants."),
-    ] = None,
-    guards: Annotated[
-        bool, option("--guards/--no-guards", "Clamp, repair and report invalid inputs.")
-    ] = True,
-    kit: Annotated[
-        bool,
-        option("--kit/--no-kit", "Add unit test, CMake, Python and Simulink files."),
-    ] = True,
-    core: Annotated[
-        list[str] | None,
-        option("--core NAME", f"Measure on this core: {', '.join(CORES)}."),
-    ] = None,
-    turning: Annotated[
-        bool, option("--turning", "Rotation: units rad/s and N m in the header.")
-    ] = False,
-    inverse_dynamics: Annotated[
-        bool,
-        option(
-            "--inverse-dynamics",
-            "Joint forces for a motion of ROBOT.urdf or --scene, with the friction of --law or of "
-            "the file.",
-        ),
-    ] = False,
-    payload: Annotated[
-        str | None, option("--payload FRAME", "Link or frame with a load that is set at run time.")
-    ] = None,
-    tunable_gravity: Annotated[
-        bool, option("--tunable-gravity", "Set gravity at run time.")
-    ] = False,
-    compensator: Annotated[
-        bool, option("--compensator", "Friction compensator of the law or of a fit.")
-    ] = False,
-    compensation: Annotated[
-        list[str] | None,
-        option(
-            "--compensation NAME=VALUE",
-            "Setting, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
-            f"{', '.join(subjects.SETTINGS)}.",
-        ),
-    ] = None,
-    compiler: Annotated[
-        str | None, option("--compiler COMMAND", "Default: $CC, gcc or clang.")
-    ] = None,
-    json: opt.JsonOption = None,
+    out: Path,
+    fit: Path | None = None,
+    law: str | None = None,
+    settings: list[str] | None = None,
+    preset: str | None = None,
+    law_of: list[str] | None = None,
+    scene: str | None = None,
+    method: str | None = None,
+    real: str | None = None,
+    step_size: float | None = None,
+    name: str | None = None,
+    fold: bool = False,
+    free: list[str] | None = None,
+    guards: bool = True,
+    kit: bool = True,
+    core: list[str] | None = None,
+    turning: bool = False,
+    inverse_dynamics: bool = False,
+    payload: str | None = None,
+    tunable_gravity: bool = False,
+    compensator: bool = False,
+    compensation: list[str] | None = None,
+    compiler: str | None = None,
+    json: str | None = None,
 ) -> None:
     """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
@@ -135,123 +124,231 @@ def codegen(
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
     """
     check_names("--core", core or (), CORES)
-    opt.check_folder(out)
+    check_folder(out)
     opt.check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
-    chosen = None if inverse_dynamics else subjects.chosen_law(fit, law)
-    subject = subjects.subject_of(chosen, scene, compensator)
-    kind = real
-    if kind is None:
-        kind = "double" if subject == subjects.PLANT else "both"
+    chosen = None if inverse_dynamics else chosen_law(fit, law)
+    subject = subject_of(chosen, scene, compensator)
+    kind = ("double" if subject == PLANT else "both") if real is None else real
     check_names("--real", [kind], REALS)
     given = {
-        "--step-size": step_size is not None, "--method": method is not None, "--free": bool(free),
-        "--fold": fold, "--turning": turning, "--payload": payload is not None,
-        "--tunable-gravity": tunable_gravity, "--compensation": bool(compensation),
-        "--preset": preset is not None, "--law-of": bool(law_of),
+        "--step-size": step_size, "--method": method, "--free": free, "--fold": fold or None,
+        "--turning": turning or None, "--payload": payload, "--compensation": compensation,
+        "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
     }  # fmt: skip
-    subjects.check_applicable(subject, [option for option, there in given.items() if there])
-    own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
+    check_applicable(subject, [option for option, value in given.items() if value is not None])
+    texts = opt.assignments("--set", settings)
+    own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
-    adjustable, forces = None, ()
+    options, adjustable = dict[str, Any](), None
     if chosen is None:
-        values = opt.numbers("--set", settings)
-        made: Block | AnyLaw = subjects.robot_block(
-            fit, scene, law, values,
-            name=name, h=step_size, fold=fold, payload=payload, tunable_gravity=tunable_gravity,
+        made: Block | AnyLaw = inverse_dynamics_block(
+            robot(fit, scene, law, opt.numbers("--set", texts)), **own, payload=payload,
+            payload_inertia=payload is not None, tunable_gravity=tunable_gravity,
         )  # fmt: skip
-        text, own = law or made.name, {}
     elif scene is not None:
-        kind_of_scene = kind_of(scene, "--scene", preset, law_of)
-        machine = subjects.machine_of(
-            scene, kind_of_scene, chosen, opt.assignments("--set", settings)
-        )
-        own["method"] = "auto" if method is None else method
+        machine = machine_of(scene, kind_of(scene, "--scene", preset, law_of), chosen, texts)
+        own["method"] = method or "auto"
         made = plant_block(machine, **own)
-        adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
-        text, own = chosen.text, {}
-    elif compensator:
-        compensated = opt.with_settings(chosen.law, chosen.text, settings)
-        made = subjects.compensator_block(
-            compensated, chosen.drive, compensation or (),
-            name=name, h=step_size, turning=turning, fold=fold,
-        )  # fmt: skip
-        text, own = chosen.text, {}
+        own.pop("h", None)
+        adjustable = partial(plant_block, machine, **own)
     else:
-        made = opt.with_settings(chosen.law, chosen.text, settings)
-        if turning or chosen.turning:
-            own["turning"] = True
-        text, forces = chosen.text, chosen.forces
-    generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **own)
+        made = opt.with_settings(chosen.law, chosen.text, texts)
+        if compensator:
+            made = compensated(made, chosen.drive, compensation or (), turning=turning, **own)
+        else:
+            options = own
+            if turning or chosen.turning:
+                options["turning"] = True
+    generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **options)
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
-    if forces:
-        names = ", ".join(forces)
+    if chosen is not None and chosen.forces and subject in (LAW, FUNCTION):
+        names = ", ".join(chosen.forces)
         output.note(f"{names}: fitted as forces under a load of 1 N; call the C with N = 1")
-    measured = on_cores(generated, core or ())
+    measured = [
+        measure(generated.block, one, name_of_core, guards=generated.guards)
+        for name_of_core in core or ()
+        for one in generated.reals
+    ]
     generated = with_cores(generated, [m.to_dict() for m in measured])
-    _report(text, generated, verification, measured, json)
-
-
-def _report(
-    text: str,
-    generated: Generated,
-    verification: Verification,
-    measured: list[Measured],
-    json: str | None,
-) -> None:
-    """Print files and verification; the exit status is 1 if it failed."""
-    output.emit_json(to_dict(text, generated, verification, measured), json)
-    if json != "-":
-        show_verification(verification)
-        show_sizes(generated, measured)
-    output.say_folder(generated.folder, generated.files)
-    output.say_written(json)
+    law = chosen.text if chosen else law or generated.block.name
+    report(law, generated, verification, measured, json)
     if not verification.ok:
         raise typer.Exit(1)
 
 
-def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
-    """Measure the block on Cortex-M cores in every generated type."""
-    return [
-        measure(generated.block, real, core, guards=generated.guards)
-        for core in cores
-        for real in generated.reals
-    ]
-
-
-def to_dict(
-    law: str, generated: Generated, verification: Verification, measured: Sequence[Measured]
-) -> dict[str, Any]:
-    """Return the content of `--json`."""
-    return {
+def report(
+    law: str,
+    generated: Generated,
+    verification: Verification,
+    measured: Sequence[Measured],
+    json: str | None,
+) -> None:
+    """Print or write the verification and the sizes, and print the names of the files."""
+    content = {
         "law": law,
         "files": [str(path) for path in generated.files],
         "manifest": dict(generated.manifest),
         "verification": verification.to_dict(),
         "cores": [m.to_dict() for m in measured],
     }
+    output.emit_json(content, json)
+    if json != "-":
+        show_verification(verification)
+        show_sizes(generated, measured)
+    names = "  ".join(str(path.relative_to(generated.folder)) for path in generated.files)
+    output.note(f"wrote {len(generated.files)} files into {generated.folder}:")
+    indent: Any = dict.fromkeys(("initial_indent", "subsequent_indent"), "  ")
+    output.note(fill(names, 78, break_long_words=False, break_on_hyphens=False, **indent))
+    output.say_written(json)
+
+
+def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
+    """Return the type of subject.
+
+    Raises:
+        ValueError: a compensator together with a scene or inverse dynamics.
+    """
+    if compensator and (chosen is None or scene is not None):
+        other = INVERSE if chosen is None else PLANT
+        raise ValueError(f"codegen: {COMPENSATOR}: expected with a law or a fit, got {other}")
+    if compensator:
+        return COMPENSATOR
+    if chosen is None:
+        return INVERSE
+    if scene is not None:
+        return PLANT
+    if not isinstance(chosen.law, Law):
+        return POPULATION
+    return LAW if chosen.law.states else FUNCTION
+
+
+def check_applicable(subject: str, given: list[str]) -> None:
+    """Refuse all options that do not apply to the subject in one error."""
+    problems: list[str] = []
+    for option in given:
+        fits = [s for s in APPLIES[option] if s != FUNCTION]
+        if subject not in APPLIES[option]:
+            why = f", {WHY[option]}" if option in WHY and subject != INVERSE else ""
+            problems.append(f"{option}: expected with {' or '.join(fits)} only, got {subject}{why}")
+    if {"--free", "--fold"} <= set(given):
+        problems.append("--free, --fold: expected one of them, got both; --free folds the others")
+    if problems:
+        raise ValueError("codegen: " + "; ".join(problems))
+
+
+def chosen_law(fit: Path | None, law: str | None) -> Chosen:
+    """Return the law of a fit or of a name.
+
+    Raises:
+        ValueError: both or neither, a robot, no fit in the file, or a fit without a law.
+    """
+    if (fit is None) == (law is None):
+        got = "neither" if fit is None else "both"
+        raise ValueError(f"codegen: expected --law NAME or the file of a fit, got {got}")
+    if fit is None:
+        text = str(law)
+        return Chosen(text, any_from_text(text))
+    from identification.result.fitted import Fitted  # noqa: PLC0415  (SciPy is slow to import)
+
+    if fit.suffix.lower() == ".urdf":
+        raise ValueError(
+            f"codegen '{fit}': expected --inverse-dynamics with a robot, got none; "
+            "its plant is --scene FILE.urdf --law NAME"
+        )
+    found = Fitted.from_json(fit)
+    if found.law is None:
+        raise ValueError(
+            f"fit '{fit}': expected a law of the catalogue, got {found.name}; generate other laws "
+            "in Python: symfric.codegen.generate(fit.law, out)"
+        )
+    if found.status is not Status.SOLVED:
+        first = found.message.partition(". ")[0].rstrip(".")
+        output.note(f"{fit}: status of the fit {found.status.name}: {first}.")
+    units = {n: p.unit for n, p in parameters(found.law).items()}
+    forces = [n for n, e in found.parameters.items() if units.get(n) == "1" and e.unit != "1"]
+    return Chosen(found.name, found.law, found.drive, tuple(forces))
+
+
+def machine_of(
+    scene: str, kind: Callable[[Law], Scene], chosen: Chosen, texts: dict[str, str]
+) -> Scene:
+    """Return the scene with the law and --set; a fitted drive includes its mass and offset.
+
+    Raises:
+        ValueError: coefficients that are forces in a scene with a load, or unknown names.
+    """
+    own = kind is Drive and chosen.drive is not None
+    if own and chosen.drive is not None:
+        machine: Scene = chosen.drive
+    else:  # `law_from_text` refuses a population
+        machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
+    machine = formed(machine, texts)
+    check_names(f"--set of {scene}", texts, [*parameters(machine), *forms(machine)])
+    values = opt.numbers("--set", {n: t for n, t in texts.items() if n not in forms(machine)})
+    if chosen.forces and not own and values.get("N") != 1.0:
+        names = ", ".join(chosen.forces)
+        hint = "--set N=1" if "N" in parameters(machine) else "fit it with --normal-force"
+        raise ValueError(
+            f"codegen: --scene {scene}: expected coefficients of friction, got forces {names}, "
+            f"fitted under a load of 1 N; {hint}"
+        )
+    return with_values(machine, values)
+
+
+def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:
+    """Return the compensator of a law, with load and offset of the drive of its fit."""
+    if not isinstance(law, Law):
+        raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
+    subject = law if drive is None else replace(drive, law=law)
+    return compensator_block(subject, settings=settings_from_text(texts), **how)
+
+
+def robot(
+    file: Path | None, scene: str | None, law: str | None, values: dict[str, float]
+) -> Mechanism:
+    """Return the mechanism of a robot's file or of a scene, which may also be a robot's file.
+
+    Args:
+        file, scene: one of them.
+        law: law of all joints; None for the friction tags of a file.
+        values: parameters of the scene or of the law, which become its defaults.
+
+    Raises:
+        ValueError: both or neither of them, or no mechanism.
+    """
+    if (file is None) == (scene is None):
+        got = "neither" if scene is None else "both"
+        raise ValueError(f"{INVERSE}: expected a robot's FILE.urdf or --scene NAME, got {got}")
+    if file is not None and file.suffix.lower() != ".urdf":
+        raise ValueError(f"{INVERSE}: expected a robot's FILE.urdf, got '{file}'")
+    where = str(file or scene)
+    if law is None and where.endswith(".urdf"):
+        if values:
+            raise ValueError(f"{INVERSE}: --set: expected with --law only, got {', '.join(values)}")
+        return read_urdf(where)
+    if law is None:
+        raise ValueError(f"{INVERSE}: expected --law NAME with --scene {where}, got none")
+    machine = kind_of(where, "--scene")(law_from_text(law))
+    check_names(f"--set of {where}", values, parameters(machine))
+    if not isinstance(machine, MechanismScene):
+        raise ValueError(f"{INVERSE}: expected a scene of bodies and joints, got {where}")
+    return with_values(machine, values).mechanism()
 
 
 def show_verification(verification: Verification) -> None:
     """Print the comparison of the C with CasADi, one row per floating point type."""
     compiler = f" ({verification.compiler})" if verification.compiler else ""
     output.show(f"{verification.name}: {verification.status}{compiler}")
-    if verification.checks:
+    rows = [
+        (check.real, check.steps, len(check.warnings), compared(check), f"{check.error:.2g}",
+         check.worst or "-", ", ".join(check.foreign or ()) or "none")
+        for check in verification.checks
+    ]  # fmt: skip
+    if rows:
         output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign"],
-            [
-                (
-                    check.real,
-                    check.steps,
-                    len(check.warnings),
-                    compared(check),
-                    f"{check.error:.2g}",
-                    check.worst or "-",
-                    ", ".join(check.foreign or ()) or "none",
-                )
-                for check in verification.checks
-            ],
+            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign"], rows
         )
     for check in verification.checks:
         if check.ties:
@@ -262,15 +359,10 @@ def show_verification(verification: Verification) -> None:
 
 
 def compared(check: Check) -> str:
-    """Describe the comparison of the C with CasADi."""
-    return "differs" if check.ulp is None and not check.near else bits(check.ulp)
-
-
-def bits(ulp: int | None) -> str:
-    """Describe the distance of the C in double from CasADi."""
-    if ulp is None:
-        return "within rounding"
-    return "bit for bit equal" if ulp == 0 else f"{ulp} ulp apart"
+    """Describe the comparison of the C with CasADi: the distance in double, or rounding."""
+    if check.ulp is None:
+        return "within rounding" if check.near else "differs"
+    return "bit for bit equal" if check.ulp == 0 else f"{check.ulp} ulp apart"
 
 
 def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:

@@ -1,9 +1,11 @@
 """Shell completions: names of laws, scenes, figures, problems, and parameters of `--set`.
 
-These functions never print or raise; without a match they return an empty list.
+These functions never print or raise; without a match they return an empty list. They import what
+one command needs only.
 """
 
 from collections.abc import Iterable
+from importlib import import_module
 from typing import Any
 
 import typer
@@ -16,24 +18,29 @@ def _of(names: Iterable[str], incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
+def _last(names: Iterable[str], incomplete: str, separators: str = ",") -> list[str]:
+    """Complete the part of a text behind the last of its separators."""
+    cut = max(map(incomplete.rfind, separators)) + 1
+    return [incomplete[:cut] + name for name in _of(names, incomplete[cut:])]
+
+
+def _from(module: str, name: str) -> Any:
+    return getattr(import_module(module), name)
+
+
 def laws(incomplete: str) -> list[str]:
     """Complete laws of a scene, also in sums and wrappers."""
-    cut = max(incomplete.rfind(c) for c in "+(") + 1
-    return [incomplete[:cut] + name for name in _of(ALL_LAWS, incomplete[cut:])]
+    return _last(ALL_LAWS, incomplete, "+(")
 
 
 def each_law(incomplete: str) -> list[str]:
     """Complete laws in a list with commas."""
-    start, comma, last = incomplete.rpartition(",")
-    return [f"{start}{comma}{name}" for name in laws(last)]
+    return _last(ALL_LAWS, incomplete, "+(,")
 
 
 def needs(incomplete: str) -> list[str]:
     """Complete words of `--need` in a list with commas."""
-    from symfric.choice import NEEDS  # noqa: PLC0415  (for one command only)
-
-    start, comma, last = incomplete.rpartition(",")
-    return [f"{start}{comma}{word}" for word in _of(NEEDS, last)]
+    return _last(_from("symfric.choice", "NEEDS"), incomplete)
 
 
 def all_laws(incomplete: str) -> list[str]:
@@ -43,9 +50,7 @@ def all_laws(incomplete: str) -> list[str]:
 
 def scenes(incomplete: str) -> list[str]:
     """Complete scenes; the shell completes files of robots."""
-    from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
-
-    return _of(ALL_SCENES, incomplete)
+    return _of(_from("symfric.scenes", "ALL_SCENES"), incomplete)
 
 
 def presets(context: typer.Context, incomplete: str) -> list[str]:
@@ -55,52 +60,47 @@ def presets(context: typer.Context, incomplete: str) -> list[str]:
 
 def places(context: typer.Context, incomplete: str) -> list[str]:
     """Complete `PLACE=LAW` for the scene on the command line."""
-    place, equals, law = incomplete.partition("=")
-    if equals:
-        return [f"{place}={name}" for name in laws(law)]
+    if "=" in incomplete:
+        return _last(ALL_LAWS, incomplete, "=+(")
     return _of((f"{name}=" for kind in _machines(context) for name in kind.places()), incomplete)
 
 
 def _machines(context: typer.Context) -> list[Any]:
-    from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
-
+    """Return the scenes on the command line."""
+    every = _from("symfric.scenes", "ALL_SCENES")
     words = (context.params.get("scene"), context.params.get("what"), *context.args)
-    return [ALL_SCENES[word] for word in map(str, words) if word in ALL_SCENES]
+    return [every[word] for word in map(str, words) if word in every]
 
 
 def figures(incomplete: str) -> list[str]:
     """Complete figures of laws, and scenes."""
-    from symfric.figures import FIGURES  # noqa: PLC0415  (for this command only)
-
-    return [*_of(FIGURES, incomplete), *scenes(incomplete)]
+    return [*_of(_from("symfric.figures", "FIGURES"), incomplete), *scenes(incomplete)]
 
 
 def plates(incomplete: str) -> list[str]:
     """Complete papers of the gallery and, after the slash, their figures."""
-    from symfric.gallery.plate import scripts, short  # noqa: PLC0415  (for this command only)
-
-    names = [short(name) for name in scripts()]
+    short = _from("symfric.gallery", "short")
+    names = [short(name) for name in _from("symfric.gallery", "scripts")()]
     papers = dict.fromkeys(f"{name.partition('/')[0]}/" for name in names)
     return _of(names if "/" in incomplete else papers, incomplete)
 
 
+def subjects(incomplete: str) -> list[str]:
+    """Complete subjects of `symfric bench`."""
+    return _of(_from("symfric.bench", "SUBJECTS"), incomplete)
+
+
 def problems(incomplete: str) -> list[str]:
     """Complete ready optimal control problems."""
-    from ocp.problems import READY  # noqa: PLC0415  (for this command only)
-
-    return _of(READY, incomplete)
+    return _of(_from("ocp.problems", "READY"), incomplete)
 
 
 def settings(context: typer.Context, incomplete: str) -> list[str]:
     """Complete `NAME=` of parameters and options of the laws, or of the scene with them."""
-    from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
-
-    words = [str(word) for word in context.args]  # arguments before the option that is completed
-    named = context.params.get("law") or context.params.get("name") or []
-    machines = [w for w in (str(context.params.get("scene")), *words) if w in ALL_SCENES]
-    texts = [named] if isinstance(named, str) else [*named]
+    machines, named = _machines(context), context.params.get("law") or context.params.get("name")
+    texts = [named] if isinstance(named, str) else list(named or ())
     if not (texts or machines):
-        texts = words
+        texts = [str(word) for word in context.args]  # before the option that is completed
     found = dict[str, None]()
     for text in texts or ["viscous"]:
         try:
@@ -108,7 +108,7 @@ def settings(context: typer.Context, incomplete: str) -> list[str]:
         except ValueError:
             continue
         if machines and isinstance(law, Law):
-            found |= dict.fromkeys(parameters(ALL_SCENES[machines[0]](law)))
+            found |= dict.fromkeys(parameters(machines[0](law)))
         else:
             found |= dict.fromkeys([*parameters(law), *options(law)])
     return _of((f"{name}=" for name in found), incomplete)

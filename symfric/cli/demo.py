@@ -1,9 +1,9 @@
 """`symfric demo`: simulation, identification, optimal control and generated C in one run."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, NamedTuple
 
 import typer
 
@@ -16,10 +16,9 @@ from ocp import Free, Solution, rest_to_rest, solve
 from symfric import ALL_LAWS, LuGre, simulate
 from symfric.cli import output
 from symfric.cli.codegen import show_verification
-from symfric.cli.options import check_folder, option
 from symfric.cli.run import show_trajectory
 from symfric.codegen import generate, verify
-from symfric.foundation.files import write_text
+from symfric.foundation.files import check_folder, write_text
 from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
@@ -29,30 +28,20 @@ STAGE = Path("..", "shared", "data", "EMPS")
 RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
 """Record for identification and record for validation."""
 
-DISTANCE, LIMIT = 0.05, 200.0
-"""Distance of the optimal move [m] and largest force [N]."""
+DISTANCE, LIMIT, INTERVALS = 0.05, 200.0, 100
+"""Distance of the optimal move [m], largest force [N], and intervals of its mesh."""
 
 
-@dataclass(frozen=True)
-class Chapter:
-    """Files and numbers of one part of the demo."""
+class Chapter(NamedTuple):
+    """Folder and numbers of one part of the demo."""
 
+    folder: Path
     title: str
     text: str
-    files: tuple[Path, ...]
     numbers: dict[str, Any]
 
 
-def demo(
-    out: Annotated[Path, option("--out DIR", "Folder for the results.")] = Path("out"),
-    data: Annotated[
-        Path | None,
-        option(
-            "--data DIR",
-            "Folder of the EMPS benchmark; default ../shared/data/EMPS, else a simulated record.",
-        ),
-    ] = None,
-) -> None:
+def demo(out: Path = Path("out"), data: Path | None = None) -> None:
     """Simulate, identify, optimise and generate C.
 
     Results are written to DIR, with a README.md that lists them.
@@ -69,13 +58,17 @@ def demo(
     output.note("3/4 optimal moves of the identified drive")
     chapters.append(optimal_moves(out / "optimal_move", found[0]))
     output.note("4/4 C for embedded controllers")
-    chapters.append(generated_c(out / "c", law_of(found[0])))
+    chapters.append(generated_c(out / "c", found[0]))
     write_text(out / "README.md", index(out, chapters))
-    summary = {c.title: c.numbers for c in chapters}
-    write_text(out / "summary.json", json.dumps(output.plain(summary), indent=2) + "\n")
+    write_json(out / "summary.json", {c.title: c.numbers for c in chapters})
     output.note(f"wrote {out / 'README.md'}, which lists the results")
     if chapters[-1].numbers["failed"]:
         raise typer.Exit(1)
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write an object as JSON."""
+    write_text(path, json.dumps(output.plain(content), indent=2) + "\n")
 
 
 def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str, ...], str]:
@@ -97,71 +90,44 @@ def stick_slip(folder: Path) -> Chapter:
 
     laws = {name: ALL_LAWS[name]() for name in ("brown_mcphee", "lugre")}
     motions = {name: simulate(Rabinowicz(law).model(), 20.0) for name, law in laws.items()}
-    picture, curves = folder / "rabinowicz.png", folder / "laws.png"
-    plot_trajectories(motions, ("x", "v", "friction"), picture)
-    plot_laws(laws, path=curves)
-    tables = {name: folder / f"{name}.csv" for name in motions}
+    plot_trajectories(motions, ("x", "v", "friction"), folder / "rabinowicz.png")
+    plot_laws(laws, path=folder / "laws.png")
+    numbers: dict[str, Any] = {}
     for name, motion in motions.items():
-        motion.to_csv(tables[name])
+        motion.to_csv(folder / f"{name}.csv")
         show_trajectory(name, motion)
-    return Chapter(
-        "Stick-slip of a block on a belt",
-        "Position, velocity and friction with Brown-McPhee and LuGre friction over 20 s.",
-        (picture, curves, *tables.values()),
-        {
-            name: {"final": motion.final, "statistics": motion.statistics.to_dict()}
-            for name, motion in motions.items()
-        },
-    )
+        numbers[name] = {"final": motion.final, "statistics": motion.statistics.to_dict()}
+    text = "Position, velocity and friction with Brown-McPhee and LuGre friction over 20 s."
+    return Chapter(folder, "Stick-slip of a block on a belt", text, numbers)
 
 
 def identified(records: tuple[Dataset, Dataset], law: str) -> Fitted:
     """Identify the drive from the first record, and validate it on the second."""
     with output.progress(f"identify {law}") as tell:
-        fit = Fit(InverseDynamics(), law, records[0]).solve(
-            progress=lambda _, fraction: tell(fraction)
-        )
+        fit = Fit(InverseDynamics(), law, records[0]).solve(progress=tell)
     found = replace(fit, validation=fit.validate(records[1]))
     typer.echo(f"{found}\n")
     return found
-
-
-def law_of(found: Fitted) -> Law:
-    """Return the identified law."""
-    if found.law is None:
-        raise ValueError(f"demo: expected a law, got none from {found.name}")
-    return found.law
 
 
 def identification(
     folder: Path, found: list[Fitted], origin: str, records: tuple[Dataset, Dataset]
 ) -> Chapter:
     """Write pages, numbers and pictures, and simulated records."""
-    files: list[Path] = []
+    numbers: dict[str, Any] = {}
     for fit in found:
         stem = fit.name.replace("+", "_").replace("(", "_").replace(")", "")
-        page, numbers, picture = (folder / f"{stem}.{kind}" for kind in ("html", "json", "png"))
-        fit.to_html(page)
-        fit.to_json(numbers)
-        fit.plot(picture)
-        files += [page, numbers, picture]
+        fit.to_html(folder / f"{stem}.html")
+        fit.to_json(folder / f"{stem}.json")
+        fit.plot(folder / f"{stem}.png")
+        keys = ("status", "message", "parameters", "errors", "validation")
+        numbers[fit.name] = {key: fit.to_dict()[key] for key in keys}
     if "simulated" in origin:
         for name, record in zip(("record", "validation"), records, strict=True):
-            files += record.to_csv(folder / f"{name}.csv")
-    return Chapter(
-        "Identification of a positioning drive",
-        f"Mass, offset and friction from {origin}.",
-        tuple(files),
-        {fit.name: numbers_of(fit) for fit in found} | {"data": origin},
-    )
-
-
-def numbers_of(fit: Fitted) -> dict[str, Any]:
-    """Return the key numbers of a fit."""
-    data = fit.to_dict()
-    return {
-        name: data[name] for name in ("status", "message", "parameters", "errors", "validation")
-    }
+            record.to_csv(folder / f"{name}.csv")
+    text = f"Mass, offset and friction from {origin}."
+    title = "Identification of a positioning drive"
+    return Chapter(folder, title, text, numbers | {"data": origin})
 
 
 def optimal_moves(folder: Path, found: Fitted) -> Chapter:
@@ -176,82 +142,62 @@ def optimal_moves(folder: Path, found: Fitted) -> Chapter:
     def move(T: float | Free) -> Solution:
         problem = rest_to_rest(found.model, DISTANCE, T, limit=LIMIT)
         bounded = replace(problem, bounds={**problem.bounds, "v": (-speed, speed)})
-        return solve(bounded, intervals=100)
+        return solve(bounded, intervals=INTERVALS)
 
     fastest = move(Free(0.05, 10.0, guess=0.5))
     moves = {"minimum time": fastest, "minimum effort": move(1.5 * fastest.T)}
-    picture = folder / "moves.png"
-    plot_solutions(moves, ("x", "v", "force", "friction"), picture)
-    files = [picture]
+    plot_solutions(moves, ("x", "v", "force", "friction"), folder / "moves.png")
+    rows: list[tuple[str | float, ...]] = []
+    numbers: dict[str, Any] = {}
     for name, solution in moves.items():
-        table, numbers = (folder / f"{name.replace(' ', '_')}.{kind}" for kind in ("csv", "json"))
-        solution.to_csv(table)
-        solution.to_json(numbers)
-        files += [table, numbers]
-    show_moves(moves)
-    return Chapter(
-        "Optimal moves of the identified drive",
-        f"{DISTANCE:g} m from rest to rest with at most {LIMIT:g} N and {speed:.3g} m/s, the "
-        "largest speed in the record: the fastest move, and the move of least effort (integral of "
-        "force^2) in 1.5 times that time; each control is verified by simulation.",
-        tuple(files),
-        {
-            name: {n: getattr(solution, n) for n in ("T", "cost", "miss", "iterations")}
-            | {"status": solution.status.name}
-            for name, solution in moves.items()
-        },
-    )
-
-
-def show_moves(moves: dict[str, Solution]) -> None:
-    """Print duration, peak force and the relative miss of the simulated moves."""
+        solution.to_csv(folder / f"{name.replace(' ', '_')}.csv")
+        solution.to_json(folder / f"{name.replace(' ', '_')}.json")
+        numbers[name] = {n: getattr(solution, n) for n in ("T", "cost", "miss", "iterations")}
+        numbers[name]["status"] = solution.status.name
+        peak, miss = float(abs(solution["force"]).max()), f"{solution.miss:.1g}"
+        status = solution.status.name.lower()
+        rows.append((name, status, solution.iterations, solution.T, peak, miss))
     output.show_table(
         ["move", "status", "iterations", "duration T [s]", "peak force [N]", "relative miss"],
-        [
-            (
-                name,
-                move.status.name.lower(),
-                move.iterations,
-                move.T,
-                float(abs(move["force"]).max()),
-                f"{move.miss:.1g}",
-            )
-            for name, move in moves.items()
-        ],
+        rows,
         title=f"{DISTANCE:g} m from rest to rest, |force| <= {LIMIT:g} N",
     )
     output.show()
+    text = (
+        f"{DISTANCE:g} m from rest to rest with at most {LIMIT:g} N and {speed:.3g} m/s, the "
+        "largest speed in the record: the fastest move, and the move of least effort (integral of "
+        "force^2) in 1.5 times that time; each control is verified by simulation."
+    )
+    return Chapter(folder, "Optimal moves of the identified drive", text, numbers)
 
 
-def generated_c(folder: Path, stage: Law) -> Chapter:
+def generated_c(folder: Path, found: Fitted) -> Chapter:
     """Generate C of LuGre, and of the identified law for friction compensation."""
-    files: list[Path] = []
+    laws: dict[str, Law | None] = {"lugre": LuGre(), "stage_friction": found.law}
     numbers: dict[str, Any] = {"failed": False}
-    for name, law in {"lugre": LuGre(), "stage_friction": stage}.items():
-        generated = generate(law, folder / name, name=name)
-        verification = verify(generated)
-        findings = folder / name / "verification.json"
-        write_text(findings, json.dumps(output.plain(verification.to_dict()), indent=2) + "\n")
+    for name, law in laws.items():
+        if law is None:
+            raise ValueError(f"demo: expected a law, got none from {found.name}")
+        verification = verify(generate(law, folder / name, name=name))
+        write_json(folder / name / "verification.json", verification.to_dict())
         show_verification(verification)
         output.show()
-        files += [*generated.files, findings]
         numbers[name] = {"law": law_name(law), **verification.to_dict()}
         numbers["failed"] |= bool(verification.checks) and not verification.ok
-    return Chapter(
-        "C for embedded controllers",
+    text = (
         "LuGre with its exact exponential update, and the identified friction for feed-forward "
-        "compensation; both compared with CasADi if there is a C compiler.",
-        tuple(files),
-        numbers,
+        "compensation; both compared with CasADi if there is a C compiler."
     )
+    return Chapter(folder, "C for embedded controllers", text, numbers)
 
 
 def index(out: Path, chapters: list[Chapter]) -> str:
-    """Return a list of the results in Markdown."""
+    """Return a list of the results in Markdown, pictures first."""
     lines = ["# Results of `symfric demo`", ""]
     for chapter in chapters:
         lines += [f"## {chapter.title}", "", chapter.text, ""]
-        for path in sorted(chapter.files, key=lambda path: path.suffix != ".png"):
+        files = sorted(path for path in chapter.folder.rglob("*") if path.is_file())
+        for path in sorted(files, key=lambda path: path.suffix != ".png"):
             place = path.relative_to(out).as_posix()
             picture = path.suffix == ".png"
             lines.append(f"![{path.stem}]({place})\n" if picture else f"- [{place}]({place})")

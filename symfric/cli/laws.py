@@ -1,44 +1,34 @@
 """`symfric laws`: list the friction laws, or show one in full."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from inspect import getdoc
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from symfric import ALL_LAWS, parameters
-from symfric.cli import completions, output
 from symfric.cli import options as opt
-from symfric.cli.options import argument, option
+from symfric.cli import output
 from symfric.figures import FIGURES, FigureData, compare
-from symfric.figures.data import NORMAL_FORCE, parts, phenomena
+from symfric.figures.data import parts, phenomena
+from symfric.figures.motion import NORMAL_FORCE
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
+from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text
 from symfric.laws.catalogue import ALIASES
 from symfric.laws.composed.populations import cost
 from symfric.scenes import ALL_SCENES
 
 
 def laws(
-    name: Annotated[
-        str | None, argument("NAME", "One law, such as lugre.", completions.all_laws)
-    ] = None,
-    settings: opt.SetOption = None,
-    plot: opt.PlotOption = None,
-    figure: Annotated[
-        str | None,
-        option("--figure FIGURE", f"Behaviour: {', '.join(FIGURES)}.", completions.figures),
-    ] = None,
-    others: Annotated[
-        list[str] | None,
-        option("--compare LAW", "Overlay another law; may be repeated.", completions.all_laws),
-    ] = None,
-    normal_force: Annotated[
-        float | None,
-        option("--normal-force NUMBER", "Normal force [N]; default 1, and 7.848 for --figure."),
-    ] = None,
-    json: opt.JsonOption = None,
+    name: str | None = None,
+    settings: list[str] | None = None,
+    plot: Path | None = None,
+    figure: str | None = None,
+    others: list[str] | None = None,
+    normal_force: float | None = None,
+    json: str | None = None,
 ) -> None:
     """List the friction laws, or show one in full.
 
@@ -51,45 +41,58 @@ def laws(
     opt.check_outputs(json, picture=plot)
     if normal_force is not None:
         checks.number("--normal-force", normal_force, unit="N", above=0.0)
-    if figure is not None or others:
-        behaviour(name, settings, figure, others or [], normal_force, plot, json)
-        return
-    every = [name] if name else [*ALL_LAWS, *POPULATIONS]
-    chosen = {text: opt.any_with(text, settings if name else None) for text in every}
-    if settings and not name:
+    if not name and (figure is not None or others):
+        raise ValueError("--figure, --compare: expected the name of a law before it, got none")
+    if not name and settings:
         raise ValueError("--set: expected the name of a law before it, got none")
+    if name and (figure is not None or others):
+        scenario = "profile" if figure is None else figure
+        check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
+        names = [name, *(others or ())]
+        load = NORMAL_FORCE if normal_force is None else normal_force
+        with output.progress(f"{scenario} of {', '.join(names)}"):
+            data = compare(laws_with(names, settings), scenario, load)
+        if plot:
+            data.plot(plot)
+        return output.finish(data.to_dict(), json, partial(show_figure, data), plot)
+    texts = opt.assignments("--set", settings)
+    every = [name] if name else [*ALL_LAWS, *POPULATIONS]
+    chosen = {text: opt.with_settings(any_from_text(text), text, texts) for text in every}
     if plot:
         from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
         draw = plot_laws if name else plot_catalogue
-        load = 1.0 if normal_force is None else normal_force
-        draw(chosen, load, plot)
+        draw(chosen, 1.0 if normal_force is None else normal_force, plot)
     described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
     show = partial(show_law, name, chosen[name]) if name else partial(show_list, chosen)
-    output.finish(described[0] if name else {"laws": described}, json, show, plot)
+    return output.finish(described[0] if name else {"laws": described}, json, show, plot)
 
 
-def behaviour(
-    name: str | None,
-    settings: list[str] | None,
-    figure: str | None,
-    others: list[str],
-    normal_force: float | None,
-    plot: Path | None,
-    json: str | None,
-) -> None:
-    """Compute a figure of one or several laws; write, draw or summarise it."""
-    if not name:
-        raise ValueError("--figure, --compare: expected the name of a law before it, got none")
-    scenario = "profile" if figure is None else figure
-    check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
-    load = NORMAL_FORCE if normal_force is None else normal_force
-    chosen = opt.all_with([name, *others], settings)
-    with output.progress(f"{scenario} of {', '.join([name, *others])}"):
-        data = compare(chosen, scenario, load)
-    if plot:
-        data.plot(plot)
-    output.finish(data.to_dict(), json, partial(show_figure, data), plot)
+def laws_with(texts: Sequence[str], settings: list[str] | None) -> list[AnyLaw]:
+    """Return the laws `texts`, all with the parameters and options of `--set`.
+
+    `LAW.NAME=VALUE` sets the parameter of one law only.
+
+    Raises:
+        ValueError: a name that one of them does not have.
+    """
+    made = {text: any_from_text(text) for text in texts}
+    chosen: dict[str, dict[str, str]] = {text: {} for text in texts}
+    lacking: list[str] = []
+    given = opt.assignments("--set", settings)
+    for name in sorted(given, key=lambda name: "." in name):  # settings of one law come last
+        only, _, own = name.rpartition(".")
+        check_names(f"--set {name}", [only] if only else [], texts)
+        for text in [only] if only else texts:
+            chosen[text][own] = given[name]
+            if not only and own not in {*parameters(made[text]), *options(made[text])}:
+                lacking.append(f"{own}, which {text} does not have")
+    if lacking and len(texts) > 1:
+        raise ValueError(
+            f"--set: expected what {' and '.join(texts)} all have, got {'; '.join(lacking)}; "
+            f"--set {texts[0]}.NAME=VALUE is for one law"
+        )
+    return [opt.with_settings(made[text], text, chosen[text]) for text in texts]
 
 
 def show_figure(data: FigureData) -> None:
@@ -107,17 +110,18 @@ def show_figure(data: FigureData) -> None:
 
 def to_dict(law: AnyLaw) -> dict[str, Any]:
     """Return the content of `--json` for one law."""
+    facts = law.facts
     return {
-        "title": title(law),
+        "title": (getdoc(type(law)) or "").partition("\n")[0].removesuffix("."),
         "phenomena": {code: PHENOMENA[code] for code in phenomena(law)},
         "states": {state.name: state.unit for state in law.states},
-        "smoothness": law.facts.smoothness,
-        "confidence": law.facts.confidence,
-        "checked": law.facts.checked,
-        "source": law.facts.source,
+        "smoothness": facts.smoothness,
+        "confidence": facts.confidence,
+        "checked": facts.checked,
+        "source": facts.source,
         "warnings": list(law.warnings()),
-        "odd": law.facts.odd,
-        "load": law.facts.load,
+        "odd": facts.odd,
+        "load": facts.load,
         "instructions": asdict(cost(law)),
         "inputs": {i.name: {"unit": i.unit, "doc": i.doc} for i in law.inputs},
         "options": {o.name: asdict(o) for o in options(law).values()},
@@ -134,66 +138,47 @@ def costs(law: AnyLaw) -> str:
     return "a step of one contact" if isinstance(law, Population) else "force and rate"
 
 
-def title(law: AnyLaw) -> str:
-    """Return the first line of the docstring."""
-    return (getdoc(type(law)) or "").partition("\n")[0].removesuffix(".")
+LEGEND = """
+shows:
+{codes}
+z: number of states, then smoothness (set: set-valued)
+value, slope: CasADi instructions for force and rate, and for their derivatives
+formula: verification of the formula; unverified: written from memory
+symfric laws NAME shows equation, parameters and more;
+symfric laws NAME --figure draws {figures}.
+Other names: {others}.
+Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre),
+lagged(stribeck), temperature_dependent(lugre)."""
 
 
 def show_list(chosen: dict[str, AnyLaw]) -> None:
     """Print all laws, one per line, and the meaning of the codes."""
-    output.show_table(
-        ["law", "shows", "z", "value", "slope", "formula"],
-        [
-            (
-                name,
-                " ".join(phenomena(law)),
-                f"{len(law.states)} {law.facts.smoothness.split()[0].removesuffix('-valued')}",
-                cost(law).value,
-                cost(law).gradient,
-                law.facts.confidence,
-            )
-            for name, law in chosen.items()
-        ],
-    )
+    rows: list[tuple[str | float, ...]] = []
+    for name, law in chosen.items():
+        states = f"{len(law.states)} {law.facts.smoothness.split()[0].removesuffix('-valued')}"
+        spent = cost(law).value, cost(law).gradient
+        rows.append((name, " ".join(phenomena(law)), states, *spent, law.facts.confidence))
+    output.show_table(["law", "shows", "z", "value", "slope", "formula"], rows)
     codes = "\n".join(f"  {code:<3} {meaning}" for code, meaning in PHENOMENA.items())
     others = ", ".join(f"{alias} = {name}" for alias, name in ALIASES.items())
-    output.show(
-        f"\nshows:\n{codes}\n"
-        "z: number of states, then smoothness (set: set-valued)\n"
-        "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
-        "formula: verification of the formula; unverified: written from memory\n"
-        "symfric laws NAME shows equation, parameters and more;\n"
-        f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
-        f"Other names: {others}.\n"
-        "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre),\n"
-        "lagged(stribeck), temperature_dependent(lugre)."
-    )
+    output.show(LEGEND.format(codes=codes, figures=", ".join(FIGURES), others=others))
 
 
 def show_law(name: str, law: AnyLaw) -> None:
     """Print docstring, properties and parameters of one law."""
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
-    shown = ", ".join(PHENOMENA[code] for code in phenomena(law))
     output.show(
-        f"{name} shows {shown}.\n"
+        f"{name} shows {', '.join(PHENOMENA[code] for code in phenomena(law))}.\n"
         f"Smoothness: {law.facts.smoothness}.\nFormula: {law.facts.formula}.\n"
         f"Cost: {cost(law).value} CasADi instructions for {costs(law)}, "
         f"{cost(law).gradient} for their derivatives.\n"
     )
     for warning in law.warnings():
         output.show(f"Warning: {warning}.\n")
-    if law.inputs:
-        output.show_table(
-            ["input", "unit", "meaning"], [(i.name, i.unit, i.doc) for i in law.inputs]
-        )
-        output.show()
-    if options(law):
-        output.show_table(
-            ["option", "value", "choices", "meaning"],
-            [(o.name, o.value, ", ".join(o.choices), o.doc) for o in options(law).values()],
-        )
-        output.show()
+    choices = [(o.name, o.value, ", ".join(o.choices), o.doc) for o in options(law).values()]
+    output.show_part(["input", "unit", "meaning"], [(i.name, i.unit, i.doc) for i in law.inputs])
+    output.show_part(["option", "value", "choices", "meaning"], choices)
     output.show_table(
         ["parameter", "value", "unit", "lower", "upper", "meaning"],
         [

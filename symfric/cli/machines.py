@@ -1,16 +1,15 @@
 """Scenes from command line options: laws, preset, parameters, inputs and start values."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, final
+from typing import NamedTuple
 
 import numpy as np
 
 from symfric import Law, Linear, law_from_text, parameters, rate_of, with_values
-from symfric.cli import completions
-from symfric.cli.options import argument, assignments, numbers, option
+from symfric.cli.options import assignments, numbers
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.foundation.tables import Column, read_table
@@ -18,37 +17,6 @@ from symfric.integrator import Input
 from symfric.integrator.equations.inputs import Sampled
 from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Scene
-
-SceneArgument = Annotated[
-    str,
-    argument(
-        "SCENE", f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.", completions.scenes
-    ),
-]
-LawsOption = Annotated[
-    list[str],
-    option(
-        "--law NAME[,NAME]",
-        "Friction law; several, separated by commas or repeated, are compared.",
-        completions.each_law,
-    ),
-]
-PresetOption = Annotated[
-    str | None,
-    option(
-        "--preset NAME",
-        "Parameters of a paper; `symfric scenes SCENE` lists the presets.",
-        completions.presets,
-    ),
-]
-LawOfOption = Annotated[
-    list[str] | None,
-    option(
-        "--law-of PLACE=LAW",
-        "Law at another place of the scene or joint of a robot, as hinge=coulomb.",
-        completions.places,
-    ),
-]
 
 
 def kind_of(
@@ -87,7 +55,7 @@ def kind_of(
 def scenes_with(
     scene: str,
     laws: Sequence[str],
-    settings: Mapping[str, str | float],
+    settings: Sequence[str] | None,
     preset: str | None = None,
     law_of: Sequence[str] | None = None,
 ) -> dict[str, Scene]:
@@ -96,7 +64,7 @@ def scenes_with(
     Args:
         scene: name, or FILE.urdf.
         laws: texts of --law.
-        settings: values of --set: parameters of scene and laws, forms of laws, structure of the
+        settings: texts of --set: parameters of scene and laws, forms of laws, structure of the
             scene; they override a preset.
         preset: value of --preset.
         law_of: texts of --law-of.
@@ -104,36 +72,41 @@ def scenes_with(
     Raises:
         ValueError: unknown law, a parameter that none of the scenes has; see also `kind_of`.
     """
-    kind = kind_of(scene, preset=preset, law_of=law_of)
-    made = {text: law_from_text(text) for text in laws}
-    machines = {text: formed(kind(law), settings) for text, law in made.items()}
-    known = {text: parameters(machine) for text, machine in machines.items()}
-    made_of = {text: forms(machine) for text, machine in machines.items()}
-    every = {n: None for group in (known, made_of) for names in group.values() for n in names}
-    check_names(f"--set of {scene}", settings, every)
-    values = {
-        name: _number(name, text)
-        for name, text in settings.items()
-        if any(name in names for names in known.values())
-    }
+    kind, texts = kind_of(scene, preset=preset, law_of=law_of), assignments("--set", settings)
+    machines = {law: formed(kind(law_from_text(law)), texts) for law in laws}
+    known = {law: parameters(machine) for law, machine in machines.items()}
+    groups = (*known.values(), *map(forms, machines.values()))
+    check_names(f"--set of {scene}", texts, dict.fromkeys(n for names in groups for n in names))
+    numeric = {n: text for n, text in texts.items() if any(n in names for names in known.values())}
+    values = numbers("--set", numeric)
     return {
-        text: with_values(machine, {n: v for n, v in values.items() if n in known[text]})
-        for text, machine in machines.items()
+        law: with_values(machine, {n: v for n, v in values.items() if n in known[law]})
+        for law, machine in machines.items()
     }
 
 
-def formed(machine: Scene, settings: Mapping[str, str | float]) -> Scene:
-    """Return the scene with the forms and the structure in `settings`.
+def formed(machine: Scene, texts: Mapping[str, str]) -> Scene:
+    """Return the scene with the forms and the structure in `texts`.
 
     Raises:
         ValueError: a text that is not one of the choices, a count, or true or false.
     """
-    law = {n: str(text) for n, text in settings.items() if n in options(machine.law)}
+    law = {n: text for n, text in texts.items() if n in options(machine.law)}
     if law:
         machine = replace(machine, law=replace(machine.law, **law))
-    own = {n: settings[n] for n in (*options(machine), *machine.structures()) if n in settings}
-    chosen = {name: _chosen(name, text, getattr(machine, name)) for name, text in own.items()}
-    return replace(machine, **chosen) if chosen else machine
+    own: dict[str, str | bool | int] = {n: texts[n] for n in options(machine) if n in texts}
+    for name in machine.structures():
+        if name in texts:
+            own[name] = _structure(f"--set {name}", texts[name], getattr(machine, name))
+    return replace(machine, **own) if own else machine
+
+
+def _structure(where: str, text: str, like: bool | int) -> bool | int:
+    """Convert a text to the type of `like`."""
+    if isinstance(like, bool):
+        return checks.choice(where, text, ("true", "false")) == "true"
+    number = checks.parsed(where, text)
+    return int(number) if number.is_integer() else checks.count(where, number)
 
 
 def forms(machine: Scene) -> list[str]:
@@ -141,23 +114,7 @@ def forms(machine: Scene) -> list[str]:
     return [*options(machine.law), *options(machine), *machine.structures()]
 
 
-def _number(name: str, given: str | float) -> float:
-    return checks.parsed(f"--set {name}", given) if isinstance(given, str) else given
-
-
-def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool | int:
-    """Convert a text to the type of `like`."""
-    if isinstance(like, str):
-        return str(text)
-    if isinstance(like, bool):
-        return checks.choice(f"--set {name}", text, ("true", "false")) == "true"
-    number = _number(name, text)
-    return int(number) if number.is_integer() else checks.count(f"--set {name}", number)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Driven:
+class Driven(NamedTuple):
     """Inputs, start values and end time of a run.
 
     Attributes:
@@ -176,9 +133,9 @@ class Driven:
 def driven(
     scene: Scene,
     model: Model,
-    texts: Sequence[str] | None,
-    x0: Sequence[str] | None,
-    t_end: float | None,
+    texts: Sequence[str] | None = None,
+    x0: Sequence[str] | None = None,
+    t_end: float | None = None,
 ) -> Driven:
     """Convert the texts of --input, --x0 and --t-end for a scene.
 
@@ -196,14 +153,15 @@ def driven(
     signals: dict[str, Input] = {}
     written, start = dict(given), dict[str, float]()
     for name, text in given.items():
-        signal = input_from_text(name, text, units[name])
-        if name not in rates:
+        signal, rate = input_from_text(name, text, units[name]), rates.get(name)
+        if rate is None:
             signals[name] = signal
             continue
-        if rates[name] in given:
-            raise ValueError(f"--input: expected {name} or its rate {rates[name]}, got both")
-        signals[rates[name]] = rate_of(signal)
-        start[name] = float(np.asarray(signal.values)[0] if isinstance(signal, Linear) else signal)  # type: ignore[arg-type]
+        if rate in given:
+            raise ValueError(f"--input: expected {name} or its rate {rate}, got both")
+        signals[rate] = rate_of(signal)
+        first = signal.values if isinstance(signal, Linear) else signal
+        start[name] = float(np.ravel(first)[0])
     for name, own in scene.inputs.items():
         if name not in signals:
             signals[name], written[name] = own.function, own.text
@@ -213,7 +171,10 @@ def driven(
 
 
 def input_from_text(name: str, text: str, unit: str) -> Linear | float:
-    """Return the input `2.0`, or `FILE.csv:COLUMN` interpolated linearly over time.
+    """Return the input `2.0`, or `FILE.csv:COLUMN` interpolated linearly over its column t.
+
+    Units in the header are converted to SI, as in `symfric identify`; columns without a unit are in
+    SI.
 
     Args:
         name: name of the input.
@@ -221,40 +182,26 @@ def input_from_text(name: str, text: str, unit: str) -> Linear | float:
         unit: SI unit of the input.
 
     Raises:
-        ValueError: neither a finite number nor a column of a readable file.
+        ValueError: neither a finite number nor a column of a readable file; a missing or repeated
+            column, an incompatible unit, a row without numbers, or times that do not increase.
+        OSError: the file cannot be read.
     """
     try:
         value = float(text)
     except ValueError:
-        file, colon, column = text.rpartition(":")
-        if not colon or not file or not column:
+        file, _, column = text.rpartition(":")
+        if not file or not column:
             raise ValueError(
                 f"--input {name}: expected a number or FILE.csv:COLUMN, got '{text}'"
             ) from None
-        return read_column(Path(file), column, unit)
-    return checks.number(f"--input {name}", value)
-
-
-def read_column(path: Path, column: str, unit: str) -> Linear:
-    """Read the samples of `column` over the column t of a CSV file.
-
-    Units in the header are converted to SI, as in `symfric identify`; columns without a unit are in
-    SI.
-
-    Raises:
-        ValueError: missing or repeated column, no column t, incompatible unit, a row without
-            numbers, or times that do not increase.
-        OSError: the file cannot be read.
-    """
+    else:
+        return checks.number(f"--input {name}", value)
     names = (column, column.partition("[")[0].strip())
+    wanted = {"t": (("t", "time", "Time"), "s"), column: (names, unit)}
     table = read_table(
-        path,
-        {
-            "t": Column(("t", "time", "Time"), "s", assumed=True),
-            column: Column(names, unit, assumed=True),
-        },
-    )
+        Path(file), {n: Column(*of, assumed=True) for n, of in wanted.items()}
+    ).columns
     try:
-        return Linear(table.columns["t"], table.columns[column])
+        return Linear(table["t"], table[column])
     except ValueError as error:
-        raise ValueError(f"read '{path.name}': {error}") from None
+        raise ValueError(f"read '{Path(file).name}': {error}") from None

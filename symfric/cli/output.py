@@ -4,7 +4,6 @@ import json
 import math
 import os
 import sys
-import textwrap
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,8 +38,7 @@ def show_table(
     Cells and column titles wrap at the width of the terminal, or at COLUMNS if that is set. In
     files and pipes, every row is one line.
     """
-    rows = [list(row) for row in rows]
-    console = Console(highlight=False)
+    rows, console = [list(row) for row in rows], Console(highlight=False)
     if not (console.is_terminal or "COLUMNS" in os.environ):
         console.width = UNLIMITED
     table = Table(
@@ -54,14 +52,22 @@ def show_table(
     widths = column_widths([columns, *texts], console.width)
     for index, (name, width) in enumerate(zip(columns, widths, strict=True)):
         numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
-        table.add_column(
-            Text(name), justify="right" if numeric else "left", width=width, overflow="fold"
-        )
+        side = "right" if numeric else "left"
+        table.add_column(Text(name), justify=side, width=width, overflow="fold")
     for row in texts:
         table.add_row(*map(Text, row))
     with console.capture() as drawn:
         console.print(table)
     typer.echo("\n".join(line.rstrip() for line in drawn.get().splitlines()))
+
+
+def show_part(
+    columns: Sequence[str], rows: Sequence[Sequence[str | float]], digits: int = 6
+) -> None:
+    """Print a table and an empty line; nothing if there are no rows."""
+    if rows:
+        show_table(columns, rows, digits=digits)
+        show()
 
 
 def column_widths(rows: Sequence[Sequence[str]], total: int) -> list[int]:
@@ -90,7 +96,7 @@ def show_doc(text: str) -> None:
     paragraph: list[str] = []
     for line in [*text.splitlines(), ""]:
         kept = not line or line.startswith(" ")
-        if paragraph and (kept or line.startswith(("Defaults:", "Limits:", "Source:"))):
+        if paragraph and (kept or line.startswith(("Defaults:", "Limits:", "Source:", "Checked:"))):
             show(" ".join(paragraph))
             paragraph = []
         if kept:
@@ -100,30 +106,16 @@ def show_doc(text: str) -> None:
 
 
 @contextmanager
-def progress(text: str) -> Generator[Callable[[float], None]]:
-    """Show a progress bar on a terminal; yield a function that takes the fraction done."""
+def progress(text: str) -> Generator[Callable[..., None]]:
+    """Show a progress bar on a terminal; yield a function whose last argument is the fraction."""
     if not sys.stderr.isatty():
-        yield lambda fraction: None
+        yield lambda *of: None
         return
     from rich.progress import Progress  # noqa: PLC0415  (for terminals only)
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=1.0)
-
-        def tell(fraction: float) -> None:
-            bar.update(task, completed=fraction)
-
-        yield tell
-
-
-def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
-    """Return `tell` as a function of an item name, which is ignored, and the fraction done."""
-
-    def advance(name: str, fraction: float) -> None:
-        del name
-        tell(fraction)
-
-    return advance
+        yield lambda *of: bar.update(task, completed=of[-1])
 
 
 def note(text: str) -> None:
@@ -162,36 +154,10 @@ def say_written(*paths: str | Path | None) -> None:
         note(f"wrote {', '.join(names)}")
 
 
-def say_folder(folder: Path, paths: Sequence[Path]) -> None:
-    """Print the names of the files written into a folder on standard error, in wrapped lines."""
-    names = "  ".join(str(path.relative_to(folder)) for path in paths)
-    note(f"wrote {len(paths)} files into {folder}:")
-    note(
-        textwrap.fill(
-            names,
-            78,
-            initial_indent="  ",
-            subsequent_indent="  ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-    )
-
-
 def plain(value: Any) -> Any:
     """Return `value` as JSON data; infinity and NaN become None."""
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
-
-
-def printable(text: str) -> str:
-    """Return `text` from the command line as valid UTF-8.
-
-    In the C locale, Python keeps undecodable bytes as lone surrogates.
-    """
-    return os.fsencode(text).decode("utf-8", errors="replace")
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,71 +1,51 @@
 """`symfric run` and `symfric report`: simulate a scene with one friction law or several."""
 
+import os
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
 from symfric import Law, SolveError, Trajectory, parameters, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.machines import (
-    LawOfOption,
-    LawsOption,
-    PresetOption,
-    SceneArgument,
-    driven,
-    kind_of,
-    scenes_with,
-)
-from symfric.cli.options import option
+from symfric.cli.machines import Driven, driven, scenes_with
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
+from symfric.scenes import ALL_SCENES as ALL_SCENES  # for options.toml
 from symfric.scenes import MECHANISMS, Scene
+
+Strings = list[str] | None
 
 
 def run(
-    scene: SceneArgument,
-    law: LawsOption,
-    settings: opt.SetOption = None,
-    preset: PresetOption = None,
-    law_of: LawOfOption = None,
-    inputs: opt.InputOption = None,
-    x0: opt.StartOption = None,
-    t_end: opt.EndOption = None,
-    rtol: opt.RtolOption = 1e-6,
-    method: Annotated[
-        str, option("--method NAME", "Method: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
-    ] = "auto",
-    backend: Annotated[
-        str, option("--backend auto|vm|compiled", "Compiled C, or CasADi's virtual machine.")
-    ] = "auto",
-    peer: Annotated[
-        str | None,
-        option("--peer sundials|rosenbrock|ggl", "Use an integrator of CasADi, for comparison."),
-    ] = None,
-    max_step: Annotated[
-        float | None, option("--max-step SECONDS", "Longest step [s]; default: no limit.")
-    ] = None,
-    times: Annotated[
-        str | None, option("--times T1,T2,...", "Times [s] at which a step must end.")
-    ] = None,
-    samples: Annotated[int, option("--samples N", "Number of equally spaced output times.")] = 2001,
-    csv: Annotated[Path | None, option("--csv --out FILE.csv", "Write the signals.")] = None,
-    plot: opt.PlotOption = None,
-    panels: Annotated[
-        str,
-        option("--panels main|all", "Panels of --plot; main: positions, friction, energy, power."),
-    ] = "main",
-    movie: Annotated[
-        Path | None, option("--animate FILE.gif", "Write an animation: .gif, .html, .mp4.")
-    ] = None,
-    json: opt.JsonOption = None,
+    scene: str,
+    law: list[str],
+    settings: Strings = None,
+    preset: str | None = None,
+    law_of: Strings = None,
+    inputs: Strings = None,
+    x0: Strings = None,
+    t_end: float | None = None,
+    rtol: float = 1e-6,
+    method: str = "auto",
+    backend: str = "auto",
+    peer: str | None = None,
+    max_step: float | None = None,
+    times: str | None = None,
+    samples: int = 2001,
+    csv: Path | None = None,
+    plot: Path | None = None,
+    panels: str = "main",
+    movie: Path | None = None,
+    json: str | None = None,
 ) -> None:
     """Simulate SCENE with a friction law.
 
@@ -79,8 +59,6 @@ def run(
 
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --csv arm.csv
     """
-    kind_of(scene, preset=preset, law_of=law_of)
-    how: Any = {"max_step": max_step, "times": opt.seconds("--times", times)}
     if peer is not None and (method, backend, max_step, times) != ("auto", "auto", None, None):
         raise ValueError(
             "--peer: expected no --method, --backend, --max-step or --times, got one of them"
@@ -93,47 +71,107 @@ def run(
         )
     opt.check_outputs(csv, json, movie, picture=plot)
     checks.choice("--panels", panels, ("main", "all"))
-    machines = scenes_with(scene, laws, opt.assignments("--set", settings), preset, law_of)
-    models = {name: machine.model() for name, machine in machines.items()}
+    ends = [] if times is None else times.split(",")
+    stops = [checks.parsed("--times", end.strip()) for end in ends]
+    machines, models, given = prepared(scene, laws, settings, preset, law_of, inputs, x0, t_end)
     check_movie(movie, scene, models[laws[0]])
-    machine = next(iter(machines.values()))
-    given = driven(machine, models[laws[0]], inputs, x0, t_end)
-    until = given.until
-    found: dict[str, Trajectory] = {}
     common: Any = {"x0": given.start, "u": given.signals, "rtol": rtol, "samples": samples}
-    common |= {"throw": False}
-    for name, model in models.items():
-        with output.progress(f"{scene} with {name}") as tell:
-            if peer is None:
-                how |= {"method": method, "backend": backend, "progress": tell}
-                found[name] = simulate(model, until, **common, **how)
-            else:
-                found[name] = simulate_by_peer(model, until, peer, **common)
+
+    def integrate(model: Model, tell: Callable[[float], None]) -> Trajectory:
+        if peer is not None:
+            return simulate_by_peer(model, given.until, peer, **common, throw=False)
+        return simulate(
+            model, given.until, **common, method=method, backend=backend, max_step=max_step,
+            times=stops, throw=False, progress=tell,
+        )  # fmt: skip
+
+    found = simulated(scene, models, integrate)
+    first = found[laws[0]]
     if csv:
-        next(iter(found.values())).to_csv(csv)
+        first.to_csv(csv)
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
         plot_trajectories(found, path=plot, panels=panels)
     if movie:
         with output.progress(f"{movie}") as tell:
-            next(iter(found.values())).animate(movie, progress=tell)
-    for name, trajectory in found.items():
-        output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": given.texts}, json)
-        if json != "-":
-            show_trajectory(name, trajectory)
-            show_warnings(name, machines[name])
-    output.say_written(csv, plot, movie, json)
-    refuse_failed(found)
+            first.animate(movie, progress=tell)
+    content = to_dict(laws[0], machines[laws[0]], first) if json else {}
+    show = partial(show_runs, found, machines)
+    output.finish(content | {"inputs": given.texts}, json, show, csv, plot, movie)
+    refuse_failed(found.values())
 
 
-def refuse_failed(found: Mapping[str, Trajectory]) -> None:
+def report(
+    scene: str,
+    law: list[str],
+    html: Path = Path("report.html"),
+    settings: Strings = None,
+    preset: str | None = None,
+    law_of: Strings = None,
+    inputs: Strings = None,
+    x0: Strings = None,
+    t_end: float | None = None,
+    rtol: float = 1e-6,
+) -> None:
+    """Simulate SCENE and write a report of signals, friction, errors and laws.
+
+    The error of every run is measured with another method at a hundredth of the tolerance. The HTML
+    page is self-contained and includes the laws with their limits and the command.
+
+    Example: symfric report rabinowicz --law lugre --law brown_mcphee --html report.html
+    """
+    from symfric.results.report import report as write_report  # noqa: PLC0415  (not for `run`)
+
+    opt.check_outputs(html)
+    laws = opt.law_names(law)
+    machines, models, given = prepared(scene, laws, settings, preset, law_of, inputs, x0, t_end)
+    found = simulated(
+        scene,
+        models,
+        lambda model, tell: simulate(
+            model, given.until, x0=given.start, u=given.signals, rtol=rtol, measure_error=True,
+            throw=False, progress=tell,
+        ),
+    )  # fmt: skip
+    # in the C locale, Python keeps bytes that it cannot decode as lone surrogates
+    command = os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")
+    values = {name: parameters(machine) for name, machine in machines.items()}
+    write_report(found, html, settings=values, command=command)
+    output.say_written(html)
+    refuse_failed(found.values())
+
+
+def prepared(
+    scene: str, laws: list[str], settings: Strings, preset: str | None, law_of: Strings,
+    inputs: Strings, x0: Strings, t_end: float | None,
+) -> tuple[dict[str, Scene], dict[str, Model], Driven]:  # fmt: skip
+    """Return scene and model with each law, and inputs, start values and end of the runs."""
+    machines = scenes_with(scene, laws, settings, preset, law_of)
+    models = {name: machine.model() for name, machine in machines.items()}
+    return machines, models, driven(machines[laws[0]], models[laws[0]], inputs, x0, t_end)
+
+
+def simulated(
+    scene: str,
+    models: Mapping[str, Model],
+    integrate: Callable[[Model, Callable[[float], None]], Trajectory],
+) -> dict[str, Trajectory]:
+    """Simulate the models of a scene, by name of the law; `integrate` reports its progress."""
+    found: dict[str, Trajectory] = {}
+    for name, model in models.items():
+        with output.progress(f"{scene} with {name}") as tell:
+            found[name] = integrate(model, tell)
+    return found
+
+
+def refuse_failed(runs: Iterable[Trajectory]) -> None:
     """Raise an error for the first run that did not reach its end.
 
     Raises:
         SolveError: message and partial result of that run.
     """
-    for run in found.values():
+    for run in runs:
         if not run.status.ok:
             raise SolveError(run.message, run.status, run)
 
@@ -158,11 +196,7 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     """Return the content of `--json`."""
-    books: dict[str, Any] = {}
-    if is_mechanism(trajectory.model):
-        books["energy_balance"] = trajectory.energy_balance().to_dict()
-        books["constraints"] = largest_norms(trajectory)
-    return {
+    found = {
         "scene": trajectory.scene,
         "law": law,
         "parameters": {name: p.value for name, p in parameters(scene).items()},
@@ -172,7 +206,11 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
         "t_end": float(trajectory.t[-1]),
         "final": trajectory.final,
         "extremes": trajectory.extremes,
-    } | books
+    }
+    if is_mechanism(trajectory.model):
+        found["energy_balance"] = trajectory.energy_balance().to_dict()
+        found["constraints"] = largest_norms(trajectory)
+    return found
 
 
 def largest_norms(trajectory: Trajectory) -> dict[str, float]:
@@ -180,19 +218,23 @@ def largest_norms(trajectory: Trajectory) -> dict[str, float]:
     return {name: float(trajectory[name].max()) for name in norms(trajectory.model)}
 
 
-def show_warnings(law: str, scene: Scene) -> None:
-    """Print warnings about changed parameters of the laws; `symfric laws` warns of defaults."""
-    held = (getattr(scene, item.name) for item in fields(scene))
-    for value in held:
-        chosen = isinstance(value, Law) and any(
-            p.value != p.default for p in parameters(value).values()
-        )
-        for warning in value.warnings() if chosen else ():
-            output.show(f"Warning: {law}: {warning}.\n")
-
-
 TABLE = ("position", "rate", "normal force", "friction", "energy")
 """Types of signals that the table of a mechanism shows; --csv and --json contain all."""
+
+
+def show_runs(found: Mapping[str, Trajectory], machines: Mapping[str, Scene]) -> None:
+    """Print the runs, and warnings about changed parameters of their laws.
+
+    `symfric laws` warns of defaults.
+    """
+    for name, trajectory in found.items():
+        show_trajectory(name, trajectory)
+        for held in (getattr(machines[name], item.name) for item in fields(machines[name])):
+            if isinstance(held, Law) and any(
+                p.value != p.default for p in parameters(held).values()
+            ):
+                for warning in held.warnings():
+                    output.show(f"Warning: {name}: {warning}.\n")
 
 
 def show_trajectory(law: str, trajectory: Trajectory) -> None:
@@ -227,12 +269,12 @@ def show_trajectory(law: str, trajectory: Trajectory) -> None:
 
 def show_books(trajectory: Trajectory) -> None:
     """Print the largest constraint violations and the energy balance."""
-    levels = largest_norms(trajectory)
+    levels = {
+        name.removeprefix("constraint_"): f"{x:.1e} {trajectory.units[name]}".rstrip()
+        for name, x in largest_norms(trajectory).items()
+    }
     if levels:
-        text = ", ".join(
-            f"{name.removeprefix('constraint_')} {x:.1e} {trajectory.units[name]}".rstrip()
-            for name, x in levels.items()
-        )
+        text = ", ".join(f"{name} {x}" for name, x in levels.items())
         output.show(f"Largest constraint violations: {text}")
     balance = trajectory.energy_balance()
     work = "".join(f", {name} {w[-1]:+.6g} J" for name, w in balance.work.items() if w.any())
@@ -241,49 +283,3 @@ def show_books(trajectory: Trajectory) -> None:
         f"unexplained at most {np.abs(balance.defect).max():.1e} J "
         f"({balance.relative:.1e} of the energy exchanged)"
     )
-
-
-def report(
-    scene: SceneArgument,
-    law: LawsOption,
-    html: Annotated[Path, option("--html --out FILE.html", "HTML page to write.")] = Path(
-        "report.html"
-    ),
-    settings: opt.SetOption = None,
-    preset: PresetOption = None,
-    law_of: LawOfOption = None,
-    inputs: opt.InputOption = None,
-    x0: opt.StartOption = None,
-    t_end: opt.EndOption = None,
-    rtol: opt.RtolOption = 1e-6,
-) -> None:
-    """Simulate SCENE and write a report of signals, friction, errors and laws.
-
-    The error of every run is measured with another method at a hundredth of the tolerance. The HTML
-    page is self-contained and includes the laws with their limits and the command.
-
-    Example: symfric report rabinowicz --law lugre --law brown_mcphee --html report.html
-    """
-    from symfric.results.report import report as write_report  # noqa: PLC0415  (not for `run`)
-
-    opt.check_outputs(html)
-    laws = opt.law_names(law)
-    machines = scenes_with(scene, laws, opt.assignments("--set", settings), preset, law_of)
-    models = {name: machine.model() for name, machine in machines.items()}
-    machine = next(iter(machines.values()))
-    given = driven(machine, models[laws[0]], inputs, x0, t_end)
-    how: Any = {"x0": given.start, "u": given.signals, "rtol": rtol, "samples": 2001}
-    found: dict[str, Trajectory] = {}
-    for name, model in models.items():
-        with output.progress(f"{scene} with {name}") as tell:
-            found[name] = simulate(
-                model, given.until, **how, throw=False, measure_error=True, progress=tell
-            )
-    write_report(
-        found,
-        html,
-        settings={name: parameters(machine) for name, machine in machines.items()},
-        command=output.printable(shlex.join(["symfric", *sys.argv[1:]])),
-    )
-    output.say_written(html)
-    refuse_failed(found)

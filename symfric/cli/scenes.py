@@ -4,15 +4,15 @@ from dataclasses import fields
 from functools import partial
 from inspect import getdoc
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from symfric import Law, SolveError, Trajectory, Viscous, parameters, simulate
-from symfric.cli import completions, output
+from symfric import Law, Viscous, parameters, simulate
 from symfric.cli import options as opt
-from symfric.cli.machines import LawOfOption, PresetOption, driven, scenes_with
-from symfric.cli.options import argument, option
+from symfric.cli import output
+from symfric.cli.machines import driven, scenes_with
+from symfric.cli.run import refuse_failed, simulated
 from symfric.foundation.numeric import is_number
-from symfric.foundation.parameters import Parameter, Variable, options
+from symfric.foundation.parameters import Variable, options
 from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Scene
 
@@ -21,27 +21,13 @@ LAW = "brown_mcphee"
 
 
 def scenes(
-    name: Annotated[
-        str | None,
-        argument(
-            "NAME|FILE.urdf",
-            "One scene, such as drive, or a robot's FILE.urdf.",
-            completions.scenes,
-        ),
-    ] = None,
-    law: Annotated[
-        str | None,
-        option(
-            "--law NAME",
-            f"Include parameters and states of this law; default for pictures: {LAW}.",
-            completions.laws,
-        ),
-    ] = None,
-    settings: opt.SetOption = None,
-    preset: PresetOption = None,
-    law_of: LawOfOption = None,
-    plot: opt.PlotOption = None,
-    json: opt.JsonOption = None,
+    name: str | None = None,
+    law: str | None = None,
+    settings: list[str] | None = None,
+    preset: str | None = None,
+    law_of: list[str] | None = None,
+    plot: Path | None = None,
+    json: str | None = None,
 ) -> None:
     """List the scenes, or show one in full.
 
@@ -54,40 +40,30 @@ def scenes(
     """
     opt.check_outputs(json, picture=plot)
     if name is None:
-        check_alone(law, settings, preset, law_of, plot)
-        every = {scene: kind(Viscous()) for scene, kind in ALL_SCENES.items()}
-        rows = [summary(scene, machine) for scene, machine in every.items()]
+        if any((law, settings, preset, law_of, plot)):
+            raise ValueError(
+                "--law, --set, --preset, --law-of, --plot: expected the name of a scene before "
+                "them, got none"
+            )
+        rows = [summary(scene, kind(Viscous())) for scene, kind in ALL_SCENES.items()]
         return output.finish({"scenes": rows}, json, partial(show_list, rows))
     text = LAW if law is None else law
-    machine = scenes_with(name, [text], opt.assignments("--set", settings), preset, law_of)[text]
+    machine = scenes_with(name, [text], settings, preset, law_of)[text]
     model = machine.model()
-    found = to_dict(name, machine, model, text if law else None)
+    found = to_dict(name, machine, model, law)
     if plot:
-        draw(name, text, machine, model, plot)
+        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+
+        given = driven(machine, model)
+        how: dict[str, Any] = {"x0": given.start, "u": given.signals, "throw": False}
+        run = simulated(
+            name,
+            {text: model},
+            lambda model, tell: simulate(model, given.until, progress=tell, **how),
+        )
+        plot_trajectories(run, path=plot)
+        refuse_failed(run.values())
     return output.finish(found, json, partial(show_scene, found), plot)
-
-
-def check_alone(*given: object) -> None:
-    """Refuse options for a single scene if no scene is named."""
-    if any(given):
-        raise ValueError(
-            "--law, --set, --preset, --law-of, --plot: expected the name of a scene before them, "
-            "got none"
-        )
-
-
-def draw(name: str, law: str, machine: Scene, model: Model, path: Path) -> None:
-    """Draw a run with the default inputs and end time of the scene."""
-    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
-
-    given = driven(machine, model, None, None, None)
-    with output.progress(f"{name} with {law}") as tell:
-        run: Trajectory = simulate(
-            model, given.until, x0=given.start, u=given.signals, throw=False, progress=tell
-        )
-    plot_trajectories({law: run}, path=path)
-    if not run.status.ok:
-        raise SolveError(run.message, run.status, run)
 
 
 def summary(name: str, machine: Scene) -> dict[str, Any]:
@@ -111,9 +87,16 @@ def title(machine: Scene) -> str:
 
 def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[str, Any]:
     """Return the content of `--json`; parameters and states of laws only if `law` is given."""
-    whole = type(machine)(Viscous(), **_without_laws(machine)).model() if law is None else model
-    own = {item.name for item in fields(machine)}
-    known = {n: p for n, p in parameters(machine).items() if law is not None or n in own}
+    values = {item.name: getattr(machine, item.name) for item in fields(machine)}
+    whole = model
+    if law is None:
+        own = {n: value for n, value in values.items() if not isinstance(value, Law)}
+        whole = type(machine)(Viscous(), **own).model()
+    inputs = [
+        _variable(u) | ({"given": machine.inputs[u.name].text} if u.name in machine.inputs else {})
+        for u in model.u
+    ]
+    shown = ("name", "unit", "lower", "upper", "doc")
     return {
         "name": name,
         "title": title(machine),
@@ -122,14 +105,13 @@ def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[st
         "law": law,
         "t_end": machine.t_end,
         "states": [_variable(v) for v in whole.x],
-        "inputs": [
-            {**_variable(u), "given": machine.inputs[u.name].text}
-            if u.name in machine.inputs
-            else _variable(u)
-            for u in model.u
-        ],
+        "inputs": inputs,
         "integrals": dict(machine.integrals),
-        "parameters": [_parameter(p) for p in known.values()],
+        "parameters": [
+            {key: getattr(p, key) for key in shown} | {"value": float(p.value)}
+            for n, p in parameters(machine).items()
+            if law is not None or n in values
+        ],
         "forms": _forms(machine),
         "places": machine.places(),
         "contacts": [c.name for c in model.contacts],
@@ -138,40 +120,31 @@ def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[st
     }
 
 
-def _without_laws(machine: Scene) -> dict[str, Any]:
-    """Return the fields of the scene except its laws."""
-    return {
-        item.name: value
-        for item in fields(machine)
-        if not isinstance(value := getattr(machine, item.name), Law)
-    }
-
-
 def _variable(v: Variable) -> dict[str, Any]:
     start = float(v.start) if is_number(v.start) else None
     return {"name": v.name, "unit": v.unit, "start": start, "doc": v.doc}
 
 
-def _parameter(p: Parameter) -> dict[str, Any]:
-    found = {n: getattr(p, n) for n in ("name", "unit", "lower", "upper", "doc")}
-    return found | {"value": float(p.value)}
-
-
 def _forms(machine: Scene) -> dict[str, dict[str, str]]:
     """Return the names of the scene that `--set` accepts besides parameters."""
-    named = {
+    found = {
         o.name: {"value": o.value, "choices": ", ".join(o.choices), "doc": o.doc}
         for o in options(machine).values()
     }
-    return named | {
-        name: {
-            "value": str(value).lower(),
-            "choices": "true, false" if isinstance(value, bool) else "a count",
-            "doc": doc,
-        }
-        for name, doc in machine.structures().items()
-        for value in [getattr(machine, name)]
-    }
+    for name, doc in machine.structures().items():
+        value = getattr(machine, name)
+        choices = "true, false" if isinstance(value, bool) else "a count"
+        found[name] = {"value": str(value).lower(), "choices": choices, "doc": doc}
+    return found
+
+
+LEGEND = """
+x: states without those of the law; u: inputs; F: contacts with friction; t_end: default end time \
+[s].
+--preset, parameters of papers:
+{papers}
+symfric scenes NAME shows equations, parameters, inputs and more;
+symfric run NAME --law LAW simulates it. Other machines: FILE.urdf of a robot."""
 
 
 def show_list(rows: list[dict[str, Any]]) -> None:
@@ -184,13 +157,22 @@ def show_list(rows: list[dict[str, Any]]) -> None:
         ],
     )
     papers = [f"  {r['name']}: {', '.join(r['presets'])}" for r in rows if r["presets"]]
-    output.show(
-        "\nx: states without those of the law; u: inputs; F: contacts with friction; t_end: "
-        "default end time [s].\n"
-        "--preset, parameters of papers:\n" + "\n".join(papers) + "\n"
-        "symfric scenes NAME shows equations, parameters, inputs and more;\n"
-        "symfric run NAME --law LAW simulates it. Other machines: FILE.urdf of a robot."
-    )
+    output.show(LEGEND.format(papers="\n".join(papers)))
+
+
+TABLES = {
+    "states": {"state": "name", "start": "start", "unit": "unit", "meaning": "doc"},
+    "inputs": {"input": "name", "unit": "unit", "when not given": "start", "meaning": "doc"},
+    "parameters": {
+        "parameter": "name", "value": "value", "unit": "unit", "lower": "lower", "upper": "upper",
+        "meaning": "doc",
+    },
+    "forms": {"--set": "name", "value": "value", "choices": "choices", "meaning": "doc"},
+    "places": {"--law-of": "name", "place": "doc"},
+    "outputs": {"result": "name", "unit": "unit", "meaning": "doc"},
+    "presets": {"--preset": "name", "numbers": "doc", "source": "source"},
+}  # fmt: skip
+"""Tables of a scene: part of the JSON -> column -> key of the entries."""
 
 
 def show_scene(found: dict[str, Any]) -> None:
@@ -200,50 +182,22 @@ def show_scene(found: dict[str, Any]) -> None:
     if found["python"]:
         output.show(f"In Python: from symfric.scenes import {found['python']}")
     output.show()
-    _table(
-        ["state", "start", "unit", "meaning"],
-        [(v["name"], _number(v["start"]), v["unit"], v["doc"]) for v in found["states"]],
-    )
-    _table(
-        ["input", "unit", "when not given", "meaning"],
-        [
-            (v["name"], v["unit"], v.get("given", _number(v["start"])), v["doc"])
-            for v in found["inputs"]
-        ],
-    )
-    for state, rate in found["integrals"].items():
-        output.show(f"--input {state}=FILE.csv:COLUMN gives {rate} as the rate of {state}.\n")
-    _table(
-        ["parameter", "value", "unit", "lower", "upper", "meaning"],
-        [
-            (p["name"], p["value"], p["unit"], p["lower"], p["upper"], p["doc"])
-            for p in found["parameters"]
-        ],
-        output.EXACT,
-    )
-    _table(
-        ["--set", "value", "choices", "meaning"],
-        [(n, f["value"], f["choices"], f["doc"]) for n, f in found["forms"].items()],
-    )
-    _table(["--law-of", "place"], [*found["places"].items()])
-    _table(
-        ["result", "unit", "meaning"],
-        [(name, o["unit"], o["doc"]) for name, o in found["outputs"].items()],
-    )
-    _table(
-        ["--preset", "numbers", "source"],
-        [(name, p["doc"], p["source"]) for name, p in found["presets"].items()],
-    )
+    for part, columns in TABLES.items():
+        entries = found[part]
+        if isinstance(entries, dict):
+            every = [(n, v if isinstance(v, dict) else {"doc": v}) for n, v in entries.items()]
+            entries = [{"name": n, **values} for n, values in every]
+        rows = [[_cell(entry, key) for key in columns.values()] for entry in entries]
+        output.show_part([*columns], rows, output.EXACT if part == "parameters" else 6)
+        for state, rate in found["integrals"].items() if part == "inputs" else ():
+            output.show(f"--input {state}=FILE.csv:COLUMN gives {rate} as the rate of {state}.\n")
     if found["law"] is None:
         output.show("--law NAME shows the parameters of a law in it, too.")
 
 
-def _number(value: float | None) -> str:
+def _cell(entry: dict[str, Any], key: str) -> Any:
+    """Return an entry of a table; start values as texts."""
+    value = entry.get("given", entry[key]) if key == "start" else entry[key]
+    if key != "start" or isinstance(value, str):
+        return value
     return "of the law" if value is None else output.number(value)
-
-
-def _table(columns: list[str], rows: list[Any], digits: int = 6) -> None:
-    """Print a table and an empty line; nothing if there are no rows."""
-    if rows:
-        output.show_table(columns, rows, digits=digits)
-        output.show()

@@ -5,87 +5,64 @@ import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
+from inspect import signature
 from os import cpu_count
 from pathlib import Path
 from textwrap import fill
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
-from symfric.choice import NEEDS, Choice, Friction
+from symfric.choice import NEEDS as NEEDS
+from symfric.choice import Choice, Friction
 from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
-from symfric.choice.text import LEGEND, lines
-from symfric.cli import completions, output
+from symfric.choice.ranking import LEGEND, lines
 from symfric.cli import options as opt
-from symfric.cli.identify import Reading, reading, residuals_of
-from symfric.cli.machines import LawOfOption, PresetOption, formed, kind_of
-from symfric.cli.options import argument, option
+from symfric.cli import output
+from symfric.cli.identify import reader, residuals_of
+from symfric.cli.machines import formed, kind_of
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import ALL_LAWS
 from symfric.scenes import Scene
 
+OFTEN = 10.0
+"""Seconds between progress lines if standard error is not a terminal."""
+OF_FRICTION = ("mu_s", "mu_d", "v_s")
+Strings = list[str] | None
+
 
 def select(
-    scene: Annotated[
-        str,
-        argument(
-            "SCENE",
-            "A scene, FILE.urdf, or FILE.py[:NAME], a function law -> Model.",
-            completions.scenes,
-        ),
-    ],
-    need: Annotated[
-        str, option("--need WORD,...", f"Required: {', '.join(NEEDS)}.", completions.needs)
-    ] = "stiction,stribeck",
-    accuracy: Annotated[
-        float, option("--accuracy NUMBER", "Largest error relative to the motion.")
-    ] = 1e-4,
-    law: Annotated[
-        list[str] | None,
-        option(
-            "--law NAME[,NAME]",
-            "Candidates, with commas or repeated; all laws by default.",
-            completions.each_law,
-        ),
-    ] = None,
-    settings: opt.SetOption = None,
-    preset: PresetOption = None,
-    law_of: LawOfOption = None,
-    t_end: opt.EndOption = None,
-    of: Annotated[
-        str | None, option("--of SIGNAL,...", "Signals to compare; default: positions.")
-    ] = None,
-    control: Annotated[float, option("--control NUMBER", "Largest error of fixed steps.")] = 0.05,
-    fixed_steps: Annotated[
-        bool, option("--fixed-steps/--no-fixed-steps", "Measure fixed steps, too.")
-    ] = True,
-    effort: Annotated[
-        float, option("--effort NUMBER", "Largest cost of a law, relative to the default.")
-    ] = 1.0,
-    workers: opt.WorkersOption = None,
-    data: Annotated[
-        list[str] | None, option("--data FILE", "Fit the candidates to these data first.")
-    ] = None,
-    kind: Annotated[
-        str, option("--kind NAME", "Residuals of --data, see `symfric identify`.")
-    ] = "inverse",
-    columns: opt.ColumnOption = None,
-    units: opt.UnitOption = None,
-    missing: opt.MissingOption = "refuse",
-    resample: opt.ResampleOption = False,
-    normal_force: opt.NormalForceOption = 1.0,
-    paper: Annotated[
-        bool, option("--paper", "Compare with the tables of Jing and Mi; two scenes only.")
-    ] = False,
-    plot: opt.PlotOption = None,
-    html: opt.HtmlOption = None,
-    csv: Annotated[Path | None, option("--csv FILE.csv", "Write the table.")] = None,
-    json: opt.JsonOption = None,
+    scene: str,
+    need: str = "stiction,stribeck",
+    accuracy: float = 1e-4,
+    law: Strings = None,
+    settings: Strings = None,
+    preset: str | None = None,
+    law_of: Strings = None,
+    t_end: float | None = None,
+    of: str | None = None,
+    control: float = 0.05,
+    fixed_steps: bool = True,
+    effort: float = 1.0,
+    workers: int | None = None,
+    data: Strings = None,
+    kind: str = "inverse",
+    columns: Strings = None,
+    units: Strings = None,
+    missing: str = "refuse",
+    resample: bool = False,
+    normal_force: float = 1.0,
+    paper: bool = False,
+    plot: Path | None = None,
+    html: Path | None = None,
+    csv: Path | None = None,
+    json: str | None = None,
 ) -> None:
     """Rank friction laws on a machine and recommend one.
 
@@ -102,22 +79,27 @@ def select(
     """
     opt.check_outputs(html, csv, json, picture=plot)
     if paper:
-        _paper(scene, json, any((law, settings, preset, law_of, plot, html, csv)))
-        return
+        return _paper(scene, json, any((law, settings, preset, law_of, plot, html, csv)))
     words = needed("--need", [word for word in need.split(",") if word])
-    machine, friction, candidates, formed_by_user = _resolved(scene, settings, preset, law_of, law)
+    given = opt.assignments("--set", settings)
+    levels = opt.numbers("--set", {n: given.pop(n) for n in OF_FRICTION if n in given})
+    candidates, formed_by_user = _candidates(opt.law_names(law) if law else [*ALL_LAWS], given)
+    if ".py" in scene:
+        machine: Any = _function_of_file(scene, opt.numbers("--set", given))
+    else:
+        machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     misfits = None
     if data:
-        read = reading(columns, units, None, None, kind == "points", missing, resample)
-        able = {n: c for n, c in candidates.items() if not lacking(words, phenomena(c))}
-        candidates, misfits = fitted(able, read, data, kind, normal_force)
+        records = reader(columns, units, kind, missing, resample)(data)
+        able = [n for n, c in candidates.items() if not lacking(words, phenomena(c))]
+        candidates, misfits = fitted(able, records, residuals_of(kind, None, {}), normal_force)
     with reported(f"select {scene}") as tell, stoppable():
         found = select_law(
             machine,
             {n: (c,) if n in formed_by_user else forms(c) for n, c in candidates.items()},
             needs=words,
             accuracy=accuracy,
-            friction=friction,
+            friction=Friction(**levels) if levels else None,
             misfits=misfits,
             t_end=t_end,
             of=None if of is None else [name.strip() for name in of.split(",")],
@@ -130,11 +112,12 @@ def select(
     for path, write in ((csv, found.to_csv), (plot, found.plot), (html, found.to_html)):
         if path:
             write(path)
-    output.finish(found.to_dict(), json, lambda: show_choice(found), plot, html, csv)
+    output.finish(found.to_dict(), json, partial(show_choice, found), plot, html, csv)
     if found.interrupted:
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)
     if found.best is None:
         raise SolveError(f"select: {found.verdict[0]}", Status.SOLVER_FAILED, found)
+    return None
 
 
 @contextmanager
@@ -149,10 +132,6 @@ def stoppable() -> Generator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-OFTEN = 10.0
-"""Seconds between progress lines if standard error is not a terminal."""
 
 
 @contextmanager
@@ -171,62 +150,41 @@ def reported(text: str) -> Generator[Callable[[str, float], None]]:
         yield say
 
 
-OF_FRICTION = ("mu_s", "mu_d", "v_s")
-
-
-def _resolved(
-    scene: str,
-    settings: list[str] | None,
-    preset: str | None,
-    law_of: list[str] | None,
-    names: list[str] | None,
-) -> tuple[Any, Friction | None, dict[str, Law], set[str]]:
-    """Return machine, friction, candidates with --set applied, and names with a form in --set.
+def _candidates(names: list[str], given: dict[str, str]) -> tuple[dict[str, Law], set[str]]:
+    """Return the laws with their settings, taken out of `given`, and names with a form in --set.
 
     Raises:
-        ValueError: unknown names, parameters or forms.
+        ValueError: an option value that no law has; unknown laws or parameters.
     """
-    given = opt.assignments("--set", settings)
-    friction = _numbers({n: given.pop(n) for n in OF_FRICTION if n in given})
-    texts = opt.law_names(names) if names else list(ALL_LAWS)
-    laws = {text: law_from_text(text) for text in texts}
-    chosen = _formed(laws, given)
+    laws, chosen = {text: law_from_text(text) for text in names}, set[str]()
+    choices: dict[str, dict[str, tuple[str, ...]]] = {}
+    for text, law in laws.items():
+        for option in options(law).values():
+            choices.setdefault(option.name, {})[text] = option.choices
+    for name in [name for name in given if name in choices]:
+        every = dict.fromkeys(c for own in choices[name].values() for c in own)
+        text = checks.choice(f"--set {name}", given.pop(name), list(every))
+        for law, own in choices[name].items():
+            if text in own:
+                laws[law] = replace(laws[law], **{name: text})
+                chosen.add(law)
     for key in [key for key in given if "." in key]:
         of, _, own = key.rpartition(".")
         check_names(f"--set {key}", [of], laws)
         if own in options(laws[of]):
             chosen.add(of)
-        laws[of] = opt.with_settings(laws[of], of, [f"{own}={given.pop(key)}"])
-    if ".py" in scene:
-        machine: Any = opt.function_of_file("select", scene, "machine", _numbers(given))
-    else:
-        machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
-    levels = Friction(**friction) if friction else None
-    return machine, levels, laws, chosen
+        laws[of] = opt.with_settings(laws[of], of, {own: given.pop(key)})
+    return laws, chosen
 
 
-def _formed(laws: dict[str, Law], given: dict[str, str]) -> set[str]:
-    """Remove options of laws from `given` and set them in all laws that have them.
-
-    Returns:
-        Names of these laws.
-
-    Raises:
-        ValueError: an option value that no law has.
-    """
-    chosen: set[str] = set()
-    every = [(n, o) for n, law in laws.items() for o in options(law).values()]
-    for name in [name for name in given if any(o.name == name for _, o in every)]:
-        own = [(law, o) for law, o in every if o.name == name]
-        text = given.pop(name)
-        checks.choice(
-            f"--set {name}", text, list(dict.fromkeys(c for _, o in own for c in o.choices))
-        )
-        for law, o in own:
-            if text in o.choices:
-                laws[law] = replace(laws[law], **{name: text})
-                chosen.add(law)
-    return chosen
+def _function_of_file(text: str, values: dict[str, float]) -> Callable[..., Any]:
+    """Return the callable in FILE.py[:NAME], with the numbers of --set as keyword arguments."""
+    _, found = opt.named_in_file("select", text, "machine", callable)
+    if not callable(found):
+        raise checks.refused(f"select '{text}'", "a function law -> Model, or a scene", found)
+    first, *others = signature(found).parameters or [""]
+    check_names(f"--set of {text}, a function of {first}", values, others)
+    return partial(found, **values) if values else found
 
 
 def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> Any:
@@ -236,10 +194,10 @@ def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> An
     one = kind(law_from_text("coulomb"))
     forms = (*options(one), *one.structures())
     made = {n: text for n, text in texts.items() if n in forms}
-    own = set(parameters(one.law))
-    known = [n for n in parameters(formed(one, made)) if n not in own]
+    of_law = parameters(one.law)
+    known = [n for n in parameters(formed(one, made)) if n not in of_law]
     check_names(f"--set of {scene}", texts, [*known, *forms, *OF_FRICTION])
-    values = _numbers({n: text for n, text in texts.items() if n not in forms})
+    values = opt.numbers("--set", {n: text for n, text in texts.items() if n not in forms})
 
     def machine(law: Law) -> Scene:
         return with_values(formed(kind(law), made), values)
@@ -248,12 +206,8 @@ def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> An
     return machine
 
 
-def _numbers(texts: dict[str, str]) -> dict[str, float]:
-    return {name: checks.parsed(f"--set {name}", text) for name, text in texts.items()}
-
-
 def fitted(
-    laws: dict[str, Law], read: Reading, files: list[str], kind: str, normal_force: float
+    laws: list[str], records: Any, residuals: Any, normal_force: float
 ) -> tuple[dict[str, Law], dict[str, float]]:
     """Return the fitted laws and their relative errors.
 
@@ -264,21 +218,19 @@ def fitted(
     """
     from identification.select import select as rank_fits  # noqa: PLC0415  (only with data)
 
-    chosen = residuals_of(kind, None, {})
-    records = read.read(files)
     with output.progress("fit") as tell:
         ranking = rank_fits(
-            list(laws), records, chosen, folds=0, normal_force=normal_force,
-            progress=lambda _, share: tell(share),
-        )  # fmt: skip
-    found = {r.law: r for r in ranking.rows if r.fit is not None and r.fit.law is not None}
+            laws, records, residuals, folds=0, normal_force=normal_force, progress=tell
+        )
+    found, misfits = dict[str, Law](), dict[str, float]()
     for row in ranking.rows:
-        if row.law not in found:
+        if row.fit is not None and row.fit.law is not None:
+            found[row.law], misfits[row.law] = row.fit.law, row.fitted / 100
+        else:
             output.note(f"{row.law}: {row.sentence}")
     if not found:
         raise ValueError("--data: expected data that some law fits, got none; see above")
-    held = {name: row.fit.law for name, row in found.items() if row.fit and row.fit.law}
-    return held, {name: row.fitted / 100 for name, row in found.items()}
+    return found, misfits
 
 
 def _paper(scene: str, json: str | None, others: bool) -> None:
@@ -293,7 +245,7 @@ def _paper(scene: str, json: str | None, others: bool) -> None:
     if others:
         raise ValueError("--paper: expected no option but --json, got others")
     with output.progress(f"select {scene} --paper") as tell:
-        found = compare_with_paper(scene, progress=lambda _, share: tell(share))
+        found = compare_with_paper(scene, progress=tell)
     output.finish(found.to_dict(), json, lambda: typer.echo("\n".join(found.lines())))
 
 

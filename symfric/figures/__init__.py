@@ -1,4 +1,4 @@
-"""Figures in which papers show what friction laws do: data first, pictures on request."""
+"""Figures of the behaviour of friction laws, as in papers: data, and pictures on request."""
 
 from typing import TYPE_CHECKING
 
@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from symfric.figures.catalogue import figure as figure
     from symfric.figures.data import Curve as Curve
     from symfric.figures.data import FigureData as FigureData
-    from symfric.figures.data import Scales as Scales
     from symfric.figures.data import phenomena as phenomena
-    from symfric.figures.data import scales as scales
+    from symfric.figures.motion import Scales as Scales
+    from symfric.figures.motion import scales as scales
     from symfric.figures.pushing import break_away as break_away
     from symfric.figures.pushing import drift as drift
     from symfric.figures.pushing import push as push

@@ -1,23 +1,12 @@
-"""All figures by name, and several laws under the same excitation."""
+"""Figures by name, and comparisons of several laws under the same excitation."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-from symfric.figures.data import NORMAL_FORCE, Curve, FigureData, Scales, check_any, scales
-from symfric.figures.pushing import break_away, drift, stiction
-from symfric.figures.sliding import (
-    dwell,
-    hysteresis,
-    lag,
-    profile,
-    steady_state,
-    sweep_b,
-    sweep_c,
-    sweep_e,
-    transition,
-    velocity_step,
-)
+from symfric.figures import pushing, sliding  # noqa: F401  # pyright: ignore[reportUnusedImport]  (they fill FIGURES)
+from symfric.figures.data import FIGURES, Curve, FigureData, check_any
+from symfric.figures.motion import NORMAL_FORCE, scales
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, distinct
 from symfric.foundation.status import SolveError
@@ -30,42 +19,15 @@ from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 
 
-class MakeFigure(Protocol):
-    """Function that makes a figure of a law."""
-
-    def __call__(self, law: AnyLaw, N: float = ..., given: Scales | None = None) -> FigureData:
-        """Return the figure of `law` under `N` [N], with its own magnitudes or those `given`."""
-        ...
-
-
-FIGURES: dict[str, MakeFigure] = {
-    "profile": profile,
-    "sweep_b": sweep_b,
-    "sweep_c": sweep_c,
-    "sweep_e": sweep_e,
-    "hysteresis": hysteresis,
-    "lag": lag,
-    "transition": transition,
-    "velocity_step": velocity_step,
-    "stiction": stiction,
-    "dwell": dwell,
-    "drift": drift,
-    "break_away": break_away,
-    "steady_state": steady_state,
-}
-"""Every figure by the name the command line uses."""
-
-
 def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
-    """Return the figure `name` of `law` under the normal force `N` [N], with the excitation of the
-    papers.
+    """Return the figure `name` of `law` under the normal force `N` [N], as in the papers.
 
-    The functions of the same names take more options.
+    The functions of the same names have more options.
 
     Raises:
-        ValueError: unknown name (the closest one is offered), a law that cannot show it, something
-            else than a law and a name.
-        SolveError: a simulation behind it failed.
+        ValueError: unknown name (the closest one is offered), a law that cannot show it, anything
+            but a law and a name.
+        SolveError: a simulation failed.
     """
     if isinstance(law, str) and isinstance(name, Law | Population):
         raise ValueError(
@@ -78,11 +40,11 @@ def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
 
 
 PANELS = 2
-"""Signals of a kind that are drawn at most, of energies the sum; all of them are columns."""
+"""Largest number of drawn signals of a kind, of energies the sum; all signals are columns."""
 
 
 def in_scene(law: AnyLaw, scene: str) -> Trajectory:
-    """Return the run of `scene` with `law`, over the time that shows what it is about.
+    """Return the run of `scene` with `law` over its default time.
 
     Raises:
         ValueError: a population of contacts, a law that the scene refuses.
@@ -100,10 +62,10 @@ def in_scene(law: AnyLaw, scene: str) -> Trajectory:
 
 
 def scene_figure(scene: str, runs: Mapping[str, Trajectory]) -> FigureData:
-    """Return the signals that `runs` (legend entry -> run of `scene`) share.
+    """Return the common signals of `runs` (legend entry -> run of `scene`).
 
-    Columns t [s] and the shared signals; a curve for each run. Drawn are positions, friction and
-    energy or power.
+    Columns t [s] and the common signals; a curve for each run. Positions, friction and energy or
+    power are drawn.
     """
     first = next(iter(runs.values()))
     shared = {n: u for n, u in first.units.items() if all(n in run.units for run in runs.values())}
@@ -134,14 +96,13 @@ def compare(
 
     Args:
         laws: laws or their names, or legend entry -> law.
-        scenario: a figure (profile, hysteresis, lag, ...), or a scene (rabinowicz, drive, ...). All
-            laws get the amplitudes that the figure takes from the first one, so put the law whose
-            scales matter first.
+        scenario: a figure (profile, hysteresis, lag, ...), or a scene (rabinowicz, drive, ...). The
+            first law determines the amplitudes of a figure.
         N: normal force [N] of a figure; a scene has its own.
 
     Returns:
-        One curve per law and case, each under the name of its law. Laws that cannot show it, or
-        whose simulation failed, are left out, and `note` says why.
+        One curve per law and case, each under the name of its law. `note` names the laws that are
+        left out because they cannot show it or their simulation failed.
 
     Raises:
         ValueError: no law, unknown scenario, no law that can show it.
@@ -168,10 +129,10 @@ Result = TypeVar("Result")
 def _able(
     laws: Mapping[str, AnyLaw], make: Callable[[AnyLaw], Result]
 ) -> tuple[dict[str, Result], str]:
-    """Results of `make` for each law that can, and a note which were left out and why.
+    """Return the results of `make` by law, and a note on the laws without one.
 
     Raises:
-        ValueError, SolveError: those of the first law, where none can.
+        ValueError, SolveError: that of the first law, if there is no result.
     """
     made: dict[str, Result] = {}
     refused: dict[str, ValueError | SolveError] = {}
@@ -189,31 +150,28 @@ def _able(
 
 
 def _reason(text: str) -> str:
-    """Return the expectation alone of an error message."""
+    """Return the expectation in an error message."""
     start = text.find("expected ")
     return text[max(start, 0) :].split("; ")[0].split(", got ")[0]
 
 
 def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:
-    """Return the title of the first, with the further inputs of all that say theirs."""
+    """Return the title of the first figure with the further inputs of all laws."""
     inputs = [steady_inputs(law) for law in laws]
     said = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
     return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(said))
 
 
 def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, AnyLaw]:
-    """Return the laws by legend entry; laws of one kind are numbered."""
+    """Return the laws by legend entry; laws of the same name are numbered."""
     if isinstance(laws, Mapping):
-        found = dict(laws)
+        names, every = [*laws], [*laws.values()]
     else:
-        given = checks.many("compare", laws, "laws or their names, such as ['lugre', 'gms']")
-        each = [any_from_text(law) if isinstance(law, str) else law for law in given]
-        for law in each:
-            check_any("compare", law)
-        names = [name for (name,) in distinct([[law_name(law)] for law in each])]
-        found = dict(zip(names, each, strict=True))
-    if not found:
+        names, given = [], checks.many("compare", laws, "laws or names, such as ['lugre', 'gms']")
+        every = [any_from_text(law) if isinstance(law, str) else law for law in given]
+    if not every:
         raise ValueError("compare: expected at least one law, got none")
-    for law in found.values():
+    for law in every:
         check_any("compare", law)
-    return found
+    names = names or [name for (name,) in distinct([[law_name(law)] for law in every])]
+    return dict(zip(names, every, strict=True))

@@ -1,18 +1,16 @@
-"""Data of a behaviour figure, and the magnitudes of laws that figures are scaled by."""
+"""Data of figures of behaviours, their drawing, and the laws that show them."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from math import inf, isfinite
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, ParamSpec, final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import checks
-from symfric.foundation.parameters import check_names, parameters
+from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.style import DASHES, colour, dash
 from symfric.foundation.units import readable
@@ -24,7 +22,6 @@ from symfric.laws import (
     Law,
     Population,
     law_name,
-    steady_force,
 )
 from symfric.laws.base.law import check_law
 
@@ -42,8 +39,8 @@ class Curve:
     """One curve: columns of equal length by name, shape (n,) each.
 
     Attributes:
-        law: whose behaviour it is.
-        case: what sets it apart from the other curves of that law, such as "2 Hz"; may be empty.
+        law: name of its law.
+        case: difference from the other curves of that law, such as "2 Hz"; may be empty.
         columns: name -> values.
         reference: drawn dashed, for comparison.
     """
@@ -59,7 +56,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Legend entry of the curve: its law and, where there are several, its case."""
+        """Legend entry: the law and the case."""
         return f"{self.law}, {self.case}" if self.case else self.law
 
     def __getitem__(self, column: str) -> Array:
@@ -75,14 +72,14 @@ class FigureData(Showing):
     `figure["2 Hz"]` is the curve of that case, law or label; its columns come by name.
 
     Attributes:
-        name: what the command line calls it.
-        title: what it shows.
+        name: name on the command line.
+        title: description.
         units: column -> unit.
         panels: (abscissa, ordinate) of each panel.
-        curves: what is drawn.
+        curves: the curves.
         log: columns on a logarithmic axis.
-        dots: whether single points are measured and shall be seen.
-        note: what else must be said: what is swept, or which law is left out and why.
+        dots: True for single points with markers.
+        note: remarks: the swept factor, or laws that are left out and why.
     """
 
     name: str
@@ -95,7 +92,7 @@ class FigureData(Showing):
     note: str = ""
 
     def shown(self) -> Shown:
-        """Its curves, with the range of each column."""
+        """Describe its curves, with the range of each column."""
         rows = tuple(
             (c.label, *(_range(c.columns[u]) if u in c.columns else "" for u in self.units))
             for c in self.curves
@@ -122,8 +119,7 @@ class FigureData(Showing):
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Draw it, labelled with units, a panel per pair of columns; save it to `path` if given.
 
-        Colours and line styles tell laws or cases apart: of several laws each has its colour, and
-        the cases differ by their line styles.
+        Several laws differ by colours and their cases by line styles; cases of one law by both.
         """
         from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
 
@@ -147,7 +143,7 @@ class FigureData(Showing):
         return save(figure, path)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data: name, title, units, panels and the columns of each curve."""
+        """Return plain data: name, title, units, panels and the columns of each curve."""
         return {
             "name": self.name,
             "title": self.title,
@@ -166,16 +162,16 @@ class FigureData(Showing):
 
 
 def _range(values: Array) -> str:
-    """From where to where a column goes."""
+    """Return the range of a column as text."""
     finite = values[np.isfinite(values)]
     return f"{finite.min():.4g} ... {finite.max():.4g}" if finite.size else ""
 
 
 def clear(curves: Sequence[Curve], *, loops: bool = False) -> tuple[list[Curve], str]:
-    """Curves that differ visibly in one picture, and a word about the others.
+    """Return the curves that differ visibly in one picture, and a note on the others.
 
-    Where laws are compared these are no references; of three laws and more the first and the last
-    case, and of `loops` within loops, which lie on each other, the first.
+    A comparison of laws has no references; of three laws and more it has the first and the last
+    case, and of `loops`, which coincide, the first.
     """
     laws = {c.law for c in curves}
     shown = [c for c in curves if not (c.reference and len(laws) > 1)]
@@ -195,10 +191,10 @@ def draw_curves(
     curves: Sequence[Curve],
     laws: Sequence[str],
 ) -> None:
-    """Return the curves of one panel, in units that are easily read.
+    """Draw the curves of one panel, in readable units.
 
     Args:
-        laws: those that have a colour each, where several are compared; else the cases have.
+        laws: names that have one colour each; if empty, each case has one.
     """
     x, y = panel
     cases = list(dict.fromkeys(c.case for c in curves))
@@ -228,37 +224,36 @@ def draw_curves(
 
 
 GIVEN = ("v", "N", "F_e", "dv")
-"""Inputs that a block that is slid or pushed gives a law."""
+"""Inputs of a law that a sliding or pushed block provides."""
 
 
 def parts(law: AnyLaw) -> list[type[AnyLaw]]:
-    """Return the kinds of law inside `law`, from the outside in, each once."""
-    found: list[type[AnyLaw]] = [type(law)]
+    """Return the classes of the laws in `law`, from the outside in, each once."""
+    kinds: list[type[AnyLaw]] = [type(law)]
     for item in fields(law):
         value = getattr(law, item.name)
         for child in value if isinstance(value, tuple) else (value,):
-            if isinstance(child, Law):
-                found += parts(child)
-    return list(dict.fromkeys(found))
+            kinds += parts(child) if isinstance(child, Law) else []
+    return list(dict.fromkeys(kinds))
 
 
 def phenomena(law: AnyLaw) -> list[str]:
-    """Return the codes of everything that `law` and the laws in it show."""
+    """Return the codes of all phenomena of `law` and of the laws in it."""
     shown = {code for part in parts(law) for code in part.facts.phenomena}
     return [code for code in PHENOMENA if code in shown]
 
 
 def check_any(where: str, law: object) -> None:
-    """Refuse what is neither a law nor a population of contacts."""
+    """Raise an error for anything but a law or a population of contacts."""
     if not isinstance(law, Population):
         check_law(where, law)
 
 
 def finite(where: str, law: AnyLaw, F: Array) -> Array:
-    """Return `F` [N] of a law, if any of it is a number.
+    """Return `F` [N] of a law.
 
     Raises:
-        ValueError: none is, as where parameters leave the range of a root or an arcsine.
+        ValueError: no value is finite, as if parameters leave the range of a root or an arcsine.
     """
     if F.size and not np.isfinite(F).any():
         raise ValueError(
@@ -269,10 +264,9 @@ def finite(where: str, law: AnyLaw, F: Array) -> Array:
 
 
 def require(where: str, law: AnyLaw, *codes: str) -> None:
-    """Refuse a law that shows none of `codes`, or needs more than motion and force of a block.
+    """Raise an error for a law without any of `codes`, or with inputs that a block does not have.
 
-    Raises:
-        ValueError: says what is missing, and names laws that have it; what else the law needs.
+    The message names the missing phenomenon and laws that show it, or the inputs.
     """
     check_any(where, law)
     shown = phenomena(law)
@@ -295,91 +289,38 @@ def require(where: str, law: AnyLaw, *codes: str) -> None:
     )
 
 
-MASS = 0.8
-"""Mass of the block where one is driven [kg], that of `Rabinowicz`."""
+Figures = dict[str, Callable[..., FigureData]]
+FIGURES: Figures = {}
+"""All figures by name: (law, N, given) -> data."""
+P = ParamSpec("P")
+Content = tuple[str, Sequence[Curve]] | tuple[str, Sequence[Curve], str]
+"""Title and curves of a figure, and a note."""
 
-NORMAL_FORCE = MASS * 9.81
-"""Normal force of the figures if none is given [N]."""
 
+def behaviour(
+    needs: tuple[str, ...], units: Mapping[str, str], *panels: tuple[str, str],
+    log: tuple[str, ...] = (), dots: bool = False,
+) -> Callable[[Callable[P, Content]], Callable[P, FigureData]]:  # fmt: skip
+    """Decorate a function (law, ...) -> title and curves as the figure of its name.
 
-@final
-@dataclass(frozen=True)
-class Scales:
-    """Magnitudes of a law under one normal force.
-
-    Attributes:
-        static: peak of the force in steady sliding, or mu_s N where that is more [N].
-        kinetic: lowest force beyond the peak, up to 10 velocities [N].
-        elastic: force up to which no drift is claimed [N]: sigma_0 z_ba of a law with a break-away
-            deflection z_ba, else the kinetic level.
-        stretch: static level over the stiffness at rest, the pre-sliding distance [m]; inf for a
-            law without pre-sliding.
-        velocity: Stribeck velocity [m/s]: the parameter v_s, else where the force has fallen half
-            the way from its peak, else the `velocity_scale` of the law, else 100 stretches a
-            second.
+    The figure refuses laws that show none of the phenomena `needs`, see `require`; no `needs` admit
+    every law. See `FigureData` for the other arguments.
     """
 
-    static: float
-    kinetic: float
-    elastic: float
-    stretch: float
-    velocity: float
+    def decorate(content: Callable[P, Content]) -> Callable[P, FigureData]:
+        name = content.__name__
 
-    @property
-    def mass(self) -> float:
-        """Mass of a block to push [kg]: 0.8, or more for a strong contact (1.5 m/s^2 at most)."""
-        return max(MASS, self.static / 1.5)
+        @wraps(content)
+        def make(*args: P.args, **options: P.kwargs) -> FigureData:
+            law: Any = args[0] if args else options["law"]
+            if needs:
+                require(name, law, *needs)
+            title, curves, *note = content(*args, **options)
+            return FigureData(
+                name, title, units, panels, tuple(curves), log=log, dots=dots, note="".join(note)
+            )
 
+        FIGURES[name] = make
+        return make
 
-def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
-    """Return the magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
-
-    Raises:
-        ValueError: no law, symbols for parameters, N that is not positive.
-    """
-    check_any("figure", law)
-    checks.number("figure: N", N, unit="N", above=0.0)
-    known = {p.name: checks.number(f"figure: {p.name}", p.value) for p in parameters(law).values()}
-    stiffness = _stiffness(law, N) if "P" in phenomena(law) else 0.0
-    velocity = known.get("v_s", float(law.velocity_scale))
-    if not isfinite(velocity):
-        top = float(steady_force(law, np.array([1e-3]), N)[0])
-        velocity = 100 * top / stiffness if stiffness > 0 else 1e-3
-    elif "v_s" not in known:
-        velocity = _half_fall(law, velocity, N)
-    F = steady_force(law, velocity * np.geomspace(1e-3, 10.0, 801), N)
-    peak = _peak(F)
-    kinetic = float(np.min(F[peak:]))
-    static = max(float(F[peak]), known.get("mu_s", 0.0) * N)
-    elastic = min(known.get("sigma_0", inf) * known.get("z_ba", inf), kinetic)
-    stretch = static / stiffness if stiffness > 0 else inf
-    return Scales(static, kinetic, elastic, stretch, velocity)
-
-
-def _peak(F: Array) -> int:
-    """Index at which `F` first falls, or ends."""
-    falls = np.flatnonzero((np.diff(F) <= 0) & (F[:-1] > 0))
-    return int(falls[0]) if falls.size else F.size - 1
-
-
-def _half_fall(law: AnyLaw, scale: float, N: float) -> float:
-    """Return the velocity at which the force has fallen half the way [m/s]; `scale` if it does
-    not.
-    """
-    v = scale * np.geomspace(1e-2, 1e3, 1001)
-    F = steady_force(law, v, N)
-    beyond = F[_peak(F) :]
-    top, low = beyond[0], np.min(beyond)
-    if top - low < 0.01 * top:
-        return scale
-    half = np.argmax(beyond <= (top + low) / 2)
-    return float(v[_peak(F) + half])
-
-
-def _stiffness(law: AnyLaw, N: float) -> float:
-    """dF/dx at rest [N/m]: how the force grows with a displacement of the unloaded contact."""
-    if isinstance(law, Population):
-        return law.stiffness
-    v, z = ca.SX.sym("v"), ca.SX.sym("z", len(law.states))
-    slope = ca.jacobian(law.force(v, N, z), z) @ ca.jacobian(law.rate(v, N, z), v)
-    return float(ca.Function("stiffness", [v, z], [slope])(0.0, law.steady_state(0.0, N)))
+    return decorate

@@ -1,33 +1,122 @@
-"""Contact that is slid with a given velocity, and one that is pushed with a given force."""
+"""Magnitudes of laws, and motions of a contact and of a block that they scale."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, sqrt
-from typing import Protocol, final
+from math import ceil, inf, isfinite, sqrt
+from typing import final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symfric.figures.data import Array, Curve
+from symfric.figures.data import Array, Curve, check_any, phenomena
 from symfric.foundation import checks
-from symfric.foundation.parameters import Variable
+from symfric.foundation.parameters import Variable, parameters
 from symfric.integrator import Hold, Linear, simulate
 from symfric.integrator.equations.inputs import Input
-from symfric.laws import AnyLaw, Law, Population, law_name
+from symfric.laws import AnyLaw, Law, Population, law_name, steady_force
 from symfric.model import Event, Model, Output
+from symfric.results.trajectory import Trajectory
 from symfric.scenes.base import contact
 from symfric.scenes.blocks import Drive
 
+MASS = 0.8
+"""Mass of a driven block [kg], that of `Rabinowicz`."""
+
+NORMAL_FORCE = MASS * 9.81
+"""Default normal force of the figures [N]."""
+
+
+@final
+@dataclass(frozen=True)
+class Scales:
+    """Magnitudes of a law under one normal force.
+
+    Attributes:
+        static: peak of the force in steady sliding, or mu_s N where that is more [N].
+        kinetic: lowest force beyond the peak, up to 10 velocities [N].
+        elastic: largest force without drift by the claim of the law [N]: sigma_0 z_ba of a law with
+            a break-away deflection z_ba, else the kinetic level.
+        stretch: static level over the stiffness at rest, the pre-sliding distance [m]; inf for a
+            law without pre-sliding.
+        velocity: Stribeck velocity [m/s]: the parameter v_s, else the velocity at which the force
+            has fallen half the way from its peak, else the `velocity_scale` of the law, else 100
+            stretches a second.
+    """
+
+    static: float
+    kinetic: float
+    elastic: float
+    stretch: float
+    velocity: float
+
+    @property
+    def mass(self) -> float:
+        """Mass of a block to push [kg]: 0.8, or more for a strong contact (1.5 m/s^2 at most)."""
+        return max(MASS, self.static / 1.5)
+
+
+def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
+    """Return the magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
+
+    Raises:
+        ValueError: no law, symbols for parameters, N that is not positive.
+    """
+    check_any("figure", law)
+    checks.number("figure: N", N, unit="N", above=0.0)
+    known = {p.name: checks.number(f"figure: {p.name}", p.value) for p in parameters(law).values()}
+    stiffness = _stiffness(law, N) if "P" in phenomena(law) else 0.0
+    velocity = known.get("v_s", float(law.velocity_scale))
+    if not isfinite(velocity):
+        top = float(steady_force(law, np.array([1e-3]), N)[0])
+        velocity = 100 * top / stiffness if stiffness > 0 else 1e-3
+    elif "v_s" not in known:
+        velocity = _half_fall(law, velocity, N)
+    F = steady_force(law, velocity * np.geomspace(1e-3, 10.0, 801), N)
+    peak = _peak(F)
+    kinetic = float(np.min(F[peak:]))
+    static = max(float(F[peak]), known.get("mu_s", 0.0) * N)
+    elastic = min(known.get("sigma_0", inf) * known.get("z_ba", inf), kinetic)
+    stretch = static / stiffness if stiffness > 0 else inf
+    return Scales(static, kinetic, elastic, stretch, velocity)
+
+
+def _peak(F: Array) -> int:
+    """Return the index at which `F` first falls, or ends."""
+    falls = np.flatnonzero((np.diff(F) <= 0) & (F[:-1] > 0))
+    return int(falls[0]) if falls.size else F.size - 1
+
+
+def _half_fall(law: AnyLaw, scale: float, N: float) -> float:
+    """Return the velocity [m/s] at which the force has fallen half the way, by default `scale`."""
+    v = scale * np.geomspace(1e-2, 1e3, 1001)
+    F = steady_force(law, v, N)
+    beyond = F[_peak(F) :]
+    top, low = beyond[0], np.min(beyond)
+    if top - low < 0.01 * top:
+        return scale
+    half = np.argmax(beyond <= (top + low) / 2)
+    return float(v[_peak(F) + half])
+
+
+def _stiffness(law: AnyLaw, N: float) -> float:
+    """Return the stiffness dF/dx of the unloaded contact at rest [N/m]."""
+    if isinstance(law, Population):
+        return law.stiffness
+    v, z = ca.SX.sym("v"), ca.SX.sym("z", len(law.states))
+    slope = ca.jacobian(law.force(v, N, z), z) @ ca.jacobian(law.rate(v, N, z), v)
+    return float(ca.Function("stiffness", [v, z], [slope])(0.0, law.steady_state(0.0, N)))
+
+
 REST = 1e6
-"""Time of rest before a motion [s], so that all contacts are old."""
+"""Time of rest before a motion [s], after which all contacts are old."""
 
 
 def slid(
     law: Population, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX], times: Array, pace: float
 ) -> dict[str, Array]:
-    """Columns t, x, v, F at `times` [s] of rested contacts slid with `velocity(t, pace)`."""
+    """Return the columns t, x, v, F at `times` [s] of rested contacts with `velocity(t, pace)`."""
     t, p = ca.SX.sym("t"), ca.SX.sym("pace")
     function = ca.Function("v", [t, p], [velocity(t, p)])
     end = float(times[-1])
@@ -48,7 +137,7 @@ def slid(
 @final
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Steps of a pushed block: their ends [s], and at each the signals."""
+    """Steps of a pushed block: their ends [s], and the signals there."""
 
     step_times: Array
     columns: dict[str, Array]
@@ -68,10 +157,10 @@ def shoved(
     until: float | None,
     way: float = 0.0,
 ) -> Steps:
-    """Return a block of `mass` [kg] on random contacts pushed with `force` [N], by explicit steps.
+    """Return a block of `mass` [kg] on random contacts under `force` [N], by explicit steps.
 
-    A step is a fifth of the inverse frequency of the block on its unloaded contacts: velocity
-    first, then position, which holds the energy of an elastic contact.
+    A step is a fifth of the inverse frequency of the block on its unloaded contacts; it changes the
+    velocity before the position, which conserves the energy of an elastic contact.
     """
     h = 0.2 * sqrt(mass / law.stiffness)
     t = np.arange(0.0, t_end + h, h)
@@ -109,10 +198,10 @@ UNITS = {"t": "s", "x": "m", "v": "m/s", "F": "N"}
 
 
 def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Model:
-    """Return `law` slid with `velocity(t, pace)` [m/s] from steady sliding at its first value.
+    """Return `law` under `velocity(t, pace)` [m/s] from steady sliding at its first value.
 
-    `pace` is a parameter of the model, so that one model serves several speeds. The law may need
-    the sliding acceleration dv.
+    `pace` is a parameter of the model, for several speeds. The law may need the sliding
+    acceleration dv.
     """
     travel = Variable("travel", "m", nominal=1e-5)
     pace, t = Variable("pace", "1", start=1.0), ca.SX.sym("t")
@@ -132,27 +221,10 @@ def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) ->
     )
 
 
-class Run(Protocol):
-    """Run of a pushed block."""
-
-    @property
-    def step_times(self) -> Array:
-        """Ends of its steps [s]."""
-        ...
-
-    def at(self, t: ArrayLike, /) -> Mapping[str, Array]:
-        """Its signals at the times `t` [s]."""
-        ...
-
-
-class Slide(Protocol):
-    """Function that makes the curve of a motion; the velocity jumps at the times `jumps` [s]."""
-
-    def __call__(
-        self, case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()
-    ) -> Curve:
-        """Return the curve of `case` at `times` [s]."""
-        ...
+Run = Steps | Trajectory
+"""Run of a pushed block, with `step_times` and its signals `at` any time."""
+Slide = Callable[..., Curve]
+"""(case, times [s], pace, jumps=()) -> curve of a motion whose velocity jumps at `jumps` [s]."""
 
 
 def slides(law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Slide:
@@ -162,32 +234,25 @@ def slides(law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> 
     """
     if isinstance(law, Population):
 
-        def of_population(
-            case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()
-        ) -> Curve:
+        def of_contacts(case: str, times: Array, pace: float, jumps: Sequence[float] = ()) -> Curve:
+            del jumps  # its steps are fine everywhere
             return Curve(law_name(law), case, slid(law, N, velocity, times, pace))
 
-        return of_population
+        return of_contacts
     model = prescribed(law, N, velocity)
 
-    def moved(case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()) -> Curve:
-        return slide(model, law, case, times, pace, jumps)
+    def curve(case: str, times: Array, pace: float, jumps: Sequence[float] = ()) -> Curve:
+        end = float(times[-1])
+        at = [t for t in jumps if t < end]
+        run = simulate(model, end, p={"pace": pace}, t_eval=times, times=at)
+        columns = {"t": run.t, "x": run["travel"], "v": run["slip_velocity"], "F": run["friction"]}
+        return Curve(law_name(law), case, columns)
 
-    return moved
-
-
-def slide(
-    model: Model, law: Law, case: str, times: Array, pace: float, jumps: Sequence[float] = ()
-) -> Curve:
-    """One run of a `prescribed` motion, seen at `times` [s]."""
-    end = float(times[-1])
-    run = simulate(model, end, p={"pace": pace}, t_eval=times, times=[t for t in jumps if t < end])
-    columns = {"t": run.t, "x": run["travel"], "v": run["slip_velocity"], "F": run["friction"]}
-    return Curve(law_name(law), case, columns)
+    return curve
 
 
 def through(points: Sequence[float], leg: float) -> Callable[[ca.SX, ca.SX], ca.SX]:
-    """Velocity of a motion through `points` [m], at rest in each, `leg` / pace [s] between them."""
+    """Return the velocity of a motion that rests in `points` [m] every `leg` / pace [s]."""
 
     def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
         phase = pace * t / leg
@@ -209,10 +274,9 @@ def pushed(
     until: float | None = None,
     way: float = 0.0,
 ) -> Run:
-    """Return a block of `mass` [kg] under `law`, at rest at first, pushed with `force` [N] to
-    `t_end` [s].
+    """Return the run of a block of `mass` [kg] from rest under `force` [N], up to `t_end` [s].
 
-    With `until` the run ends where the velocity is beyond it [m/s], and the position beyond `way`.
+    With `until` it ends when the velocity [m/s] exceeds it and the position exceeds `way` [m].
     """
     if isinstance(law, Population):
         return shoved(law, N, mass, force, t_end, until, way)

@@ -1,4 +1,4 @@
-"""Figures of a block whose force is given: stiction, drift, break-away."""
+"""Figures of a block under a given force: stiction, drift, break-away."""
 
 from collections.abc import Sequence
 from math import cbrt, isfinite, sqrt
@@ -6,18 +6,8 @@ from math import cbrt, isfinite, sqrt
 import casadi as ca
 import numpy as np
 
-from symfric.figures.data import (
-    MASS,
-    NORMAL_FORCE,
-    Array,
-    Curve,
-    FigureData,
-    Scales,
-    check_any,
-    require,
-    scales,
-)
-from symfric.figures.motion import fine, pushed
+from symfric.figures.data import Array, Content, Curve, FigureData, behaviour, check_any
+from symfric.figures.motion import MASS, NORMAL_FORCE, Scales, fine, pushed, scales
 from symfric.foundation import checks
 from symfric.integrator import Linear
 from symfric.integrator.equations.inputs import Input
@@ -33,18 +23,19 @@ def push(
     mass: float = MASS,
     samples: int = 2001,
 ) -> FigureData:
-    """Motion of a block of `mass` [kg] on `law`, at rest at first, under `force` [N] (t).
+    """Show the motion of a block of `mass` [kg] on `law` from rest under `force` [N] (t).
 
-    Columns t [s], F_e [N], x [m], v [m/s], F [N]. `simulate` with the scene `Drive` is the same for
-    a law, and tells more; a population of contacts, which no scene takes, moves by explicit steps.
+    Columns t [s], F_e [N], x [m], v [m/s], F [N]. `simulate` with the scene `Drive` gives the same
+    and more for a law; a population of contacts, for which there is no scene, moves by explicit
+    steps.
 
     Args:
-        law: any law that a scene takes, or a population.
+        law: any law of a scene, or a population.
         N: normal force [N].
         force: number, function of the time, or samples (`Linear`, `Hold`).
         t_end: end of the motion [s].
-        mass: of the block [kg].
-        samples: rows of the columns.
+        mass: mass of the block [kg].
+        samples: number of rows.
 
     Raises:
         ValueError: no law, numbers that are not positive.
@@ -66,16 +57,19 @@ def push(
     )
 
 
+@behaviour(
+    ("D", "S"), {"t": "s", "F_e": "N", "F": "N", "v": "m/s"}, ("F_e", "F"), ("t", "v")
+)  # fmt: skip
 def stiction(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     excess: float = 1.3,
     period: float = 1.0,
-) -> FigureData:
-    """Friction of a block under F_e = excess F_S sin(2 pi t/period), and its velocity.
+) -> Content:
+    """Show friction and velocity of a block under F_e = excess F_S sin(2 pi t/period).
 
-    F_S is the static level; the block has 0.8 kg, or 1 kg per 1.5 N of F_S where that is more.
+    F_S is the static level; the mass is 0.8 kg, or 1 kg per 1.5 N of F_S if that is more.
     Columns t [s], F_e, F [N], v [m/s] of one and a half periods from rest. At rest friction equals
     F_e, the diagonal of the first panel; while the block slides it is the kinetic force with the
     sign of the velocity.
@@ -83,7 +77,6 @@ def stiction(
     Raises:
         ValueError: a law with neither dynamic nor static friction.
     """
-    require("stiction", law, "D", "S")
     magnitudes = given or scales(law, N)
 
     def force(t: ca.SX) -> ca.SX:
@@ -92,13 +85,8 @@ def stiction(
     run = pushed(law, N, magnitudes.mass, force, 1.5 * period)
     found = run.at(t := np.union1d(fine(run), np.linspace(0.0, 1.5 * period, 601)))
     columns = {"t": t, "F_e": found["force"], "F": found["friction"], "v": found["v"]}
-    return FigureData(
-        "stiction",
-        f"pulled by F_e = {excess:g} F_S sin(2πt/{period:g} s), N = {N:g} N",
-        {"t": "s", "F_e": "N", "F": "N", "v": "m/s"},
-        (("F_e", "F"), ("t", "v")),
-        (Curve(law_name(law), "", columns),),
-    )
+    title = f"pulled by F_e = {excess:g} F_S sin(2πt/{period:g} s), N = {N:g} N"
+    return title, [Curve(law_name(law), "", columns)]
 
 
 RELEASED, REST, HOLD = 1.05, 0.45, 0.5
@@ -106,10 +94,10 @@ RELEASED, REST, HOLD = 1.05, 0.45, 0.5
 
 
 def time_to_rest(law: AnyLaw, N: float, magnitudes: Scales) -> float:
-    """Time without load [s] after which the block, pushed beyond break-away, has come to rest.
+    """Return the time without load [s] in which a block comes to rest after break-away.
 
-    `REST`, doubled until the block stays within its pre-sliding distance, or a thousandth of its
-    way, in the last quarter; five times at most, since some laws only creep to a halt.
+    It is `REST`, doubled until the block stays within its pre-sliding distance, or a thousandth of
+    its way, in the last quarter; at most five times, since some laws creep on.
     """
 
     def push(t: ca.SX) -> ca.SX:
@@ -128,32 +116,34 @@ def time_to_rest(law: AnyLaw, N: float, magnitudes: Scales) -> float:
     return rest
 
 
+@behaviour(
+    ("S", "P"), {"t": "s", "F_e": "N", "x": "m", "F": "N", "x_mean": "m"}, ("t", "x_mean")
+)  # fmt: skip
 def drift(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     frequency: float = 10.0,
     t_end: float = 8.0,
-) -> FigureData:
-    """Displacement of a block under a vibrating force (Lampaert et al. 2003, figs. 8, 9).
+) -> Content:
+    """Show the displacement of a block under a vibrating force (Lampaert et al. 2003, figs. 8, 9).
 
         F_e = 1.05 F_S t           up to 1 s, held until 1.05 s: it breaks away
-        F_e = 0                    up to 1.5 s, or longer where it takes longer to come to rest
+        F_e = 0                    up to 1.5 s, or until the block rests
         F_e = 0.5 F_b              for 0.5 s
         F_e = F_b [0.5 + 0.3 sin(2 pi f t)]   beyond: does it move on?
 
     F_S is the static level and F_b the kinetic one, or sigma_0 z_ba for `ElastoPlastic`, which
-    claims no drift below that only. The block has 0.8 kg, or 1 kg per 1.5 N of F_S where that is
-    more. Columns t [s], F_e, F [N], x [m], the way since the vibration began, which lasts until
-    `t_end`, or longer by as much as the block needs longer to rest, and x_mean [m], the mean of x
-    over two periods, which is drawn: it stays for a block that only shakes. A law without drift
-    stays where the first strokes put it; LuGre goes on with every period, and a law without states
+    has no drift below that force only. The mass is 0.8 kg, or 1 kg per 1.5 N of F_S if that is
+    more. Columns t [s], F_e, F [N], x [m], the displacement since the start of the vibration, which
+    lasts until `t_end`, later by the additional time of rest, and x_mean [m], the mean of x over
+    two periods, which is drawn: it is constant for a block that only oscillates. A law without
+    drift stays after the first strokes; LuGre moves on with every period, and a law without states
     creeps.
 
     Raises:
         ValueError: a law with neither static friction nor pre-sliding.
     """
-    require("drift", law, "S", "P")
     magnitudes = given or scales(law, N)
     peak, base = 1.05 * magnitudes.static, magnitudes.elastic
     hold_from = RELEASED + time_to_rest(law, N, magnitudes)
@@ -174,22 +164,15 @@ def drift(
     columns = {"t": t, "F_e": found["force"], "x": found["x"] - rest, "F": found["friction"]}
     keep = (t >= vibrate_from - 0.2) & (t <= t_end + 1e-9)
     once = over_period(t, columns["x"], 1 / frequency)
-    columns["x_mean"] = over_period(
-        t, once, 1 / frequency
-    )  # twice, or elastic ringing shines through
-    return FigureData(
-        "drift",
-        f"drift under {frequency:g} Hz below break-away, mean over two periods, N = {N:g} N",
-        {"t": "s", "F_e": "N", "x": "m", "F": "N", "x_mean": "m"},
-        (("t", "x_mean"),),
-        (Curve(law_name(law), "", {name: c[keep] for name, c in columns.items()}),),
-    )
+    columns["x_mean"] = over_period(t, once, 1 / frequency)  # twice, to remove elastic ringing
+    title = f"drift under {frequency:g} Hz below break-away, mean over two periods, N = {N:g} N"
+    return title, [Curve(law_name(law), "", {name: c[keep] for name, c in columns.items()})]
 
 
 def over_period(t: Array, x: Array, period: float) -> Array:
-    """Mean of `x` over the `period` [s] around each of the equally spaced times `t`, shape (n,).
+    """Return the mean of `x` over the `period` [s] around each of the times `t`, shape (n,).
 
-    At the ends it is that of the first and last full period.
+    At the ends it is that of the first and the last full period.
     """
     way = np.concatenate([[0.0], np.cumsum((x[1:] + x[:-1]) / 2 * np.diff(t))])
     middle = np.clip(t, t[0] + period / 2, t[-1] - period / 2)
@@ -198,46 +181,39 @@ def over_period(t: Array, x: Array, period: float) -> Array:
 
 
 SLID = 10.0
-"""Pre-sliding distances after which bristles carry what they do in steady sliding."""
+"""Pre-sliding distances after which bristles are in steady sliding."""
 
 
+@behaviour(("S", "P"), {"rate": "N/s", "F": "N"}, ("rate", "F"), log=("rate",), dots=True)
 def break_away(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     rates: Sequence[float] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
-) -> FigureData:
-    """Greatest friction force of a block whose load grows at a constant rate.
+) -> Content:
+    """Show the largest friction force of a block under a load of constant rate.
 
     Columns rate [N/s], F [N]: the largest friction until the block, of 0.8 kg or 1 kg per 1.5 N,
     has slid by ten times the pre-sliding distance of its law and is faster than twice the sum of
-    the Stribeck velocity and that of its elastic motion, rate over stiffness. Those are scales of
-    the law itself; `given` ones are of the mass alone. The force falls with the rate for LuGre-like
-    laws, to the kinetic level at least, and is the static level, or what of it they reach, for laws
-    of the velocity or the path alone.
+    the Stribeck velocity and that of its elastic motion, rate over stiffness. These scales are of
+    the law itself; `given` determines the mass only. The force of LuGre-like laws falls with the
+    rate, down to the kinetic level; laws of the velocity or the path alone reach about the static
+    level at any rate.
 
     Raises:
         ValueError: a law with neither static friction nor pre-sliding, a rate that is not positive.
     """
-    require("break_away", law, "S", "P")
     if not all(rate > 0 for rate in rates):
         raise ValueError(f"break_away: rates: expected numbers above 0 N/s, got {tuple(rates)}")
     own = scales(law, N)
     mass = (given or own).mass
     levels = np.array([_peak(law, N, rate, own, mass) for rate in rates])
-    return FigureData(
-        "break_away",
-        f"break-away force, N = {N:g} N",
-        {"rate": "N/s", "F": "N"},
-        (("rate", "F"),),
-        (Curve(law_name(law), "", {"rate": np.array(rates, dtype=float), "F": levels}),),
-        log=("rate",),
-        dots=True,
-    )
+    columns = {"rate": np.array(rates, dtype=float), "F": levels}
+    return f"break-away force, N = {N:g} N", [Curve(law_name(law), "", columns)]
 
 
 def _peak(law: AnyLaw, N: float, rate: float, own: Scales, mass: float) -> float:
-    """Return the greatest friction force [N] until the block has broken away."""
+    """Return the largest friction force [N] until the block has broken away."""
     stretch = own.stretch if isfinite(own.stretch) else 0.0
     until, way = 2 * (own.velocity + rate * stretch / own.static), SLID * stretch
     t_end = 2 * own.static / rate + 4 * sqrt(2 * mass * until / rate) + 4 * cbrt(way * mass / rate)

@@ -1,9 +1,9 @@
-"""Softest regularisation of a law that a wanted error allows in a given machine."""
+"""Widest smoothing of a law that a wanted error allows in a given machine."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import floor, inf, isfinite, log, log10
+from math import floor, inf, isfinite, log, log10, nan
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, final
@@ -33,19 +33,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RATIO = 4.0
-"""From one width of the curve to the next."""
+"""Ratio of successive widths."""
 SLOWEST = 0.2
-"""Orders below this are none: the curve has not settled."""
+"""Smallest order of errors that have settled."""
 SHARE = 0.2
-"""Part of the wanted error that may be the reference's own."""
+"""Largest share of the reference in the wanted error."""
 MARGIN = 0.8
-"""Part of the wanted error that is aimed at between two widths of the curve."""
+"""Share of the wanted error at which a width between two runs is chosen."""
 DRIEST, SOFTEST = 20, 5
-"""Widths tried on either side of that of the law."""
+"""Largest numbers of narrower and of wider widths."""
 MOST_STEPS = 400_000
-"""Attempts of a run, seconds at most."""
+"""Largest number of attempts of a run."""
 FINEST = 1e-11
-"""Smallest relative tolerance of a run of the curve."""
+"""Smallest relative tolerance of a run."""
 
 
 @final
@@ -54,16 +54,15 @@ class Recommendation(Showing):
     """Law as smooth as a wanted error allows.
 
     Attributes:
-        law: with its width or stiffness set.
+        law: the law with its width or stiffness.
         values: the parameters that were set.
-        error: of a run of `law` at `rtol`, measured: the largest difference from dry friction
-            relative to the motion, and what the reference may be off.
+        error: measured error of a run of `law` at `rtol`: the largest difference from dry friction
+            relative to the motion, and the uncertainty of the reference.
         wanted: the given error.
-        uncertain: the part of `error` that is the reference's.
-        order: in which the error falls with the width where it was chosen; NaN where nothing
-            depends on it.
-        reference: what dry friction is here.
-        rtol: relative tolerance that the error includes.
+        uncertain: the share of the reference in `error`.
+        order: order of the error in the width at the chosen one; NaN if nothing depends on it.
+        reference: description of dry friction.
+        rtol: relative tolerance of that run.
         steps, attempts: of that run.
         time_s: its CPU time [s].
         curve: error, steps and CPU time against the parameter, of runs in which the integrator's
@@ -85,9 +84,9 @@ class Recommendation(Showing):
 
     def __str__(self) -> str:
         """Return the result in a sentence."""
-        found = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
+        values = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
         return (
-            f"{type(self.law).__name__}: {found} is off {self.reference} by {self.error:.2g} "
+            f"{type(self.law).__name__}: {values} is off {self.reference} by {self.error:.2g} "
             f"({self.wanted:g} wanted) at rtol = {self.rtol:g}, in {self.steps} steps"
         )
 
@@ -116,36 +115,38 @@ def recommended(
     u: Mapping[str, Input] | None = None,
     rtol: float = 1e-6,
 ) -> Recommendation:
-    """Set what makes `law` smooth so that its motion is `error` off that with dry friction.
+    """Return `law` with the widest smoothing at which its motion is `error` off dry friction.
 
         error = max |x - x_dry| / (largest - smallest value of x_dry)     over signals and times
 
-    The widths of the law shrink in steps of 4 until three runs settle into a power of the width,
-    which says how far the last is from the limit (Richardson): that run is x_dry. The softest width
-    is chosen below which every run keeps the error; a run at `rtol` verifies it.
+    The widths of the law shrink in steps of 4 until three runs follow a power of the width, from
+    which the distance of the last one from the limit is known (Richardson): that run is x_dry. The
+    widest width is chosen below which every run keeps the error; a run at `rtol` verifies it.
 
     Args:
-        law: where the search starts.
+        law: start of the search.
         scene: a machine (`FourMass`, `FourMass(law, k=3.0)`) or a function law -> Model. The width
-            that an error needs depends on the machine and on how long it runs.
-        error: wanted, relative to the size of the motion; between 0 and 1.
+            for an error depends on the machine and on the length of its motion.
+        error: wanted error, relative to the size of the motion; between 0 and 1.
         t_end: end of the motion [s]; that of the scene.
-        parameter: what is scaled, if it is not what the roles say (`regularisation`): stiffnesses
-            of bristles, v_t, widths. Several are scaled together, stiffnesses inversely.
-        exact: a law without regularisation, such as `ExactCoulomb`, to compare with instead of the
-            limit of `law` itself. Then differences of their levels are errors that no width mends.
-        of: what is compared: names of signals, or a function that takes numbers from a trajectory,
-            such as the period of a cycle, where an error of phase would grow with time; by default
-            positions, which are the states of the machine that are no rates of others.
+        parameter: scaled parameters, by default those of certain roles (`regularisation`):
+            stiffnesses of bristles, v_t, widths. Several are scaled together, stiffnesses
+            inversely.
+        exact: a law without regularisation, such as `ExactCoulomb`, as the reference instead of the
+            limit of `law` itself. Different levels then are errors at any width.
+        of: compared signals by name, or a function of a trajectory, such as the period of a cycle,
+            if an error of phase would grow with time; by default positions, the states of the
+            machine that are no rates of others.
         u: inputs, as for `simulate`.
-        rtol: relative tolerance that the law is going to be run with.
+        rtol: relative tolerance of later runs of the law.
 
     Raises:
         ValueError: bad input.
-        SolveError: the error is not reached; the message says which one is, `partial` is the curve.
+        SolveError: the error is not reached; the message gives the smallest one, `partial` is the
+            curve.
 
-    Limits: a motion that has no limit, such as a chaotic one over a long time, does not settle;
-    shorten it or compare other numbers. Runs are seen at 2001 times.
+    Limits: a motion without a limit, such as a chaotic one over a long time, does not settle;
+    shorten it or compare other numbers. Runs are compared at 2001 times.
     """
     where = "recommended"
     check_law(f"{where}: law", law)
@@ -163,7 +164,7 @@ def recommended(
 
 @final
 class _Search:
-    """Runs along the curve, driest last."""
+    """Runs over the width, narrowest last."""
 
     def __init__(self, machine: Machine, knob: Regularisation, wanted: float, rtol: float) -> None:
         self.machine, self.knob, self.wanted, self.rtol = machine, knob, wanted, rtol
@@ -177,44 +178,40 @@ class _Search:
         law, values = self.knob.at(s), self.knob.values(s)
         return sample(self.machine, law, rtol, s, values, max_steps=MOST_STEPS)
 
-    def drier(self) -> None:
-        """One more run, its widths a quarter of those before."""
+    def narrow(self) -> None:
+        """Run with widths a quarter of the last ones."""
         s = self.runs[-1].s / RATIO if self.runs else 1.0
         if len(self.runs) > DRIEST:
             self.give_up("the curve has not settled by then")
         try:
             self.runs.append(self.run(s, self.fine))
-        except SolveError as problem:
+        except (SolveError, ValueError) as problem:
             if self.runs:
                 self.give_up(f"beyond: {problem}", problem)
-            given = f"recommended: {self.shown(s)}, where the search starts: {problem}"
-            raise SolveError(given, problem.status, problem.partial) from problem
-        except ValueError as problem:
-            if not self.runs:
+            if isinstance(problem, ValueError):
                 raise
-            self.give_up(f"beyond: {problem}", problem)
+            start = f"recommended: {self.shown(s)}, where the search starts: {problem}"
+            raise SolveError(start, problem.status, problem.partial) from problem
 
     def settle(self) -> None:
-        """Go on until the limit is known well enough, and take the last run for it."""
+        """Run until the limit is known well enough, and take the last run as the reference."""
         while self.uncertain > SHARE * self.wanted:
-            self.drier()
+            self.narrow()
             self.uncertain = self.remaining()
-        self.reference, last = self.runs[-1], self.runs[-1].values
-        self.about = ", ".join(f"{name} = {value:.3g}" for name, value in last.items())
+        self.reference, self.about = self.runs[-1], self.shown(self.runs[-1].s)
 
     def compare(self, exact: Law) -> None:
-        """Go on until two runs keep the wanted error off the motion with the law `exact`."""
-        own = replace(self.machine, free=False)
-        self.reference = sample(own, exact, self.fine)
+        """Run until two runs keep the wanted error from the motion with the law `exact`."""
+        self.reference = sample(replace(self.machine, free=False), exact, self.fine)
         self.about, self.uncertain = type(exact).__name__, self.fine
         while len(self.runs) < 2 or max(map(self.off, self.runs[-2:])) > self.wanted:
-            self.drier()
+            self.narrow()
             last = [self.off(run) for run in self.runs[-4:]]
             if len(last) > 3 and min(last[1:]) >= last[0]:
                 self.give_up(f"it does not tend to {self.about}: do their levels differ?")
 
     def remaining(self) -> float:
-        """Distance of the last run from the limit, from how the last four follow each other.
+        """Return the distance of the last run from the limit, from the last four runs.
 
         With differences d and D before, and D/d = 4^q, the sum of all that follow is d / (4^q - 1).
         """
@@ -225,44 +222,44 @@ class _Search:
             return max(gaps[-2:])
         if len(gaps) < 3 or not all(isfinite(gap) and gap > 0 for gap in gaps):
             return inf
-        orders = [log(a / b) / log(RATIO) for a, b in pairwise(gaps)]
-        slowest = min(orders)
+        slowest = min(log(a / b) / log(RATIO) for a, b in pairwise(gaps))
         return gaps[-1] / (RATIO**slowest - 1.0) if slowest > SLOWEST else inf
 
     def off(self, run: Sample) -> float:
-        """Error of a run and of the reference together; infinite where they are not comparable."""
-        if self.reference is None:
-            return inf
-        return distance(run, self.reference) + self.uncertain
+        """Return the error of a run and of the reference together; inf without a comparison."""
+        return inf if self.reference is None else distance(run, self.reference) + self.uncertain
 
     def choose(self) -> Recommendation:
-        """Return the softest width below which all keep the wanted error, verified."""
+        """Return the widest width below which all runs keep the wanted error, verified."""
         if self.off(self.runs[0]) <= self.wanted:
-            self.soften()
+            self.widen()
         errors = [self.off(run) for run in self.runs]
         kept = len(errors)
         while kept and errors[kept - 1] <= self.wanted:
             kept -= 1
-        # runs[kept] is the softest that keeps it, runs[kept - 1] the driest that does not
+        # runs[kept] is the widest that keeps it, runs[kept - 1] the narrowest that does not
         keeps = self.runs[kept].s
-        factors, order = [keeps], float("nan")
+        factors, order = [keeps], nan
         if kept:
             order = log(errors[kept - 1] / errors[kept]) / log(RATIO) if errors[kept] else inf
             between = keeps * (MARGIN * self.wanted / errors[kept]) ** (1 / order)
             factors.insert(0, self.rounded(min(max(between, keeps), keeps * RATIO)))
-        found = inf
+        error = inf
         for s in (*factors, keeps / RATIO):
             run = self.run(s, self.rtol)
-            found = self.off(run)
-            if found <= self.wanted:
-                return self.recommendation(run, found, order)
+            error = self.off(run)
+            if error <= self.wanted:
+                return Recommendation(
+                    self.knob.at(run.s), run.values, error, self.wanted, self.uncertain, order,
+                    self.about, self.rtol, run.steps, run.attempts, run.time_s, self.curve(),
+                )  # fmt: skip
         return self.give_up(
-            f"with rtol = {self.rtol:g} the run at {self.shown(keeps)} is off by {found:.2g}, "
+            f"with rtol = {self.rtol:g} the run at {self.shown(keeps)} is off by {error:.2g}, "
             f"without the integrator's part by {errors[kept]:.2g}; tighten rtol"
         )
 
-    def soften(self) -> None:
-        """Widen while the error is kept, as far as the law allows."""
+    def widen(self) -> None:
+        """Run with wider widths while the error is kept, as far as the law allows."""
         for _ in range(SOFTEST):
             s = self.runs[0].s * RATIO
             try:
@@ -273,30 +270,23 @@ class _Search:
                 return
 
     def rounded(self, s: float) -> float:
-        """Return a factor at which the first parameter has two digits, on the dry side."""
+        """Return a factor at which the first parameter has two digits, on the narrow side."""
         name = self.knob.names[0]
         value = self.knob.values(s)[name]
         size = 10.0 ** (floor(log10(value)) - 1)
         digits = value / size
-        grows = self.knob.values(0.5)[name] > self.knob.values(1.0)[name]
+        grows = self.knob.powers[name] < 0
         return self.knob.factor((-floor(-digits) if grows else floor(digits)) * size)
 
     def shown(self, s: float) -> str:
-        """Return the parameters at a factor."""
+        """Return the parameters at a factor as text."""
         return ", ".join(f"{name} = {value:.3g}" for name, value in self.knob.values(s).items())
 
-    def recommendation(self, run: Sample, error: float, order: float) -> Recommendation:
-        """Return the result, with the curve."""
-        return Recommendation(
-            self.knob.at(run.s), run.values, error, self.wanted, self.uncertain, order, self.about,
-            self.rtol, run.steps, run.attempts, run.time_s, self.curve(),
-        )  # fmt: skip
-
     def curve(self) -> FigureData:
-        """Error, steps and time of the runs so far; without a reference, against the last."""
+        """Return error, steps and time of the runs; without a reference, against the last run."""
         if self.reference is None and self.runs:
             self.reference, self.uncertain = self.runs[-1], 0.0
-        name = self.knob.names[0]
+        name, law = self.knob.names[0], self.knob.law
         seen = [run for run in self.runs if run is not self.reference]
         columns = {
             name: [run.values[name] for run in seen],
@@ -304,33 +294,24 @@ class _Search:
             "steps": [run.steps for run in seen],
             "time": [run.time_s for run in seen],
         }
-        curve = Curve(
-            type(self.knob.law).__name__, "", {k: np.array(v) for k, v in columns.items()}
-        )
-        unit = parameters(self.knob.law)[name].unit
+        arrays = {column: np.array(values) for column, values in columns.items()}
         return FigureData(
             "recommended",
             f"{self.machine.name}, {self.machine.t_end:g} s: error against dry friction",
-            {name: unit, "error": "1", "steps": "1", "time": "s"},
-            ((name, "error"), (name, "steps"), (name, "time")),
-            (curve,),
+            {name: parameters(law)[name].unit, "error": "1", "steps": "1", "time": "s"},
+            tuple((name, column) for column in ("error", "steps", "time")),
+            (Curve(type(law).__name__, "", arrays),),
             log=tuple(columns),
             dots=True,
         )
 
     def give_up(self, why: str, cause: BaseException | None = None) -> Recommendation:
-        """Say what was reached.
-
-        Raises:
-            SolveError: always.
-        """
-        last = self.runs[-1]
-        curve = self.curve()
+        """Raise a SolveError with the smallest error and the curve so far."""
+        curve, law = self.curve(), type(self.knob.law).__name__
         errors = curve.curves[0]["error"]
         best = f"{errors.min():.2g}" if errors.size else "unknown"
-        law = type(self.knob.law).__name__
         message = (
             f"recommended: {law} does not keep an error of {self.wanted:g} in {self.machine.name}: "
-            f"tried to {self.shown(last.s)}, the smallest error is {best}; {why}"
+            f"tried to {self.shown(self.runs[-1].s)}, the smallest error is {best}; {why}"
         )
         raise SolveError(message, Status.SOLVER_FAILED, curve) from cause

@@ -1,4 +1,4 @@
-"""Parameters that make a law smooth, and its distance from dry friction.
+"""Parameters that make a law smooth, its runs in a machine, and their distance from dry friction.
 
 A smooth law has a width, such as v_t, below which it creeps instead of resting; bristles have a
 stiffness. As all widths of a law shrink with a factor s (stiffnesses grow with 1/s) its motion
@@ -6,19 +6,18 @@ tends to that with dry, set-valued friction,
 
     |x(s) - x(0)| = C s^q
 
-The order q is a matter of what the motion does, not of the law alone:
+The order q depends on the motion, not on the law alone:
 
-    1      a contact that comes to rest and stays there: it creeps at a velocity of order v_t; with
-           tanh times a logarithm
-    2/3    break-away over a falling branch that is itself of width v_t (Brown-McPhee): the state
-           lingers at the peak, the fold of the stick branch
-    1/2    bristles that are turned: time to slide their deflection F/sigma_0 from rest
+    1      a contact that comes to rest and stays: it creeps at a velocity of order v_t; with tanh
+           times a logarithm
+    2/3    break-away over a falling branch of width v_t (Brown-McPhee): the state stays long at the
+           peak, the fold of the stick branch
+    1/2    reversed bristles: time to slide their deflection F/sigma_0 from rest
     > 1    a contact that only slides, 3 with Brown-McPhee, whose tail falls like (v_t/v)^3
 
-Where contacts rest as one their loads are not determined by dry friction: with mu_s > mu_d each
-smooth law tends to an instant of break-away of its own.
-
-Far from the limit there is no order at all: where rest is longer than motion, creep is everything.
+Dry friction does not determine the loads of several contacts that rest together: with mu_s > mu_d
+each smooth law tends to its own instant of break-away. Far from the limit there is no order: if
+rest is longer than motion, creep dominates.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -33,7 +32,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
-from symfric.foundation.parameters import Parameter, parameters, with_values
+from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
@@ -47,15 +46,15 @@ from symfric.scenes import Scene
 
 Array = NDArray[np.float64]
 Measure = Sequence[str] | Callable[[Trajectory], Array]
-"""Signals by name, or a function that takes numbers from a trajectory, such as periods."""
+"""Signals by name, or a function trajectory -> numbers, such as periods."""
 SAMPLES = 2001
-"""Times at which motions are compared."""
+"""Number of times at which motions are compared."""
 NEGLIGIBLE = 1e-9
-"""Widths below this [m/s] only round off a modulus; they are not what makes a law smooth."""
+"""Widths [m/s] below this only round off an absolute value and do not make a law smooth."""
 DIGITS = 12
-"""Of scaled parameters: what is behind is rounding."""
+"""Number of digits to which scaled parameters are rounded."""
 STILL = 1e-9
-"""Signal that moves by less than this times its nominal size is measured by the latter."""
+"""Ratio to its nominal size below which the motion of a signal is measured by that size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,7 @@ class Regularisation:
         return tuple(self.powers)
 
     def values(self, s: float) -> dict[str, float]:
-        """Their values at the factor `s`."""
+        """Return their values at the factor `s`."""
         known = parameters(self.law)
         scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
         return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
@@ -98,17 +97,20 @@ def regularisation(
 ) -> Regularisation:
     """Return the parameters that make `law` smooth: `parameter`, or those of certain roles.
 
-    Those are the stiffnesses of bristles, their damping and the paths they remember, transition
-    velocities called v_t and smoothing widths [m/s]; of a law without these its only velocity.
+    The roles are stiffness, damping and length of bristles, transition velocities called v_t and
+    smoothing widths [m/s]; a law without any of these has its only velocity.
 
     Raises:
-        ValueError: no law, no such parameter, or several velocities that may be meant.
+        ValueError: no law, no such parameter, or several velocities without `parameter`.
     """
     check_law(f"{where}: law", law)
     known = parameters(law)
     if parameter is not None:
         given = [parameter] if isinstance(parameter, str) else parameter
-        return _numbers(where, law, checks.names(f"{where}: parameter", given, known))
+        names = checks.names(f"{where}: parameter", given, known)
+        if not names:
+            raise ValueError(f"{where}: parameter: expected the names of one or more, got none")
+        return _scaled(where, law, names)
     if isinstance(law, Sticking) and law.has_mode:
         raise ValueError(
             f"{where}: law: expected a law that has to be made smooth, got {type(law).__name__}, "
@@ -132,42 +134,35 @@ def regularisation(
             f"{where}: parameter: expected what makes {type(law).__name__} smooth, one of "
             f"{', '.join(scales)}, got none"
         )
-    return _numbers(where, law, tuple(found))
+    return _scaled(where, law, found)
 
 
-def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
-    """Return `names`, whose values have to be positive numbers."""
-    known = parameters(law)
+def _scaled(where: str, law: Law, names: Iterable[str]) -> Regularisation:
+    """Return the parameters `names` with their powers; their values must be positive numbers."""
+    powers: dict[str, float] = {}
     for name in names:
-        value = known[name].value
-        if not is_number(value) or not float(value) > 0.0:
-            raise checks.refused(f"{where}: law: {name}", "a number > 0 to start from", value)
-    if not names:
-        raise ValueError(f"{where}: parameter: expected the names of one or more, got none")
-    return Regularisation(law, {name: _power(known[name]) for name in names})
-
-
-def _power(p: Parameter) -> float:
-    """Power of s with which the parameter is scaled."""
-    if p.role == "damping":
-        return -0.5
-    return -1.0 if p.role == "stiffness" or p.unit in ("s/m", "s/rad", "1/m") else 1.0
+        p = parameters(law)[name]
+        if not is_number(p.value) or not float(p.value) > 0.0:
+            raise checks.refused(f"{where}: law: {name}", "a number > 0 to start from", p.value)
+        inverse = p.role == "stiffness" or p.unit in ("s/m", "s/rad", "1/m")
+        powers[name] = -0.5 if p.role == "damping" else -1.0 if inverse else 1.0
+    return Regularisation(law, powers)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """Machine that takes any law, and the signals by which laws are compared.
+    """Machine that accepts any law, and the signals by which laws are compared.
 
     Attributes:
         name: of the machine.
         make: law -> scene or model.
-        t_end: how long a motion is [s].
-        of: which signals, or which numbers; None for the positions.
+        t_end: length of the motion [s].
+        of: compared signals or numbers; None for the positions.
         u: inputs of the model.
-        times: at which motions are compared [s]; None for equally spaced ones.
-        places: fields of the scene that hold the law; None for all that hold its kind.
-        free: whether the widths are parameters of one model and not numbers in each.
+        times: times of the comparison [s]; None for equally spaced ones.
+        places: fields of the scene that hold the law; None for all that hold its class.
+        free: True if the widths are parameters of one model and not numbers in each.
         backend: engine of the runs, see `simulate`.
     """
 
@@ -200,12 +195,12 @@ class Sample:
 
     Attributes:
         s: factor of the widths.
-        values: what they are.
+        values: the widths.
         rtol: relative tolerance of the run.
         steps, attempts: of the integrator.
         time_s: CPU time of the call [s].
-        motion: what was looked at, shape (signals, times).
-        size: of each row, that errors are relative to.
+        motion: compared signals, shape (signals, times).
+        size: size of each row, to which errors are relative.
     """
 
     s: float
@@ -229,31 +224,29 @@ def machine_of(
 ) -> Machine:
     """Return a scene, a class of scenes, or a function law -> scene or model, as a machine.
 
-    A scene is driven as it is by default, unless `u` is given. A function is called with
-    `probe` once.
+    Inputs are those of the scene and `u`. A function is called once with `probe`.
 
     Raises:
-        ValueError: none of these, no end where nothing says one.
+        ValueError: none of these, or no end of the motion.
     """
     if of is not None and not callable(of):
         of = checks.names(f"{where}: of", of)
     places: tuple[str, ...] | None = ("law",)
     make: Callable[[Law], object]
     if isinstance(scene, Scene):
-        make, kind, name = partial(_in_scene, scene), type(scene), type(scene).__name__
+        first, make = scene, partial(_in_scene, scene)
     elif isinstance(scene, type) and issubclass(scene, Scene):
-        make, kind, name = scene, scene, scene.__name__
+        first, make = scene(probe), scene
     elif callable(scene):
-        make, places = scene, None
-        first = make(probe)
+        first, make, places = scene(probe), scene, None
         if not isinstance(first, Scene | Model):
             called = f"{where}: scene({type(probe).__name__})"
             raise checks.refused(called, "a scene or a Model", first)
-        kind, name = type(first), first.name if isinstance(first, Model) else type(first).__name__
     else:
-        what = "a scene such as Rabinowicz, or a function law -> Model"
-        raise checks.refused(f"{where}: scene", what, scene)
-    end, given = driven(where, kind, t_end, u)
+        expected = "a scene such as Rabinowicz, or a function law -> Model"
+        raise checks.refused(f"{where}: scene", expected, scene)
+    name = first.name if isinstance(first, Model) else type(first).__name__
+    end, given = driven(where, type(first), t_end, u)
     return Machine(name, make, end, of, given, places=places, backend=backend)
 
 
@@ -264,10 +257,10 @@ def _in_scene(scene: Scene, law: Law) -> Scene:
 def driven(
     where: str, kind: type, t_end: float | None, u: Mapping[str, Input] | None
 ) -> tuple[float, Mapping[str, Input]]:
-    """End [s] and inputs of a motion: those given, else those of the class `kind` of scenes.
+    """Return the end [s] and the inputs of a motion, by default those of the scenes `kind`.
 
     Raises:
-        ValueError: no end where nothing says one, or one that is not positive.
+        ValueError: no end, or one that is not positive.
     """
     given = dict(u or {})
     if issubclass(kind, Scene):
@@ -288,7 +281,7 @@ def sample(
     max_steps: int = 10_000_000,
     model: Model | None = None,
 ) -> Sample:
-    """Run `machine` with `law`, whose model it makes; timed as the fastest of `repeats` calls.
+    """Run `machine` with `law`, in `model` if it is given; the time is the shortest of `repeats`.
 
     Raises:
         SolveError: the run failed.
@@ -314,10 +307,10 @@ def sample(
 
 
 def looked_at(machine: Machine, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
-    """Signals on which errors are measured, shape (signals, times), and their sizes."""
+    """Return the compared signals, shape (signals, times), and their sizes."""
     if callable(machine.of):
-        found = checks.array(f"{machine.name}: of", machine.of(run), ndim=None, nan=True)
-        rows = found.reshape(-1, 1)
+        numbers = checks.array(f"{machine.name}: of", machine.of(run), ndim=None, nan=True)
+        rows = numbers.reshape(-1, 1)
         size = np.abs(rows)[:, 0]
         return rows, np.where(size > 0, size, 1.0)
     names = machine.of or positions(model, law)
@@ -339,15 +332,15 @@ def positions(model: Model, law: Law) -> tuple[str, ...]:
 
 
 def distance(one: Sample, reference: Sample) -> float:
-    """Largest difference of two runs at any time, relative to the size of the reference."""
+    """Return the largest difference of two runs, relative to the size of the reference."""
     return apart(one.motion, reference.motion, reference.size)
 
 
 def apart(one: Array, reference: Array, size: Array, mean: bool = False) -> float:
-    """Largest difference of two motions, shape (signals, times), relative to `size`.
+    """Return the largest difference of two motions, shape (signals, times), relative to `size`.
 
-    With `mean` the largest root mean square, for data, which hold noise; infinite where motions do
-    not compare: another number of cycles, say.
+    With `mean` it is the largest root mean square, for data with noise. It is infinite for motions
+    of another shape, for example of another number of cycles.
     """
     if one.shape != reference.shape or not one.size:
         return inf

@@ -1,4 +1,4 @@
-"""Figures of a contact whose velocity is given: steady curves, hysteresis, lag, jumps, dwell."""
+"""Figures of a contact under a given velocity: steady curves, hysteresis, lag, jumps, dwell."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -6,58 +6,32 @@ from math import isfinite
 import casadi as ca
 import numpy as np
 
-from symfric.figures.data import NORMAL_FORCE, Curve, FigureData, Scales, finite, require, scales
-from symfric.figures.motion import UNITS, Slide, slides, through
+from symfric.figures.data import Content, Curve, behaviour, finite
+from symfric.figures.motion import NORMAL_FORCE, UNITS, Scales, Slide, scales, slides, through
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import AnyLaw, Law, RuiWang, SelfTuning, law_name, steady_force, steady_inputs
 
+over_velocity = behaviour((), {"v": "m/s", "F": "N"}, ("v", "F"))
 
-def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -> FigureData:
-    """Force-velocity profile over +-5 Stribeck velocities.
 
-    Columns v [m/s], F [N]. Every law has one. Further inputs of a law, such as the applied force,
-    have the values that the title says, with the sign of v.
+@over_velocity
+def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -> Content:
+    """Show the force-velocity profile over +-5 Stribeck velocities, of any law.
+
+    Columns v [m/s], F [N]. Further inputs of a law, such as the applied force, have the values in
+    the title, with the sign of v.
 
     Args:
         law: with numbers for parameters.
         N: normal force [N].
-        given: magnitudes to take the range from, instead of those of the law.
+        given: magnitudes that determine the range, by default those of the law.
     """
     V = (given or scales(law, N)).velocity
     fine = np.geomspace(1e-4 * V, 5 * V, 600)
     v = np.concatenate([-fine[::-1], [0.0], fine])
     F = finite("profile", law, steady_force(law, v, N))
     title = f"force in steady sliding, N = {N:g} N{steady_inputs(law)}"
-    return _over_velocity("profile", title, [Curve(law_name(law), "", {"v": v, "F": F})])
-
-
-def steady_state(
-    law: AnyLaw,
-    N: float = NORMAL_FORCE,
-    given: Scales | None = None,
-    shares: Sequence[float] = (0.0, 0.25, 0.5, 1.0),
-) -> FigureData:
-    """Force in steady sliding up to 10 Stribeck velocities V (thesis, Lund 2015).
-
-    Columns v [m/s], F [N]. A law with the viscous coefficient sigma_2 is shown with that of its
-    own and, dashed, with those that add `shares` of the kinetic level at 10 V; the first, none,
-    is its dry part. Every other law is shown as it is.
-    """
-    magnitudes = given or scales(law, N)
-    v = np.geomspace(1e-3, 10.0, 601) * magnitudes.velocity
-    F = finite("steady_state", law, steady_force(law, v, N))
-    curves = [Curve(law_name(law), "", {"v": v, "F": F})]
-    if isinstance(law, Law) and "sigma_2" in parameters(law):
-        unit = parameters(law)["sigma_2"].unit
-        load = N if unit == "s/m" else 1.0
-        for share in shares:
-            sigma_2 = share * magnitudes.kinetic / (10 * magnitudes.velocity * load)
-            other = with_values(law, {"sigma_2": sigma_2})
-            columns = {"v": v, "F": steady_force(other, v, N)}
-            case = f"sigma_2 = {sigma_2:.4g} {unit}"
-            curves.append(Curve(law_name(law), case, columns, reference=True))
-    title = f"steady sliding, N = {N:g} N{steady_inputs(law)}"
-    return _over_velocity("steady_state", title, curves)
+    return title, [Curve(law_name(law), "", {"v": v, "F": F})]
 
 
 SHAPES = (0.0, 0.5, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
@@ -69,16 +43,31 @@ SWEPT = {
     "C": ("shape factor", "up to 1 gives a plateau, above 1 a peak from which the force falls"),
     "E": ("curvature factor", "moves the peak to another velocity and leaves height and slope"),
 }
-"""Factor -> what it is called, and what a figure says that it does."""
+"""Factor -> its name and its effect."""
 
 
+@over_velocity
+def sweep_b(
+    law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None,
+    values: Sequence[float] = STIFFNESSES,
+) -> Content:  # fmt: skip
+    """Show profiles for the stiffness factors `values` as shares of B.
+
+    Columns v [m/s], F [N]. B scales the velocity and leaves the height of the peak (doi
+    10.1177/14644193231169325, fig. 8).
+
+    Raises:
+        ValueError: neither `SelfTuning` nor `RuiWang`.
+    """
+    return _sweep("B", law, N, given, values)
+
+
+@over_velocity
 def sweep_c(
-    law: AnyLaw,
-    N: float = NORMAL_FORCE,
-    given: Scales | None = None,
+    law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None,
     values: Sequence[float] = SHAPES,
-) -> FigureData:
-    """Profiles for the shape factors `values` in [0, 2] (doi 10.1177/14644193231169325, fig. 7).
+) -> Content:  # fmt: skip
+    """Show profiles for the shape factors `values` in [0, 2] (same source, fig. 7).
 
     Columns v [m/s], F [N]. `SelfTuning` computes C >= 1 from mu_d / mu_s; here C is set, as in
     `RuiWang` with D = mu_s N. C = 0 is no friction, C <= 1 monotone, C > 1 has a peak.
@@ -89,29 +78,12 @@ def sweep_c(
     return _sweep("C", law, N, given, values)
 
 
-def sweep_b(
-    law: AnyLaw,
-    N: float = NORMAL_FORCE,
-    given: Scales | None = None,
-    values: Sequence[float] = STIFFNESSES,
-) -> FigureData:
-    """Profiles for the stiffness factors `values` as shares of B (same source, fig. 8).
-
-    Columns v [m/s], F [N]. B scales the velocity and leaves the peak as high as it is.
-
-    Raises:
-        ValueError: neither `SelfTuning` nor `RuiWang`.
-    """
-    return _sweep("B", law, N, given, values)
-
-
+@over_velocity
 def sweep_e(
-    law: AnyLaw,
-    N: float = NORMAL_FORCE,
-    given: Scales | None = None,
+    law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None,
     values: Sequence[float] = CURVATURES,
-) -> FigureData:
-    """Profiles for the curvature factors `values` below 1 (same source, fig. 9).
+) -> Content:  # fmt: skip
+    """Show profiles for the curvature factors `values` below 1 (same source, fig. 9).
 
     Columns v [m/s], F [N]. E moves the peak and leaves its height and the slope at rest.
 
@@ -123,17 +95,16 @@ def sweep_e(
 
 def _sweep(
     factor: str, law: AnyLaw, N: float, given: Scales | None, values: Sequence[float]
-) -> FigureData:
-    """Profiles of the magic formula of `law`, its shape factor free, for `values` of a factor."""
-    name = f"sweep_{factor.lower()}"
+) -> Content:
+    """Return profiles of the magic formula of `law`, its shape factor free, for `values`."""
     if isinstance(law, RuiWang):
         base = law
     elif isinstance(law, SelfTuning):
         base = RuiWang(D=law.mu_s * N, C=law.C, B=law.B, E=law.E)
     else:
         raise ValueError(
-            f"{name} of {law_name(law)}: expected a law with the factors B, C and E, self_tuning "
-            "or rui_wang, got one without them"
+            f"sweep_{factor.lower()} of {law_name(law)}: expected a law with the factors B, C and "
+            "E, self_tuning or rui_wang, got one without them"
         )
     v = np.linspace(-2.0, 2.0, 1201) * (given or scales(law, N)).velocity
     curves: list[Curve] = []
@@ -142,20 +113,16 @@ def _sweep(
         case = f"{factor} = {value:g}" + (" s/m" if factor == "B" else "")
         F = steady_force(RuiWang(D=base.D, **factors), v, N)
         curves.append(Curve(law_name(law), case, {"v": v, "F": F}))
-    kind, does = SWEPT[factor]
-    title = f"profiles for values of the {kind} {factor}, N = {N:g} N"
-    return _over_velocity(name, title, curves, f"{factor} {does}")
-
-
-def _over_velocity(name: str, title: str, curves: Sequence[Curve], note: str = "") -> FigureData:
-    units = {"v": "m/s", "F": "N"}
-    return FigureData(name, title, units, (("v", "F"),), tuple(curves), note=note)
+    name, effect = SWEPT[factor]
+    title = f"profiles for values of the {name} {factor}, N = {N:g} N"
+    return title, curves, f"{factor} {effect}"
 
 
 ROUTE = (0.0, 2.0, -2.0, 1.0, -1.0, 1.0, -2.0, 2.0)
 """Turning points in pre-sliding distances: a loop from -1 to 1 within one from -2 to 2."""
 
 
+@behaviour(("P",), UNITS, ("x", "F"))
 def hysteresis(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
@@ -163,18 +130,17 @@ def hysteresis(
     speeds: Sequence[float] = (1.0, 5.0, 20.0),
     duration: float = 8.0,
     route: Sequence[float] | None = None,
-) -> FigureData:
-    """Force over position along nested loops at several `speeds` (Lampaert et al. 2003).
+) -> Content:
+    """Show the force over position along nested loops at several `speeds` (Lampaert et al. 2003).
 
     Columns t [s], x [m], v [m/s], F [N]. The loops turn at 1 and 2 pre-sliding distances, or at
     the positions `route` [m], and take `duration` [s] at speed 1. A law with non-local memory
-    returns to the force of each turning point it comes back to (the second arrival at 1 and at -2);
-    a rate-independent one draws the same curve at every speed.
+    returns to the force of a turning point that is reached again (the second arrival at 1 and at
+    -2); a rate-independent one has the same curve at every speed.
 
     Raises:
         ValueError: a law without pre-sliding displacement, or one that needs the applied force.
     """
-    require("hysteresis", law, "P")
     if route is None:
         stretch = (given or scales(law, N)).stretch
         route = [point * stretch for point in ROUTE]
@@ -185,36 +151,30 @@ def hysteresis(
     curves = [
         slide(f"{speed:g}x", np.linspace(0.0, duration / speed, 1401), speed) for speed in speeds
     ]
-    return FigureData(
-        "hysteresis",
-        f"pre-sliding hysteresis, {duration:g} s at 1x, N = {N:g} N",
-        UNITS,
-        (("x", "F"),),
-        tuple(curves),
-    )
+    return f"pre-sliding hysteresis, {duration:g} s at 1x, N = {N:g} N", curves
 
 
+@behaviour(("L",), UNITS, ("v", "F"))
 def lag(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     frequencies: Sequence[float] = (2.0, 5.0, 10.0),
     periods: int = 3,
-) -> FigureData:
-    """Force over a velocity that rises and falls without reversal (Lampaert et al. 2003, fig. 6).
+) -> Content:
+    """Show the force over a velocity without reversal (Lampaert et al. 2003, fig. 6).
 
         v = V [2.5 + 2 sin(2 pi f t)],   V the Stribeck velocity
 
     Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each f of `frequencies` [Hz];
     the curve "steady" is F in steady sliding. With lag the force is higher while v rises than
-    while it falls. A memory much longer than the periods has not settled by then: rate-and-state
-    renews its contacts over D_c, here within seconds, and shows its direct effect; give it a
-    larger velocity by `given`.
+    while it falls. A memory much longer than the periods is not settled: rate-and-state friction
+    renews its contacts over D_c, here within seconds, and shows its direct effect; a larger
+    velocity of `given` settles it.
 
     Raises:
         ValueError: a law without frictional lag.
     """
-    require("lag", law, "L")
     V = (given or scales(law, N)).velocity
 
     def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
@@ -224,23 +184,19 @@ def lag(
     curves = last_period(slide, frequencies, periods, 401)
     v = V * np.linspace(0.5, 4.5, 401)
     steady = Curve(law_name(law), "steady", {"v": v, "F": steady_force(law, v, N)}, reference=True)
-    return FigureData(
-        "lag",
-        f"frictional lag, v = {V:.3g} m/s (2.5 + 2 sin(2πft)), N = {N:g} N",
-        UNITS,
-        (("v", "F"),),
-        (*curves, steady),
-    )
+    title = f"frictional lag, v = {V:.3g} m/s (2.5 + 2 sin(2πft)), N = {N:g} N"
+    return title, [*curves, steady]
 
 
+@behaviour(("P",), UNITS, ("v", "F"), ("x", "F"))
 def transition(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     frequencies: Sequence[float] = (2.0, 10.0),
     periods: int = 2,
-) -> FigureData:
-    """Force over a sinusoidal velocity of 5 Stribeck velocities (Lampaert et al. 2003).
+) -> Content:
+    """Show the force over a sinusoidal velocity of 5 Stribeck velocities (Lampaert et al. 2003).
 
     Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each of `frequencies` [Hz].
     The contact goes from pre-sliding to sliding and back twice a period.
@@ -248,21 +204,14 @@ def transition(
     Raises:
         ValueError: a law without pre-sliding displacement, or one that needs the applied force.
     """
-    require("transition", law, "P")
     V = 5 * (given or scales(law, N)).velocity
 
     def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
         return V * ca.sin(2 * ca.pi * pace * t)
 
     slide = slides(law, N, velocity)
-    curves = last_period(slide, frequencies, periods, 1201)
-    return FigureData(
-        "transition",
-        f"from pre-sliding to sliding, v = {V:.3g} m/s sin(2πft), N = {N:g} N",
-        UNITS,
-        (("v", "F"), ("x", "F")),
-        curves,
-    )
+    title = f"from pre-sliding to sliding, v = {V:.3g} m/s sin(2πft), N = {N:g} N"
+    return title, last_period(slide, frequencies, periods, 1201)
 
 
 def last_period(
@@ -276,23 +225,23 @@ def last_period(
 
 
 LEG = 20.0
-"""Way at each velocity, in ways that renew the contacts."""
+"""Path at each velocity, in paths that renew the contacts."""
 
 
+@behaviour(("L",), UNITS, ("x", "F"))
 def velocity_step(
     law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None, factor: float = 10.0
-) -> FigureData:
-    """Force along the way while the velocity jumps from V to `factor` V and back.
+) -> Content:
+    """Show the force along a path on which the velocity jumps from V to `factor` V and back.
 
-    V is the Stribeck velocity, that of `RateAndState` its reference velocity. Columns t [s], x [m],
-    v [m/s], F [N]. The way at each velocity is 20 times that which renews the contacts, D_c or the
-    pre-sliding distance. Rate-and-state friction jumps by a ln(factor) N and falls by
-    b ln(factor) N behind it.
+    V is the Stribeck velocity, for `RateAndState` the reference velocity. Columns t [s], x [m],
+    v [m/s], F [N]. The path at each velocity is 20 times that which renews the contacts, D_c or the
+    pre-sliding distance. Rate-and-state friction jumps by a ln(factor) N, then falls by
+    b ln(factor) N.
 
     Raises:
         ValueError: a law without frictional lag.
     """
-    require("velocity_step", law, "L")
     magnitudes = given or scales(law, N)
     V = magnitudes.velocity
     slow = LEG * memory(law, magnitudes) / V
@@ -305,30 +254,24 @@ def velocity_step(
     legs = zip((0.0, *ends[:-1]), ends, strict=True)
     times = np.concatenate([a + (b - a) * np.linspace(0.0, 1.0, 301) ** 3 for a, b in legs])
     curve = slides(law, N, velocity)("", np.unique(times), 1.0, jumps=ends[:-1].tolist())
-    return FigureData(
-        "velocity_step",
-        f"v from {V:.3g} to {factor * V:.3g} m/s and back, N = {N:g} N",
-        UNITS,
-        (("x", "F"),),
-        (Curve(law_name(law), "", curve.columns),),
-    )
+    return f"v from {V:.3g} to {factor * V:.3g} m/s and back, N = {N:g} N", [curve]
 
 
+@behaviour(("T",), {"hold": "s", "F": "N"}, ("hold", "F"), log=("hold",), dots=True)
 def dwell(
     law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     holds: Sequence[float] = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0),
-) -> FigureData:
-    """Peak of the force when sliding starts again after a time at rest (slide, hold, slide).
+) -> Content:
+    """Show the peak of the force when sliding starts again after a rest (slide, hold, slide).
 
     The contact slides at the Stribeck velocity until it is steady, rests for each of `holds` [s],
-    and slides again. Columns hold [s], F [N], the greatest force from then on.
+    and slides again. Columns hold [s], F [N], the largest force after the rest.
 
     Raises:
         ValueError: a law whose static friction does not depend on the dwell time.
     """
-    require("dwell", law, "T")
     magnitudes = given or scales(law, N)
     V, way = magnitudes.velocity, 20 * memory(law, magnitudes)
     slide_for = max(1.0, way / V)
@@ -343,21 +286,41 @@ def dwell(
         slide("", slide_for + hold + again, hold, jumps=(slide_for, slide_for + hold))["F"].max()
         for hold in holds
     ]
-    return FigureData(
-        "dwell",
-        f"slide, hold, slide at {V:.3g} m/s, N = {N:g} N",
-        {"hold": "s", "F": "N"},
-        (("hold", "F"),),
-        (Curve(law_name(law), "", {"hold": np.array(holds), "F": np.array(peaks)}),),
-        log=("hold",),
-        dots=True,
-    )
+    columns = {"hold": np.array(holds), "F": np.array(peaks)}
+    return f"slide, hold, slide at {V:.3g} m/s, N = {N:g} N", [Curve(law_name(law), "", columns)]
+
+
+@over_velocity
+def steady_state(
+    law: AnyLaw,
+    N: float = NORMAL_FORCE,
+    given: Scales | None = None,
+    shares: Sequence[float] = (0.0, 0.25, 0.5, 1.0),
+) -> Content:
+    """Show the force in steady sliding up to 10 Stribeck velocities V (thesis, Lund 2015).
+
+    Columns v [m/s], F [N]. A law with the viscous coefficient sigma_2 is shown with its own one
+    and, dashed, with those that add `shares` of the kinetic level at 10 V; the first, zero, is its
+    dry part.
+    """
+    magnitudes = given or scales(law, N)
+    v = np.geomspace(1e-3, 10.0, 601) * magnitudes.velocity
+    F = finite("steady_state", law, steady_force(law, v, N))
+    curves = [Curve(law_name(law), "", {"v": v, "F": F})]
+    if isinstance(law, Law) and "sigma_2" in parameters(law):
+        unit = parameters(law)["sigma_2"].unit
+        load = N if unit == "s/m" else 1.0
+        for share in shares:
+            sigma_2 = share * magnitudes.kinetic / (10 * magnitudes.velocity * load)
+            other = with_values(law, {"sigma_2": sigma_2})
+            columns = {"v": v, "F": steady_force(other, v, N)}
+            case = f"sigma_2 = {sigma_2:.4g} {unit}"
+            curves.append(Curve(law_name(law), case, columns, reference=True))
+    return f"steady sliding, N = {N:g} N{steady_inputs(law)}", curves
 
 
 def memory(law: AnyLaw, magnitudes: Scales) -> float:
-    """Return the way that renews the contacts [m]: D_c, else the pre-sliding distance, else
-    1e-5.
-    """
+    """Return the path that renews the contacts [m]: D_c, the pre-sliding distance, or 1e-5."""
     known = parameters(law)
     if "D_c" in known:
         return float(known["D_c"].value)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu.variables import LEAST_RTOL
 from symfric.integrator.arguments import chosen
-from symfric.integrator.equations.expressions import pace
+from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import (
     FLOOR,
     LONGEST_FIRST,
@@ -27,8 +27,8 @@ from symfric.integrator.equations.initial import (
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import search_source
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import search_source
 from symfric.integrator.running.run import PACES
 from symfric.integrator.step.attempt import build_fixed
 from symfric.integrator.step.layout import GROWTH_MEMORY
@@ -157,7 +157,7 @@ def header(own: Equations, token: str) -> str:
     }
     span = own.span[1] - own.span[0]
     # as in `run.integrate`: a few straight pieces of events in time alone
-    quickest = min((pace(f, *own.span) for f in own.integrator.schedules), default=inf)
+    quickest = min((pieces(f, *own.span).pace for f in own.integrator.schedules), default=inf)
     numbers = {
         "DEFAULT_RTOL": own.rtol, "LEAST_RTOL": LEAST_RTOL,
         "LARGEST_RTOL": min((event.rtol for event in model.events), default=0.1),

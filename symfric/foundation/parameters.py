@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import inf
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transform
 
 import casadi as ca
 import numpy as np
@@ -80,6 +80,15 @@ def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
     A form is chosen when the object is made and leaves no switch in the expressions.
     """
     return field(default=default, metadata={"choices": choices, "doc": doc})
+
+
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True, eq_default=False)
+def parametric(cls: type[T]) -> type[T]:
+    """Make a class a frozen dataclass that compares by identity, as every `Parametric` is."""
+    return dataclass(frozen=True, eq=False)(cls)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,75 +5,35 @@ Other spellings are accepted: `N*s/m`, `kg·m²`, `m/s/s`, `m/s2`, `N.m`, `Nm`. 
 slash divide. Newtons stay newtons and radians radians, so that a torque is not an energy.
 """
 
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from math import pi
+from pathlib import Path
 from re import fullmatch, search, sub
-from typing import final
+from typing import Any, final
 from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-YEAR = 365.25 * 86400.0
-"""Julian year [s]."""
-PREFIXES: Mapping[str, float] = {
-    "": 1.0, "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 0.1,
-    "h": 100.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
-}  # fmt: skip
-
-_COUNTS = (
-    "count", "counts", "inc", "tick", "ticks", "step", "steps", "unit", "units", "LSB", "bit",
-    "px", "pulse", "pulses", "pu", "sample", "AU", "arb",
-)  # fmt: skip
-_OF_SI = (
-    *"msAKNJWVFCSTH", "mol", "cd", "Pa", "Hz", "Ohm", "Wb", "rad", "sr", "lm", "lx", "kat",
-)  # fmt: skip
+_DATA: dict[str, Any] = tomllib.loads(Path(__file__).with_name("units.toml").read_text("utf-8"))
+PREFIXES: Mapping[str, float] = _DATA["prefixes"]
 PREFIXED: Mapping[str, tuple[float, str]] = {
-    **{symbol: (1.0, symbol) for symbol in _OF_SI},
-    "g": (1e-3, "kg"), "L": (1e-3, "m^3"), "l": (1e-3, "m^3"), "bar": (1e5, "Pa"),
-    "cal": (4.184, "J"), "Wh": (3600.0, "J"), "Ah": (3600.0, "C"), "VA": (1.0, "W"),
-    "var": (1.0, "W"),
-}  # fmt: skip
+    **{symbol: (1.0, symbol) for symbol in _DATA["si"].split()},
+    **{symbol: (size, unit) for symbol, (size, unit) in _DATA["prefixed"].items()},
+}
 """Symbols that take a prefix -> their size in SI units, and that SI unit."""
-ALONE: Mapping[str, Mapping[str, float]] = {
-    "1": {
-        **dict.fromkeys(_COUNTS, 1.0),
-        "1": 1.0, "%": 0.01, "permille": 1e-3, "ppm": 1e-6, "dB": 1.0,
-    },
-    "rad": {
-        "deg": pi / 180, "arcmin": pi / 10800, "arcsec": pi / 648000, "gon": pi / 200,
-        **dict.fromkeys(("rev", "turn", "turns", "rot", "cycle", "cycles"), 2 * pi),
-    },
-    "rad/s": {"rpm": pi / 30, "rps": 2 * pi},
-    "s": {
-        "min": 60.0, "h": 3600.0, "d": 86400.0, "day": 86400.0, "days": 86400.0, "week": 604800.0,
-        **dict.fromkeys(("a", "yr", "year", "years"), YEAR),
-    },
-    "m": {"in": 0.0254, "ft": 0.3048}, "kg": {"lb": 0.45359237, "t": 1000.0},
-    "N": {"lbf": 4.4482216152605, "kgf": 9.80665}, "W": {"hp": 745.6998715822702},
-    "Pa": {"psi": 6894.757293168, "atm": 101325.0, "mmHg": 133.322387415},
-    "degC": {"degC": 1.0}, "degF": {"degF": 5 / 9},
-}  # fmt: skip
-"""SI unit -> symbols of it without prefixes, and their size; units of counts are 1."""
-_ALONE = {name: (size, unit) for unit, names in ALONE.items() for name, size in names.items()}
+_ALONE: Mapping[str, tuple[float, str]] = {
+    **{symbol: (1.0, "1") for symbol in _DATA["counts"].split()},
+    **{symbol: (size, si) for si, own in _DATA["alone"].items() for symbol, size in own.items()},
+}
+"""Symbols without prefixes, likewise; units of counts are 1."""
 SPOKEN: Mapping[str, str] = {"u/min": "rpm", "r/min": "rpm"}
 """Complete units that are not products of symbols."""
 WORDS: Mapping[str, str] = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us",
-    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "minute": "min", "minutes": "min",
-    "mins": "min", "hour": "h", "hours": "h", "hr": "h", "newton": "N", "newtons": "N",
-    "newtonmeter": "N m", "kilogram": "kg", "kilograms": "kg", "kilo": "kg", "gram": "g",
-    "radian": "rad", "radians": "rad", "rads": "rad", "degree": "deg", "degrees": "deg",
-    "degs": "deg", "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A",
-    "watt": "W", "watts": "W", "joule": "J", "joules": "J", "pascal": "Pa", "hertz": "Hz",
-    "kelvin": "K", "celsius": "degC", "ohm": "Ohm", "ohms": "Ohm", "percent": "%", "mps": "m/s",
-    "kph": "km/h", "kmh": "km/h", "kmph": "km/h", "mm2": "mm^2", "inch": "in", "inches": "in",
-    "none": "1", "rpm": "rpm", "rps": "rps", "kg": "kg", "kgs": "kg", "nm": "N m",
-    "hz": "Hz", "pa": "Pa", "kpa": "kPa",
-    "mpa": "MPa", "kn": "kN", "n": "N", "w": "W", "v": "V", "j": "J", "kgm": "kg m",
-}  # fmt: skip
+    word: unit for unit, words in _DATA["words"].items() for word in words.split()
+}
 """Common words in lower case, and the unit they mean."""
 
 _SIGNS = (
@@ -87,11 +47,6 @@ _doubted: set[str] = set()
 _ORDER = ("kg", "N", "J", "V", "A", "K", "W", "", "rad", "m", "s")
 """Order of symbols in a written product; "" is the place of all others."""
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-DERIVED: Mapping[str, str] = {
-    "N": "kg m/s^2", "J": "kg m^2/s^2", "W": "kg m^2/s^3", "Pa": "kg/(m s^2)", "Hz": "1/s",
-    "V": "kg m^2/(s^3 A)", "C": "s A", "Ohm": "kg m^2/(s^3 A^2)",
-}  # fmt: skip
-"""Derived SI units in base units."""
 CELSIUS = "degC"
 """Temperature unit of FMI with an offset: 273.15 K."""
 
@@ -199,7 +154,7 @@ def exponents(text: str) -> dict[str, int] | None:
     if unit is None or unit.factor != 1.0:
         return None
     for symbol, power in unit.powers:
-        base = {symbol: 1} if symbol in BASE else exponents(DERIVED.get(symbol, "?"))
+        base = {symbol: 1} if symbol in BASE else exponents(_DATA["derived"].get(symbol, "?"))
         if base is None or power != round(power, 0):
             return None
         for name, inner in base.items():
@@ -302,7 +257,7 @@ STEPS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"
 LEAST, MOST = 0.08, 2e4
 """Range of largest magnitudes that are written without a prefix."""
 
-CLOCKS = ((YEAR, "years"), (86400.0, "days"), (3600.0, "h"))
+CLOCKS = tuple((_ALONE[unit][0], unit) for unit in ("years", "days", "h"))
 """Units of long times [s]; used from three of them on, hours from six."""
 
 

@@ -125,8 +125,12 @@ def at_start(expression: Scalar, variables: Sequence[Variable]) -> ca.DM:
     return ca.DM(ca.substitute(ca.SX(expression), symbols_of(variables), starts))
 
 
+def undeclared(expression: Scalar, known: ca.SX) -> list[ca.SX]:
+    """Return the symbols in `expression` that are not among `known`, each once."""
+    declared = {symbol.__hash__() for symbol in ca.symvar(known)}
+    return [s for s in ca.symvar(ca.SX(expression)) if s.__hash__() not in declared]
+
+
 def strays(expression: Scalar, known: ca.SX) -> list[str]:
     """Return the names of symbols in `expression` that are not among `known`, each once."""
-    declared = {symbol.__hash__() for symbol in ca.symvar(known)}
-    found = (str(s) for s in ca.symvar(ca.SX(expression)) if s.__hash__() not in declared)
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(map(str, undeclared(expression, known))))

@@ -251,7 +251,7 @@ def integrate_by_peer(
         for name, value in _counts(solver).items():
             counts[name] += value
     dense = _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n])
-    run.keep(dense)
+    run.keep(dense.rows)
     outputs.fill(dense, last=True)
     return run, counts
 

@@ -27,7 +27,7 @@ from symfric.integrator.arguments import (
     stopping,
     tolerances,
 )
-from symfric.integrator.equations.initial import first_steps
+from symfric.integrator.equations.initial import first_step
 from symfric.integrator.many.chunk import (
     EXECUTORS,
     Chunk,
@@ -357,7 +357,7 @@ def _chunk(integrator: Integrator, given: Members, tolerances: Tolerances, pick:
     y, p, data, ends = _alone(integrator, given, pick)
     t_start = float(given.inputs.breaks[0])
     S = np.ascontiguousarray(State.at(t_start, 0.0, y))
-    h = np.minimum(first_steps(ends - t_start, t_start), tolerances.max_step)
+    h = np.minimum(first_step(ends - t_start, t_start), tolerances.max_step)
     S[:, State.H] = S[:, State.H_OLD] = h
     at_start = np.broadcast_to(data[:, :, 0], (y.shape[0], data.shape[1]))
     R = tolerances.given(float(given.inputs.breaks[-1]), np.hstack([p, at_start]))

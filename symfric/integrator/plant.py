@@ -26,11 +26,10 @@ from symfric.integrator.running.plants import (
     SEARCH,
     STORM,
     Advance,
-    Looks,
     Plants,
     compiled,
-    in_vm,
-    with_events,
+    in_python,
+    looking,
 )
 from symfric.integrator.running.run import MOST_ORDERS
 from symfric.integrator.step.layout import Given, State
@@ -71,8 +70,7 @@ class Plant:
                 raise
             self._backend = "vm"  # continue in the VM if the compiler is broken
             self._advance = self._loop(integrator)
-        signals = np.zeros((plants.S.shape[0], integrator.signals.numel_out(0)))
-        self._looks, self._seen = Looks(integrator, plants, signals), False
+        self._look, self._seen = looking(integrator, plants, self._backend), False
         nx, one = integrator.system.nx, self._batch is None
         states = plants.S[:, State.MEMORY : State.MEMORY + nx]
         self._x: Array = states[0] if one else states
@@ -82,11 +80,9 @@ class Plant:
         """Return the function that advances the plants."""
         vm, plants = self._backend == "vm", self._plants
         self._in_python = vm or integrator.crossings is not None
-        if integrator.crossings is not None:
-            engine = integrator.vm() if vm else integrator.compiled()
-            return with_events(integrator, plants, engine, self._tolerance)
-        if vm:
-            return in_vm(integrator, plants)
+        if self._in_python:
+            engine = integrator.vm if vm else integrator.compiled
+            return in_python(integrator, plants, engine, self._tolerance)
         return (side_by_side if pays(integrator, plants) else compiled)(integrator, plants)
 
     def __repr__(self) -> str:
@@ -244,9 +240,8 @@ class Plant:
     def _looked(self) -> Array:
         """All signals, shape (plants, signals)."""
         if not self._seen:
-            self._looks(self._backend)
-            self._seen = True
-        return self._looks.values
+            self._values, self._seen = self._look(), True
+        return self._values
 
     def _take(self, u: ArrayLike | Numbers) -> None:
         """Store the inputs to hold next."""

@@ -193,9 +193,8 @@ class Stored:
             engine=self.engine,
             status=self.status,
             message=self.message,
-            most=np.inf,
+            kept=[self.steps.rows],
         )
-        run.keep_all(self.steps)
         later = Later(self.model, self.inputs, self.method)
         made = trajectory_of(later, self.inputs, run, self.p, lambda: self.statistics, self.backend)
         names, known = list(self.model.signals), self.signals

@@ -60,7 +60,7 @@ class Contact:
     contains the law, with its states after those of the model and its changes of mode as events.
 
     Attributes:
-        name: of its states and events, "<name>_<state>".
+        name: prefix of its states and events, "<name>_<state>".
         slip: sliding velocity [m/s], a variable or an expression of the model, shape (1, 1).
         N: normal force [N], an expression or an algebraic variable of the model; NaN if a
             mechanism's law does not depend on it.
@@ -69,8 +69,9 @@ class Contact:
             the equations of the model.
         rest: state of the model -> its value at which `slip` is exactly zero, set by a law with
             modes when sliding ends; by default the first state in which `slip` is linear.
-        states: variables for the states of the law; created, starting in steady sliding.
-        force: SX symbol of the friction force [N] that opposes the slip; created.
+        states: variables for the states of the law, by default new ones that start in steady
+            sliding.
+        force: SX symbol of the friction force [N] that opposes the slip, by default a new one.
         turning: True if the law is one of a rate [rad/s], and its force a moment [N m].
         widths: further smoothing widths: name -> parameter of `Model.open`, whose start value is
             the number in the closed model. `JointFriction.eps` is one.
@@ -114,11 +115,19 @@ class Contact:
         if self.force.is_empty():
             object.__setattr__(self, "force", ca.SX.sym(f"{self.name}_F"))
         if self.law.states and not self.states:
-            object.__setattr__(self, "states", self._made())
+            start = ca.SX(self.law.steady_state(self.slip, self.N))
+            states = tuple(
+                Variable(
+                    self.called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
+                    doc=s.doc or "internal friction state", kind=MODE if s.whole else "",
+                )
+                for i, s in enumerate(self.law.states)
+            )  # fmt: skip
+            object.__setattr__(self, "states", states)
 
     def __repr__(self) -> str:
-        kept = f", states {', '.join(v.name for v in self.states)}" if self.states else ""
-        return f"<contact '{self.name}' by {type(self.law).__name__}{kept}>"
+        states = f", states {', '.join(v.name for v in self.states)}" if self.states else ""
+        return f"<contact '{self.name}' by {type(self.law).__name__}{states}>"
 
     def unit(self, of_sliding: str) -> str:
         """Return a unit of the law, of sliding or of turning."""
@@ -127,16 +136,6 @@ class Contact:
     def called(self, name: str) -> str:
         """Return the name of a state or an event of the law in the model."""
         return f"{self.name}_{name}" if self.bare is False else name
-
-    def _made(self) -> Variables:
-        start = ca.SX(self.law.steady_state(self.slip, self.N))
-        return tuple(
-            Variable(
-                self.called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
-                doc=s.doc or "internal friction state", kind=MODE if s.whole else "",
-            )
-            for i, s in enumerate(self.law.states)
-        )  # fmt: skip
 
     @property
     def variable(self) -> Variable:

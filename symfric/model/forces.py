@@ -43,8 +43,6 @@ def completed(model: System) -> tuple[Contact, ...]:
     """
     contacts = tuple(_named(c, len(model.contacts)) for c in model.contacts)
     contacts = tuple(_resting(c, model) if _mode(c) is not None else c for c in contacts)
-    if all(_complete(c) for c in contacts):
-        return contacts
     return tuple(
         c if _complete(c) else replace(c, given={**c.given, APPLIED: _applied(i, contacts, model)})
         for i, c in enumerate(contacts)
@@ -62,6 +60,7 @@ def _named(c: Contact, count: int) -> Contact:
 
 
 def _complete(c: Contact) -> bool:
+    """Return True if the applied force is given or not needed."""
     return APPLIED in c.given or all(i.name != APPLIED for i in c.law.inputs)
 
 
@@ -73,10 +72,10 @@ def _mode(c: Contact) -> ca.SX | None:
 
 
 def _resting(c: Contact, model: System) -> Contact:
-    """Set `rest`: a state in which the slip is linear, and its value for zero slip.
+    """Set `rest` to a state in which the slip is linear, and its value for zero slip.
 
-    If there are several, it is the one in the fewest sliding velocities, since a reset also moves
-    those.
+    Of several such states it is the one in the fewest sliding velocities, since a reset also
+    changes these.
     """
     slip = ca.SX(c.slip)
     slopes = {v: ca.jacobian(slip, v.symbol) for v in model.x}
@@ -134,14 +133,14 @@ def _row(c: Contact, model: System) -> ca.SX:
 
 
 def _connected(i: int, rows: list[ca.SX], F: ca.SX) -> list[int]:
-    """Return the contacts whose forces appear in the equation of contact `i`, with `i` last."""
-    found, queue = {i}, [i]
+    """Return the contacts whose forces the equation of contact `i` depends on, with `i` last."""
+    known, queue = {i}, [i]
     while queue:
         slope = ca.jacobian(rows[queue.pop()], F)
-        new = {j for j in range(F.numel()) if slope[0, j].nnz()} - found
-        found |= new
+        new = {j for j in range(F.numel()) if slope[0, j].nnz()} - known
+        known |= new
         queue += sorted(new)
-    return [*sorted(found - {i}), i]
+    return [*sorted(known - {i}), i]
 
 
 def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
@@ -218,9 +217,7 @@ def opened(given: Mapping[str, Any], make: Callable[..., M]) -> M:
 
 
 def reopened(model: System, made: M) -> M:
-    """Return the open model `made` of a model if its variables are unchanged, else raise an
-    error.
-    """
+    """Return the open model `made` of a model; raise an error if its variables were changed."""
     inputs = {c.variable.name for c in model.contacts}
     now, then = ({letter: {v.name for v in getattr(m, letter)} for letter in "xup"}
                  for m in (model, made))  # fmt: skip

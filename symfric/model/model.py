@@ -218,27 +218,18 @@ class Model(Showing, System):
         Raises:
             ValueError: unknown name, or "ode" of an implicit model.
         """
-        t, x, z, u, p = self.t, *(self.vector(letter) for letter in "xzup")
         checks.text(f"model '{self.name}'", what, "the name of a function")
-        if what == "residual":
-            return ca.Function(
-                "residual",
-                [t, self.xdot, x, z, u, p],
-                [self.residual],
-                ["t", "xdot", "x", "z", "u", "p"],
-                ["residual"],
-            )
-        known: dict[str, Any] = {"alg": self.alg}
-        if self.ode is not None:
-            known["ode"] = self.ode
-        known["signals"] = ca.vertcat(
-            x, z, u, *(ca.SX(o.expression) for o in self.outputs.values())
-        )
-        known |= {name: ca.SX(output.expression) for name, output in self.outputs.items()}
+        outputs = {name: ca.SX(output.expression) for name, output in self.outputs.items()}
+        variables = {letter: self.vector(letter) for letter in "xzup"}
+        known = {"alg": self.alg} | ({} if self.ode is None else {"ode": self.ode})
+        known["signals"] = ca.vertcat(*(self.vector(g) for g in "xzu"), *outputs.values())
+        known |= outputs | {"residual": self.residual}
         if what not in known:
             known |= {name: ca.SX(output.expression) for name, output in self.further.items()}
-        check_names(f"model '{self.name}'", [what], [*known, "residual"])
-        return ca.Function(what, [t, x, z, u, p], [known[what]], ["t", "x", "z", "u", "p"], [what])
+        check_names(f"model '{self.name}'", [what], known)
+        rates = {"xdot": self.xdot} if what == "residual" else {}
+        given = {"t": self.t, **rates, **variables}
+        return ca.Function(what, [*given.values()], [known[what]], [*given], [what])
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:
@@ -250,16 +241,14 @@ def check_model(where: str, model: object) -> None:
     """Raise an error for anything but a model: a law, a scene, a mechanism that was not built."""
     if isinstance(model, Model):
         return
-    hint = ""
+    ways = {
+        "model": "call its model()",
+        "build": "call its build()",
+        "force": "put the law in a scene",
+    }
+    hint = next((advice for way, advice in ways.items() if hasattr(model, way)), "")
     if isinstance(model, type):
         hint = f"make one, as in {model.__name__}(LuGre()).model()" * hasattr(model, "model")
-    else:
-        ways = {
-            "model": "call its model()",
-            "build": "call its build()",
-            "force": "put the law in a scene",
-        }
-        hint = next((advice for way, advice in ways.items() if hasattr(model, way)), "")
     raise checks.refused(where, "a model, such as rabinowicz(LuGre())", model, hint)
 
 
@@ -275,31 +264,22 @@ def shown(model: System) -> Shown:
     """Describe names, units and start values of all variables, and the laws of all contacts."""
     counts = [counted(len(getattr(model, g)), *words) for g, words in WORDS.items()]
     counts += [counted(len(model.outputs), "output")]
+    rows = [
+        (v.name, one, v.unit, figure_of(v.start), v.doc)
+        for g, (one, _) in WORDS.items()
+        for v in getattr(model, g)
+    ]
+    rows += [(name, "output", o.unit, "", o.doc) for name, o in model.outputs.items()]
+    lists = {
+        "friction": friction(model),
+        "events": among(e.name for e in model.events) if model.events else "",
+        "further results": among(further) if (further := vars(model).get("further")) else "",
+    }
     return Shown(
         f"model '{model.name}': {', '.join(c for c in counts if not c.startswith('no '))}",
-        table=Table(("name", "what", "unit", "start", ""), tuple(_rows(model)), numbers=(3,)),
-        after=tuple(_after(model)),
+        table=Table(("name", "what", "unit", "start", ""), tuple(rows), numbers=(3,)),
+        after=tuple(f"{what}: {text}" for what, text in lists.items() if text),
     )
-
-
-def _rows(model: System) -> list[tuple[str, ...]]:
-    rows = [_row(v, one) for g, (one, _) in WORDS.items() for v in getattr(model, g)]
-    return rows + [(name, "output", o.unit, "", o.doc) for name, o in model.outputs.items()]
-
-
-def _row(v: Variable, what: str) -> tuple[str, ...]:
-    return v.name, what, v.unit, figure_of(v.start), v.doc
-
-
-def _after(model: System) -> list[str]:
-    found = list[str]()
-    if model.contacts:
-        found.append(f"friction: {friction(model)}")
-    if model.events:
-        found.append(f"events: {among(e.name for e in model.events)}")
-    if "further" in model.__dict__:
-        found.append(f"further results: {among(model.__dict__['further'])}")
-    return found
 
 
 def friction(model: System) -> str:

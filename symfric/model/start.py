@@ -1,4 +1,4 @@
-"""Fields of a model, and start values of its states: numbers, or expressions in other values."""
+"""Fields of a model, start values of its states, and accelerations."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -56,9 +56,7 @@ class System:
         return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
 
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
-        """Return values of the group "u" or "p": start values, replaced by those `given` by
-        name.
-        """
+        """Return the values of the group "u" or "p": those `given` by name, else start values."""
         group: Variables = getattr(self, letter)
         if not group and given is None:
             return np.zeros(0)
@@ -97,29 +95,16 @@ class System:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> NDArray[np.float64]:  # fmt: skip
-        """Return start values of x at the time `t` [s], shape (nx,), replaced by those `given` by
-        name.
+        """Return the start values of x at the time `t` [s], shape (nx,), or those `given` by name.
 
-        A start value that is an expression (a bristle at steady state depends on the sliding
+        A start value that is an expression (a bristle in steady sliding depends on the sliding
         velocity) is evaluated with the given values of the other states and parameters, and with
         the start values of algebraic variables.
         """
-        if not given and not (p and self._start_by_p) and not (t and self._start_by_t):
-            if p:
-                self.values("p", p)
-            return self._default_state.copy()
-        if self._starts_alone:
-            state, places = self._default_state.copy(), self._places
-            for name, x in self.named("x0", given).items():
-                state[places[name]] = checks.number(f"{self.name}.{name}", x)
-            if p:
-                self.values("p", p)
-            return state
-        return self._checked(evaluate(self._start, *self._start_arguments(given, p, t)))
-
-    def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
-        named = zip(self.x, start.tolist(), strict=True)
-        return np.array([checks.number(f"{self.name}.{v.name}", x) for v, x in named], float)
+        start = evaluate(self._start, *self._start_arguments(given, p, t))
+        for v, x in zip(self.x, start.tolist(), strict=True):
+            checks.number(f"{self.name}.{v.name}", x)
+        return start
 
     def initial_states(
         self,
@@ -128,28 +113,23 @@ class System:
         count: int,
         t: float | NDArray[np.float64] = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return start values (count, nx) at `t` [s], shape (count,) if times differ, and
-        parameters.
+        """Return start values (count, nx) and parameters (count, n_p) of `count` members.
 
-        Parameters have the shape (count, n_p).
+        `t` [s] is the start time, of shape (count,) if it differs between members.
         """
         given, p = self.named("x0", given), self.named("p", p)
-        parameters = np.tile(self.values("p")[:, None], (1, count))
-        for i, v in enumerate(self.p):
-            parameters[i] = p.get(v.name, parameters[i])
-        if self._starts_alone:
-            alone = np.tile(self._default_state[:, None], (1, count))
-            for i, v in enumerate(self.x):
-                alone[i] = given.get(v.name, alone[i])
-            return alone.T, parameters.T
-        known = np.zeros((len(self.x), count))
-        chosen = np.array([float(v.name in given) for v in self.x])
-        for i, v in enumerate(self.x):
-            known[i] = given.get(v.name, known[i])
-        every = np.tile(chosen[:, None], (1, count))
-        inputs = np.tile(self.values("u")[:, None], (1, count))
-        times = np.broadcast_to(t, (1, count))
-        start = self._start.map(count)(known, every, inputs, parameters, times).full()
+
+        def rows(group: Variables, values: Mapping[str, Any], start: Any) -> NDArray[np.float64]:
+            found = np.tile(np.reshape(start, (-1, 1)), (1, count))
+            for i, v in enumerate(group):
+                found[i] = values.get(v.name, found[i])
+            return found
+
+        parameters = rows(self.p, p, self.values("p"))
+        known = rows(self.x, given, np.zeros(len(self.x)))
+        chosen = rows((), {}, [float(v.name in given) for v in self.x])
+        inputs, times = rows((), {}, self.values("u")), np.broadcast_to(t, (1, count))
+        start = self._start.map(count)(known, chosen, inputs, parameters, times).full()
         return start.T, parameters.T
 
     def start_by_parameters(
@@ -157,8 +137,6 @@ class System:
         t: float = 0.0,
     ) -> NDArray[np.float64]:  # fmt: skip
         """Return the derivative of `initial_state` with respect to p, shape (nx, n_p)."""
-        if not self._start_follows:
-            return np.zeros((len(self.x), len(self.p)))
         return evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))[0]
 
     def start_by_state(
@@ -183,37 +161,9 @@ class System:
         return known, chosen, self.values("u"), self.values("p", p), np.array([t])
 
     @cached_property
-    def _default_state(self) -> NDArray[np.float64]:
-        return self._checked(evaluate(self._start, *self._start_arguments(None, None, 0.0)))
-
-    @cached_property
-    def _places(self) -> dict[str, int]:
-        return {v.name: i for i, v in enumerate(self.x)}
-
-    @cached_property
-    def _starts_alone(self) -> bool:
-        """True if all start values are numbers, independent of other states and parameters."""
-        return all(ca.SX(v.start).is_constant() for v in self.x)
-
-    @cached_property
-    def _start_by_p(self) -> bool:
-        """True if start values depend on parameters."""
-        return self._start.jac_sparsity(0, 3).nnz() > 0
-
-    @cached_property
-    def _start_by_t(self) -> bool:
-        """True if start values depend on time, such as that of a bristle under a varying load."""
-        return self._start.jac_sparsity(0, 4).nnz() > 0
-
-    @cached_property
     def _start(self) -> ca.Function:
         """Start values as a Function of (values given, mask of given ones, u, p, t)."""
         return start_function(self.x, self.vector("u"), self.vector("p"), self.t, self.z)
-
-    @cached_property
-    def _start_follows(self) -> bool:
-        """True if some start value is an expression in p."""
-        return bool(ca.depends_on(stacked(ca.SX(v.start) for v in self.x), self.vector("p")))
 
     @cached_property
     def _start_slopes(self) -> ca.Function:
@@ -245,10 +195,11 @@ def start_function(
 
 
 def accelerations(model: System) -> dict[str, Output]:
-    """Return `<q>_acc` for every state q whose rate is a state r: the rate of r, as an expression.
+    """Return the rate of r as the output `<q>_acc` for every state q whose rate is a state r.
 
-    A speed that is not the rate of a state, for example if angles do not matter, has `<speed>_acc`;
-    states of friction laws have none, nor have implicit models, whose rates are not expressions.
+    A speed that is not the rate of a state, for example if angles do not matter, has `<speed>_acc`.
+    States of friction laws have none, and neither have implicit models, whose rates are no
+    expressions.
     """
     if model.ode is None:
         return {}

@@ -35,7 +35,6 @@ acceleration per unit friction force with all other forces unchanged.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import final
 
 import casadi as ca
@@ -44,7 +43,6 @@ from numpy.typing import NDArray
 
 from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import at_start, starts_of, symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch
@@ -53,7 +51,14 @@ from symfric.model import Variables, kinds
 from symfric.multibody.equations import Equations
 from symfric.multibody.joint import Contact
 from symfric.multibody.joints import Floating
+from symfric.multibody.prepare import Prepared
 from symfric.multibody.spatial import GROUND, euler_e
+
+
+def free_bodies(eq: Equations) -> bool:
+    """Return True if all bodies are connected to the ground by floating joints."""
+    links = eq.kin.topology.links
+    return bool(links) and all(isinstance(x.joint, Floating) and x.base == GROUND for x in links)
 
 
 def mirrored(M: ca.SX) -> ca.SX:
@@ -70,7 +75,7 @@ def mirrored(M: ca.SX) -> ca.SX:
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
     """Return M^-1 times the columns of `right`, by blocks if bodies float freely."""
     topology = eq.kin.topology
-    if not _free(eq):
+    if not free_bodies(eq):
         D, L, order = ca.ldl(mirrored(eq.mass))
         return ca.ldl_solve(ca.densify(right), D, L, order) if eq.n else right
     rows: list[ca.SX] = []
@@ -84,17 +89,11 @@ def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
     return ca.vertcat(*rows)
 
 
-def _free(eq: Equations) -> bool:
-    """Return True if all bodies are connected to the ground by floating joints."""
-    links = eq.kin.topology.links
-    return bool(links) and all(isinstance(x.joint, Floating) and x.base == GROUND for x in links)
-
-
 def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return W of each row of `G`, and its value without the constraints, shape (k, 1) each."""
     J, k = eq.Phi_q, G.size1()
     right = ca.densify(ca.vertcat(G, J).T)
-    columns = ca.horzsplit(right) if _free(eq) else [right]
+    columns = ca.horzsplit(right) if free_bodies(eq) else [right]
     moved = ca.horzcat(*(solve_mass(eq, column) for column in columns))
     loose = ca.sum2(G * moved[:, :k].T)
     if not eq.m:
@@ -190,12 +189,6 @@ def forward(x: ca.SX) -> ca.SX:
     return ca.SX(smooth.choose(x < 0, -1.0, 1.0))
 
 
-def sliding_change(eq: Equations, slip: ca.SX) -> ca.SX:
-    """Return the rate of change of a sliding velocity, in terms of the accelerations of `eq`."""
-    change = ca.jtimes(slip, eq.q, eq.qd) + ca.jtimes(slip, eq.qd, eq.a)
-    return change + ca.jacobian(slip, eq.kin.t)
-
-
 def switches_at(
     law: Law | SpatialSlip, v: ca.SX, N: ca.SX, z: ca.SX, F_e: ca.SX
 ) -> tuple[Switch, ...]:
@@ -219,41 +212,21 @@ def capacity_of(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """Coordinates coupled by constraints: their numbers, and those of the constraints."""
-
-    columns: tuple[int, ...]
-    rows: tuple[int, ...]
-
-    @property
-    def freedom(self) -> int:
-        """Number of degrees of freedom."""
-        return len(self.columns) - len(self.rows)
-
-
-def loops_of(eq: Equations) -> list[Loop]:
-    """Return groups of coordinates that constraints couple, independent of each other."""
-    pattern = ca.DM(eq.Phi_q.sparsity(), 1).full() != 0
-    return [Loop(tuple(columns), tuple(rows)) for columns, rows in coupled(pattern)]
-
-
-@final
 class _Maker:
-    """Builder of the groups of contacts that stick together, of a mechanism at its start."""
+    """Builder of the groups of contacts that stick together, of a mechanism at its start.
 
-    def __init__(
-        self, where: str, eq: Equations, start: tuple[Variables, Variables, Array], p: Variables
-    ) -> None:
-        self.where, self.eq = where, eq
-        self.q, self.qd, self.a0 = start
-        self.p = p
+    Args:
+        where: for messages.
+        made: the equations of motion and their start.
+        a0: accelerations without friction at the start.
+    """
+
+    def __init__(self, where: str, made: Prepared, a0: Array) -> None:
+        self.where, self.made, self.eq, self.a0 = where, made, made.eq, a0
 
     def numbers(self, expression: ca.SX) -> Array:
         """Return an expression at the start, without friction."""
-        symbols = ca.vertcat(symbols_of(self.q), symbols_of(self.qd), self.eq.a, self.eq.kin.t)
-        values = ca.vertcat(starts_of(self.q), starts_of(self.qd), ca.SX(self.a0), 0.0)
-        return at_start(ca.substitute(ca.SX(expression), symbols, values), self.p).full()
+        return self.made.numbers(ca.substitute(expression, self.eq.a, ca.SX(self.a0)))[0]
 
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
         """Return the error for contacts whose laws cannot stick here."""
@@ -264,111 +237,91 @@ class _Maker:
             f"which needs the applied force; {advice}"
         )
 
-    def made(
+    def group(
         self, name: str, members: Sequence[int], along: Sequence[ca.SX], rate: ca.SX,
         change: ca.SX, G: ca.SX, columns: Sequence[int],
     ) -> Rest:  # fmt: skip
         """Return one group; `G` are the derivatives of its rate by the joint rates."""
-        contacts = [self.eq.contacts[i] for i in members]
+        contacts, rates = [self.eq.contacts[i] for i in members], self.made.qd
         W, loose = mobility(self.eq, G)
         here, free = (float(self.numbers(x)[0, 0]) for x in (W, loose))
         if not here > IMMOVABLE * free:
-            raise self.refuse(
-                contacts,
-                "one that needs only v and N, because constraints prescribe the sliding",
-                "start elsewhere if this is a dead centre",
-            )
+            what = "one that needs only v and N, because constraints prescribe the sliding"
+            raise self.refuse(contacts, what, "start elsewhere if this is a dead centre")
         modes = {bool(some_switches(c.law)) for c in contacts}
         if len(modes) > 1:
-            raise self.refuse(
-                contacts,
-                "laws in one loop that all stick by modes, or none",
-                "use one form",
-            )
+            what = "laws in one loop that all stick by modes, or none"
+            raise self.refuse(contacts, what, "use one form")
         by_modes, single = modes == {True}, columns == ()
         start = float(self.numbers(change)[0, 0]) / here
-        own = {f"{contacts[0].name}_rate"} if single else {self.qd[k].name for k in columns}
+        still = {f"{contacts[0].name}_rate"} if single else {rates[k].name for k in columns}
         direction: Variables = ()
         if by_modes and not single:
             begin = ca.SX(smooth.sign(rate, 0.0))
             doc = "direction of the motion of the loop, 0 in stick"
-            variable = Variable(f"{name}_direction", "1", start=begin, doc=doc, kind=kinds.MODE)
-            direction = (variable,)
+            direction = (Variable(f"{name}_direction", "1", start=begin, doc=doc, kind=kinds.MODE),)
         unit = contacts[0].unit("N") if single else ""
         doc = f"friction force of {name} for zero sliding acceleration"
-        force = Variable(
-            f"{name}_{FORCE}", unit, start=start, nominal=max(1.0, abs(start)), doc=doc
-        )
+        nominal = max(1.0, abs(start))
+        force = Variable(f"{name}_{FORCE}", unit, start=start, nominal=nominal, doc=doc)
         return Rest(
             name, tuple(members), tuple(along), rate, change, force,
             ca.SX(1 / here) if by_modes else 1 / W[0], by_modes, direction,
-            tuple(v.name for v in self.qd if v.name in own),
+            tuple(v.name for v in rates if v.name in still),
         )  # fmt: skip
 
     def single(self, i: int) -> Rest:
         """Return the group of a single contact."""
-        contact = self.eq.contacts[i]
-        change = sliding_change(self.eq, contact.slip)
-        G = ca.jacobian(contact.slip, self.eq.qd)
-        return self.made(contact.name, [i], [ca.SX(1)], contact.slip, change, G, ())
+        eq, contact = self.eq, self.eq.contacts[i]
+        slip, G = contact.slip, ca.jacobian(contact.slip, eq.qd)
+        change = ca.jtimes(slip, eq.q, eq.qd) + ca.jtimes(slip, eq.qd, eq.a)
+        change += ca.jacobian(slip, eq.kin.t)
+        return self.group(contact.name, [i], [ca.SX(1)], slip, change, G, ())
 
-    def loop(self, loop: Loop, members: Sequence[int]) -> Rest:
+    def loop(self, columns: list[int], rows: list[int], members: Sequence[int]) -> Rest:
         """Return the group of all contacts of a loop of one degree of freedom."""
-        eq, columns = self.eq, list(loop.columns)
-        contacts = [eq.contacts[i] for i in members]
-        J = eq.Phi_q[list(loop.rows), columns]
-        if ca.depends_on(eq.phi[list(loop.rows), 0], eq.kin.t):
-            raise self.refuse(
-                contacts, "one that needs only v and N in a loop that moves with time",
-                "use a smooth law",
-            )  # fmt: skip
+        eq, contacts = self.eq, [self.eq.contacts[i] for i in members]
+        if ca.depends_on(eq.phi[rows, 0], eq.kin.t):
+            what = "one that needs only v and N in a loop that moves with time"
+            raise self.refuse(contacts, what, "use a smooth law")
         if len(columns) > MINORS:
-            raise self.refuse(
-                contacts, f"a loop of at most {MINORS} coordinates", "build joint coordinates"
-            )
+            what = f"a loop of at most {MINORS} coordinates"
+            raise self.refuse(contacts, what, "build joint coordinates")
         if {s.name for c in contacts for s in some_switches(c.law)} - {"stick", "slip"}:
-            raise self.refuse(
-                contacts, "one that stops only at v = 0 in a loop", "use ExactCoulomb"
-            )
+            what = "one that stops only at v = 0 in a loop"
+            raise self.refuse(contacts, what, "use ExactCoulomb")
         Z = ca.SX(eq.n, 1)
-        Z[columns] = null_direction(J)
+        Z[columns] = null_direction(eq.Phi_q[rows, columns])
         along = [ca.jacobian(c.slip, eq.qd) @ Z for c in contacts]
         name = f"{contacts[0].name}_loop"
-        return self.made(name, members, along, ca.dot(Z, eq.qd), ca.dot(Z, eq.a), Z.T, loop.columns)
+        return self.group(name, members, along, ca.dot(Z, eq.qd), ca.dot(Z, eq.a), Z.T, columns)
 
 
-def rests(
-    where: str, eq: Equations, start: tuple[Variables, Variables, Array], p: Variables
-) -> tuple[Rest, ...]:
-    """Return the contacts whose laws need F_e, in groups that stick together.
-
-    Args:
-        where: for messages.
-        eq: the equations of motion.
-        start: coordinates, rates, and the accelerations without friction at the start.
-        p: parameters.
+def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
+    """Return the contacts whose laws need F_e, in groups that stick together; see `_Maker`.
 
     Raises:
         ValueError: constraints hold a contact, or the forces of sticking contacts are undetermined.
     """
-    asking = [i for i, c in enumerate(eq.contacts) if c.law.inputs]
-    if not asking:
+    eq = made.eq
+    applied = {i: ca.jacobian(c.slip, eq.qd) for i, c in enumerate(eq.contacts) if c.law.inputs}
+    if not applied:
         return ()
-    make, found = _Maker(where, eq, start, p), list[Rest]()
+    make = _Maker(where, made, a0)
+    loops = coupled(ca.DM(eq.Phi_q.sparsity(), 1).full() != 0)
     alone, of_loop = list[int](), dict[int, list[int]]()
-    loops = loops_of(eq)
-    for i in asking:
-        moves = set(ca.jacobian(eq.contacts[i].slip, eq.qd).sparsity().get_col())
-        touched = [k for k, loop in enumerate(loops) if moves & {*loop.columns}]
-        inside = len(touched) == 1 and moves <= {*loops[touched[0]].columns}
-        if inside and loops[touched[0]].freedom == 1:
+    for i, slopes in applied.items():
+        moves = set(slopes.sparsity().get_col())
+        touched = [k for k, (columns, _) in enumerate(loops) if moves & {*columns}]
+        columns, rows = loops[touched[0]] if len(touched) == 1 else ((), ())
+        if moves <= {*columns} and len(columns) == len(rows) + 1:
             of_loop.setdefault(touched[0], []).append(i)
         else:
             alone.append(i)
-    found += [make.loop(loops[k], members) for k, members in of_loop.items()]
+    found = [make.loop(*loops[k], members) for k, members in of_loop.items()]
     found += [make.single(i) for i in alone]
-    rows = ca.vertcat(eq.Phi_q, *(ca.jacobian(eq.contacts[i].slip, eq.qd) for i in alone))
-    if eq.m and alone and np.linalg.matrix_rank(make.numbers(ca.densify(rows))) < rows.size1():
+    rows = ca.vertcat(eq.Phi_q, *(applied[i] for i in alone))
+    if eq.m and alone and np.linalg.matrix_rank(make.numbers(rows)) < rows.size1():
         raise make.refuse(
             [eq.contacts[i] for i in alone],
             "no more of them in a loop than it has degrees of freedom",
@@ -379,12 +332,8 @@ def rests(
 
 def applied_forces(groups: Sequence[Rest], levels: Sequence[ca.SX]) -> dict[int, ca.SX]:
     """Return number of a contact -> its F_e, for the static levels of all contacts [N]."""
-    pairs = (
-        zip(
-            rest.members,
-            rest.shares([levels[i] for i in rest.members]),
-            strict=True,
-        )
-        for rest in groups
-    )
-    return dict(chain.from_iterable(pairs))
+    found: dict[int, ca.SX] = {}
+    for rest in groups:
+        shares = rest.shares([levels[i] for i in rest.members])
+        found |= zip(rest.members, shares, strict=True)
+    return found

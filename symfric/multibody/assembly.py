@@ -10,7 +10,7 @@ loops, the applied forces of laws with true sticking and those normal forces tha
 reactions are algebraic variables.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import final
@@ -26,98 +26,48 @@ from symfric.laws.catalogue import law_name
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
-from symfric.model.sketch import Sketch
 from symfric.multibody.applied import Rest, rests, solve_mass
 from symfric.multibody.equations import Equations, normals_with
-from symfric.multibody.joint import Contact as Rubbing
-from symfric.multibody.results import Put, constraint_units, multiplier_units
+from symfric.multibody.prepare import Prepared, with_cuts, without_friction
+from symfric.multibody.results import Put, constraint_units, results, sketch
 from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
-from symfric.multibody.topology import Topology
 
 AT_REST = 1e-9
 """Sliding velocity [m/s] below which a law with modes sticks in figures: its stick is exact up to
 rounding.
 """
-Details = Callable[[ca.SX, Put], Mapping[str, Output]]
-Drawn = Callable[[Mapping[str, float]], Sketch]
-
-
-def coordinates(topology: Topology) -> tuple[Variables, Variables]:
-    """Joint coordinates and their rates as variables of a model."""
-    q: list[Variable] = []
-    qd: list[Variable] = []
-    for link in topology.links:
-        joint = link.joint
-        quaternion = range(0) if joint.quaternion is None else range(joint.quaternion, link.n)
-        given = zip(joint.coordinates, joint.starts, joint.rates, strict=True)
-        for i, ((_, unit), start, rate) in enumerate(given):
-            name = joint.coordinate(i)
-            per_second = "1/s" if i in quaternion else f"{unit}/s"
-            q.append(Variable(name, unit, start=start, doc="joint coordinate", kind=kinds.POSITION))
-            qd.append(
-                Variable(f"{name}_rate", per_second, start=rate, doc="joint rate", kind=kinds.RATE)
-            )
-    return tuple(q), tuple(qd)
-
-
-def assemble(
-    name: str,
-    eq: Equations,
-    q: Variables,
-    qd: Variables,
-    labels: Sequence[str],
-    guess: Mapping[str, np.ndarray],
-    p: Variables,
-    u: Variables,
-    more: tuple[Details, Drawn],
-    index: int,
-    cut: Equations | None = None,
-) -> Model:
-    """Return the model of a mechanism.
-
-    Args:
-        eq: its equations, in the symbols of q and qd.
-        labels: names of the multipliers.
-        guess: accelerations "a", multipliers "lam" and normal forces "N" without friction, at the
-            start.
-        more: functions for further results and the sketch.
-        index: 0 or 1, see `Holonomic`.
-        cut: the equations of a long chain once more, with cuts.
-    """
-    groups = rests(f"mechanism '{name}'", eq, (q, qd, guess["a"]), p)
-    contacts = slips(eq, guess["N"].tolist(), groups)
-    units = multiplier_units(eq)
-    multipliers = tuple(
-        Variable(
-            label,
-            units[label],
-            start=float(x),
-            nominal=max(1.0, abs(float(x))),
-            doc="multiplier",
-        )
-        for label, x in zip(labels, guess["lam"], strict=True)
-    )
-    machine = _Machine(name, eq, q, qd, multipliers, p, u, more, index)
-    inner = None if cut is None else _inner(cut, eq, contacts, stacked(s.force for s in contacts))
-    frictional = _frictional(contacts)
-    opening = partial(_open, machine, contacts, frictional)
-    return _model(machine, contacts, groups, inner, frictional, opening)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """Parts of a mechanism that do not depend on its friction forces."""
+    """Parts of a mechanism that do not depend on its friction forces; `index` as in `Holonomic`."""
 
     name: str
-    eq: Equations
-    q: Variables
-    qd: Variables
+    made: Prepared
     multipliers: Variables
-    p: Variables
     u: Variables
-    more: tuple[Details, Drawn]
+    p: Variables
     index: int
+
+
+def assemble(name: str, made: Prepared, u: Variables, index: int) -> Model:
+    """Return the model of a mechanism with the inputs `u`; `index` is 0 or 1, see `Holonomic`."""
+    eq, cut = made.eq, with_cuts(made)
+    a0, lam0, N0 = without_friction(made, u)
+    groups = rests(f"mechanism '{name}'", made, a0)
+    contacts = slips(eq, N0.tolist(), groups)
+    units = eq.multipliers
+    multipliers = tuple(
+        Variable(label, units[label], start=x, nominal=max(1.0, abs(x)), doc="multiplier")
+        for label, x in zip(made.labels, lam0.tolist(), strict=True)
+    )
+    machine = _Machine(name, made, multipliers, u, made.p, index)
+    inner = None if cut is None else _inner(cut, eq, contacts)
+    # a ball is not among the contacts of a model: its slip is a vector without two sides
+    frictional = tuple(_contact(s) for s in contacts if not isinstance(s.contact.law, SpatialSlip))
+    opening = partial(_open, machine, contacts, frictional)
+    return _model(machine, contacts, groups, inner, frictional, opening)
 
 
 def _model(
@@ -125,94 +75,76 @@ def _model(
     frictional: tuple[Contact, ...], opening: Callable[[], Model] | None,
 ) -> Model:  # fmt: skip
     """Return the model of a machine with the contact forces of `contacts`."""
-    eq, p = machine.eq, machine.p
+    made, eq, p = machine.made, machine.made.eq, machine.p
     pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
-    forces = stacked(s.force for s in contacts)
-    symbols = symbols_of(machine.multipliers)
-    before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
+    states = [v for s in contacts for v in s.states]
+    before = ca.vertcat(eq.lam, eq.F)
+    after = ca.vertcat(symbols_of(machine.multipliers), stacked(s.force for s in contacts))
     needed = stacked(rest.needed([contacts[i].force for i in rest.members]) for rest in groups)
     balance, normals, phi_ddot = ca.substitute(
-        [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot],
-        [before],
-        [after],
+        [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot], [before], [after]
     )
+    rates = (*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))
     mechanics = Holonomic(
-        eq.n,
-        eq.phi,
-        eq.a,
-        ca.vertcat(balance, phi_ddot, needed, normals),
-        stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))),
-        partial(solve_mass, eq),
-        eq.norms,
-        machine.index,
-        inner,
-        *_pressing(contacts, ca.vertcat(eq.a, before)),
-        applied=len(groups),
-    )
+        eq.n, eq.phi, eq.a, ca.vertcat(balance, phi_ddot, needed, normals), stacked(rates),
+        partial(solve_mass, eq), eq.norms, machine.index, inner,
+        *_pressing(contacts, ca.vertcat(eq.a, before)), applied=len(groups),
+    )  # fmt: skip
 
     def put(expressions: Sequence[ca.SX]) -> list[ca.SX]:
         known = ca.substitute(list(expressions), [before], [after])
         return ca.substitute(known, [eq.a], [mechanics.explicit[0]])
 
-    scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
-    modal = (s for s in contacts if s.contact.friction.law.inputs)
-    names = {s.contact.name: AT_REST for s in modal} | {s.contact.name: x for s, x in scales}
+    scales = {s.contact.name: at_start(s.contact.friction.law.velocity_scale, p) for s in contacts}
+    limits = {s.contact.name: AT_REST for s in contacts if s.contact.friction.law.inputs}
+    limits |= {name: float(x) for name, x in scales.items() if x.is_regular()}
+    closed = [s for s in contacts if s.force is not s.contact.F]
+    watched = [s for s in closed if scales[s.contact.name].is_regular()]
     return Model(
         name=machine.name,
-        x=(
-            *machine.q,
-            *machine.qd,
-            *(t.angle for t in eq.turns),
-            *(v for s in contacts for v in s.states),
-            *loops,
-        ),
+        x=(*made.q, *made.qd, *(t.angle for t in eq.turns), *states, *loops),
         z=(
             *machine.multipliers,
             *(r.force for r in groups),
-            *(v for s in contacts for v in s.unknown),
+            *(v for s in pressed for v in s.unknown),
         ),
         u=machine.u,
         p=p,
         outputs=_outputs(eq, contacts, put, [v.unit for v in machine.multipliers]),
-        monitors=tuple(m for s, _ in scales if s.force is not s.contact.F for m in _watched(s)),
-        events=events([s for s in contacts if s.force is not s.contact.F], groups, machine.qd),
+        monitors=tuple(
+            Monitor(v, s.contact.friction.law.velocity_scale)
+            for s in watched
+            for v in ca.vertsplit(s.contact.slip)
+        ),
+        events=events(closed, groups, made.qd),
         t=eq.kin.t,
-        details=lambda: machine.more[0](symbols_of(p), put),
-        sketch=lambda: machine.more[1](names),
+        details=lambda: results(eq, made.open_reactions, symbols_of(p), put),
+        sketch=lambda: sketch(eq, limits),
         holonomic=mechanics,
         contacts=frictional,
         opening=opening,
     )
 
 
-def _frictional(contacts: Sequence[Slip]) -> tuple[Contact, ...]:
-    """Return the contacts of a model, except balls, whose slip is a vector without two sides."""
-    return tuple(
-        Contact(
-            s.contact.name,
-            s.contact.slip,
-            s.N if _pressed(s) else ca.SX(np.nan),
-            s.contact.friction.law,
-            given=s.inputs,
-            states=s.states,
-            force=s.contact.F,
-            turning=s.contact.friction.turning,
-            widths={"eps": _rounding(s.contact)} if s.N is not s.normal else {},
-        )
-        for s in contacts
-        if not isinstance(s.contact.law, SpatialSlip)
+def _contact(s: Slip) -> Contact:
+    """Return a contact of the model."""
+    contact = s.contact
+    width = Variable(
+        f"{contact.pressed}_eps", "N", start=contact.friction.eps, lower=0.0, doc="width of |f|"
     )
-
-
-def _pressed(slip: Slip) -> bool:
-    """Return True if its normal force is written in the symbols of the model."""
-    return slip.N is not slip.normal or depends_on_load(slip.contact.friction.law)
-
-
-def _rounding(contact: Rubbing) -> Variable:
-    """Return the width of |f| in a normal force, as a parameter."""
-    eps = contact.friction.eps
-    return Variable(f"{contact.pressed}_eps", "N", start=eps, lower=0.0, doc="width of |f|")
+    # the normal force is written in the symbols of the model, or no law needs it
+    known = s.N is not s.normal or depends_on_load(contact.friction.law)
+    return Contact(
+        contact.name,
+        contact.slip,
+        s.N if known else ca.SX(np.nan),
+        contact.friction.law,
+        given=s.inputs,
+        states=s.states,
+        force=contact.F,
+        turning=contact.friction.turning,
+        widths={"eps": width} if s.N is not s.normal else {},
+    )
 
 
 def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact, ...]) -> Model:
@@ -220,23 +152,20 @@ def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact
     eps: dict[str, Scalar] = {s.contact.pressed: s.contact.friction.eps for s in contacts}
     widths = {v.name: v for c in frictional for v in c.widths.values()}
     eps |= {name: widths[f"{name}_eps"].symbol for name in eps if f"{name}_eps" in widths}
-    free = [
-        s if s.N is s.normal else replace(s, normal=normal)
-        for s, normal in zip(contacts, normals_with(machine.eq, eps), strict=True)
-    ]
+    normals = normals_with(machine.made.eq, eps)
     names = {c.name for c in frictional}
-    free = [
-        replace(s, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
-        if s.contact.name in names
-        else s
-        for s in free
-    ]
+    free: list[Slip] = []
+    for s, normal in zip(contacts, normals, strict=True):
+        own = s if s.N is s.normal else replace(s, normal=normal)
+        if s.contact.name in names:
+            own = replace(own, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
+        free.append(own)
     u = (*machine.u, *(c.variable for c in frictional))
     p = (*machine.p, *widths.values())
     return _model(replace(machine, u=u, p=p), free, (), None, (), None)
 
 
-def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.SX) -> Inner | None:
+def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | None:
     """Return balance and normal forces with inner unknowns, eliminated link by link from the
     tips.
     """
@@ -248,30 +177,17 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.S
     f, values = ca.substitute(
         [ca.vertcat(cut.balance, *normals), cuts.values],
         [ca.vertcat(cut.a, cut.F)],
-        [ca.vertcat(eq.a, forces)],
+        [ca.vertcat(eq.a, stacked(s.force for s in contacts))],
     )
     kept = cuts.needed(f)
-    of_link: dict[str, list[ca.SX]] = {link.joint.name: [] for link in links}
-    for s in contacts:
-        of_link[s.contact.joint] += [v.symbol for v in (*s.unknown, *s.states)]
     groups: list[ca.SX] = []
     for k, link in reversed(list(enumerate(links))):
         # inner unknowns first: their right-hand sides are zero, so they cost no stage
         groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
-        groups.append(stacked(of_link[link.joint.name]))
+        own = (s for s in contacts if s.contact.joint == link.joint.name)
+        groups.append(symbols_of(v for s in own for v in (*s.unknown, *s.states)))
     return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
-
-
-def _scale(slip: Slip, p: Variables) -> float:
-    """Return the velocity scale of the law at the start values of `p` [m/s]."""
-    return float(at_start(slip.contact.friction.law.velocity_scale, p))
-
-
-def _watched(slip: Slip) -> tuple[Monitor, ...]:
-    """Return the monitors of its sliding velocities, on the scale of its law."""
-    scale = slip.contact.friction.law.velocity_scale
-    return tuple(Monitor(v, scale) for v in ca.vertsplit(slip.contact.slip))
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:
@@ -335,20 +251,17 @@ def _outputs(
     levels = ("constraint_position", "constraint_velocity", "constraint_acceleration")
     norms = [eq.phi, eq.phi_dot, eq.phi_ddot]
     expressions = put([*(s.normal for s in contacts), *norms])
-    for slip, normal in zip(contacts, expressions, strict=False):
-        contact, name = slip.contact, slip.contact.name
-        if slip.N is slip.normal:
-            what = "level of the friction moment" if contact.friction.turning else "normal force"
-            found[f"{contact.pressed}_N"] = Output(
-                normal, contact.unit("N"), what, kinds.NORMAL_FORCE
-            )
-        speed, size = _sizes(slip)
-        rate = contact.unit("m/s")
-        found[f"{name}_slip"] = Output(speed, rate, "sliding velocity, for a ball its magnitude")
-        found[f"{name}_friction"] = Output(
-            size, contact.unit("N"), "friction force opposing the slip", kinds.FRICTION
-        )
-        power = ca.dot(slip.force, contact.slip)
+    for s, normal in zip(contacts, expressions, strict=False):
+        contact, name, force = s.contact, s.contact.name, s.contact.unit("N")
+        if s.N is s.normal:
+            doc = "level of the friction moment" if contact.friction.turning else "normal force"
+            found[f"{contact.pressed}_N"] = Output(normal, force, doc, kinds.NORMAL_FORCE)
+        slip, size = _sizes(s)
+        doc = "sliding velocity, for a ball its magnitude"
+        found[f"{name}_slip"] = Output(slip, contact.unit("m/s"), doc)
+        doc = "friction force opposing the slip"
+        found[f"{name}_friction"] = Output(size, force, doc, kinds.FRICTION)
+        power = ca.dot(s.force, contact.slip)
         found[f"{name}_power"] = Output(power, "W", "power dissipated by friction", kinds.FRICTION)
     for name, value, doc in (
         ("kinetic", eq.kinetic, "kinetic energy"),
@@ -359,8 +272,6 @@ def _outputs(
     if eq.m:
         units = constraint_units(multipliers)
         for label, unit, value in zip(levels, units, expressions[len(contacts) :], strict=True):
-            norm = ca.sqrt(ca.sumsqr(value))
-            found[label] = Output(
-                norm, unit, "norm of the constraints on this level", kinds.CONSTRAINTS
-            )
+            norm, doc = ca.sqrt(ca.sumsqr(value)), "norm of the constraints on this level"
+            found[label] = Output(norm, unit, doc, kinds.CONSTRAINTS)
     return found

@@ -8,28 +8,27 @@ joints in absolute coordinates, the pose gives an angle between -pi and pi. Then
 its period: full turns are possible, and the nearest of equivalent positions is used.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import pi
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as ca
 
 from symfric.foundation.checks import expression
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.multibody.forces import Axial, Load
-from symfric.multibody.joint import Joint, Keywords
+from symfric.multibody.dynamics import numbered, twist_jacobian
+from symfric.multibody.forces import Axial, Load, Part
+from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics, Motion
-from symfric.multibody.spatial import GROUND, skew
+from symfric.multibody.spatial import GROUND
 
 Loads = Sequence[Load | Axial]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Held:
+class Held(NamedTuple):
     """Equations of a constraint, and the loads of its multipliers.
 
     Attributes:
@@ -46,31 +45,29 @@ class Held:
     unit: str = ""
     problems: tuple[str, ...] = ()
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of its multipliers."""
+        return (self.unit,) * len(self.labels)
+
+
+def _unloaded(_: ca.SX) -> Loads:
+    return ()
+
 
 def impossible(*problems: str) -> Held:
     """Return no equations, with the problems."""
-    return Held(ca.SX(0, 1), (), lambda lam: (), problems=problems)
+    return Held(ca.SX(0, 1), (), _unloaded, problems=problems)
 
 
 @dataclass(frozen=True, eq=False)
-class Constraint(Keywords, ABC):
+class Constraint(Part):
     """Constraint on the motion of bodies."""
 
     kind: ClassVar[str] = "constraint"
-    """Name of the type in messages."""
-
-    name: str
-
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the joints it names, each with a direction."""
-        return ()
-
-    def problems(self) -> Iterator[str]:
-        """Yield problems of its numbers."""
-        return iter(())
 
     @abstractmethod
-    def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
+    def held(self, kin: Kinematics) -> Held:
         """Return its equations and the loads of its multipliers."""
 
 
@@ -93,12 +90,11 @@ def linear(
         phi -= period * ca.floor(phi / period + 0.5)
     last, along, _ = terms[-1]
     what, unit = ("force", "N") if last.linear(along) else ("moment", "N m")
-    return Held(
-        phi,
-        (f"{name}_{what}",),
-        lambda lam: [Axial(joint, direction, c * lam) for joint, direction, c in terms],
-        unit,
-    )
+
+    def loads(lam: ca.SX) -> Loads:
+        return [Axial(joint, direction, c * lam) for joint, direction, c in terms]
+
+    return Held(phi, (f"{name}_{what}",), loads, unit)
 
 
 def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
@@ -138,7 +134,7 @@ class PrescribedMotion(Constraint):
         if not callable(self.motion):
             yield f"motion: expected a function of time, got {self.motion!r}; write lambda t: ..."
 
-    def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
+    def held(self, kin: Kinematics) -> Held:
         """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"
         try:
@@ -148,7 +144,7 @@ class PrescribedMotion(Constraint):
             return impossible(f"{what}, got {reason}; use casadi functions, not those of math")
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
-        joint = joints[self.joint]
+        joint = kin.topology.joints[self.joint]
         direction = joint.way(self.direction)
         period = 2 * pi if wraps(kin, joint, direction) else None
         return linear(kin, self.name, [(joint, direction, 1.0)], target, period)
@@ -175,7 +171,7 @@ class UserConstraint(Constraint):
         if not callable(self.expression):
             yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
-    def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
+    def held(self, kin: Kinematics) -> Held:
         """Return the expressions, and their derivatives by the pose of every body."""
         probe = _probe(kin)
         given: Any = self.expression(probe)
@@ -192,23 +188,22 @@ class UserConstraint(Constraint):
                 "expression: expected positions only, got velocities; nonholonomic constraints "
                 "are excluded"
             )
-        bodies = [name for name in probe.motion if name != GROUND]
-        w = ca.SX.sym("w", 3)
-        rows = [phi, ca.jacobian(phi, kin.q)]
+        rows, bodies = [phi, ca.jacobian(phi, kin.q)], [n for n in probe.motion if n != GROUND]
+        symbols, poses = list[ca.SX](), list[ca.SX]()
         for name in bodies:
-            R, p = probe.motion[name].R, probe.motion[name].p
-            turned = ca.jtimes(phi, ca.vec(R), ca.vec(skew(w) @ R))
-            rows += [ca.jacobian(phi, p), ca.jacobian(turned, w)]
-        symbols = [x for name in bodies for x in (probe.motion[name].R, probe.motion[name].p)]
-        poses = [ca.densify(x) for name in bodies for x in (kin.motion[name].R, kin.motion[name].p)]
+            (R, p, *_), (R_now, p_now, *_) = probe.motion[name], kin.motion[name]
+            by_p, by_w = twist_jacobian(phi, R, p)
+            rows += [by_p, by_w]
+            symbols += [R, p]
+            poses += [ca.densify(R_now), ca.densify(p_now)]
         value, by_q, *by_pose = (ca.sparsify(x) for x in ca.substitute(rows, symbols, poses))
 
         def loads(lam: ca.SX) -> Loads:
             found: list[Load | Axial] = []
             for name, C_v, C_w in zip(bodies, by_pose[::2], by_pose[1::2], strict=True):
                 if C_v.nnz() or C_w.nnz():
-                    at, arm = kin.motion[name].p, ca.SX(3, 1)
-                    found.append(Load(name, -C_v.T @ lam, at, -C_w.T @ lam, arm))
+                    at = kin.motion[name].p
+                    found.append(Load(name, -C_v.T @ lam, at, -C_w.T @ lam, ca.SX(3, 1)))
             for link in kin.topology.links:
                 for direction, k in link.joint.directions.items():
                     column = by_q[:, link.first + k]
@@ -216,10 +211,7 @@ class UserConstraint(Constraint):
                         found.append(Axial(link.joint, direction, -ca.dot(column, lam)))
             return found
 
-        m = value.numel()
-        label = f"{self.name}_lambda"
-        labels = (label,) if m == 1 else tuple(f"{label}_{i + 1}" for i in range(m))
-        return Held(ca.densify(value), labels, loads)
+        return Held(ca.densify(value), numbered(self.name, value.numel()), loads)
 
 
 def _probe(kin: Kinematics) -> Kinematics:
@@ -281,40 +273,34 @@ class Coupling(Constraint):
         """Yield messages about a zero ratio, invalid numbers, or a displacement coupled to
         itself.
         """
-        name, ratio, offset = self.ratio_field, getattr(self, self.ratio_field), self.offset
-        if not is_symbolic(ratio) and not (is_number(ratio) and 0 < abs(ratio) < ca.inf):
-            yield f"{name}: expected a finite number other than 0, got {ratio!r}"
-        if not is_symbolic(offset) and not (is_number(offset) and abs(offset) < ca.inf):
-            yield f"offset: expected a finite number, got {offset!r}"
+        for name, other in ((self.ratio_field, " other than 0"), ("offset", "")):
+            value = getattr(self, name)
+            number = is_number(value) and abs(value) < ca.inf and (value != 0 or not other)
+            if not is_symbolic(value) and not number:
+                yield f"{name}: expected a finite number{other}, got {value!r}"
         a, b = self._ends
         if a == b:
             yield f"expected two displacements, got {a[1]} of {a[0]} twice"
 
-    def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
+    def held(self, kin: Kinematics) -> Held:
         """Return offset + ratio s_a - s_b = 0."""
-        (a, along_a), (b, along_b) = ((joints[name], d) for name, d in self._ends)
+        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
         ratio, offset, period = self._ratio, self.offset, None
         cyclic = wraps(kin, a, along_a), wraps(kin, b, along_b)
         if all(cyclic):
-            if is_symbolic(ratio) or not _rational(ratio):
+            fraction = Fraction(0.0 if is_symbolic(ratio) else float(ratio)).limit_denominator(
+                TEETH
+            )
+            if is_symbolic(ratio) or abs(float(fraction) - ratio) > 1e-14 * abs(ratio):
                 return impossible(
                     f"{self.ratio_field}: expected a ratio of integers up to {TEETH}, as the "
                     f"angles of {a.name} and {b.name} are known modulo 2 pi only, got {ratio}; in "
                     "joint coordinates, joints outside loops allow any number"
                 )
-            fraction = _fraction(ratio)
             ratio, period = float(fraction), 2 * pi / fraction.denominator
         elif any(cyclic):
             period = 2 * pi * ratio if cyclic[0] else 2 * pi
         return linear(kin, self.name, [(a, along_a, -ratio), (b, along_b, 1.0)], offset, period)
-
-
-def _fraction(ratio: Scalar) -> Fraction:
-    return Fraction(float(ratio)).limit_denominator(TEETH)
-
-
-def _rational(ratio: Scalar) -> bool:
-    return abs(float(_fraction(ratio)) - float(ratio)) <= 1e-14 * abs(float(ratio))
 
 
 @final

@@ -1,21 +1,29 @@
 """Expressions of a mechanism in one choice of coordinates."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import final
 
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.variable import stacked
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.constraints import Constraint, Held
-from symfric.multibody.dynamics import Loop, Wrench, balance, kinetic_energy, loops, normalisations
-from symfric.multibody.forces import Axial, Force, Gravity, Load
-from symfric.multibody.joint import Contact, Joint
-from symfric.multibody.kinematics import Cuts, Kinematics, Turn, Turns, kinematics
+from symfric.multibody.dynamics import (
+    Loop,
+    Wrench,
+    balance,
+    kinetic_energy,
+    loop_of,
+    normalisations,
+)
+from symfric.multibody.forces import ZERO, Axial, Force, Gravity, Load
+from symfric.multibody.joint import Contact
+from symfric.multibody.kinematics import Cuts, Kinematics, Turn, kinematics
 from symfric.multibody.spatial import vector
-from symfric.multibody.topology import Topology, body_of, frame_at
+from symfric.multibody.topology import Topology, body_of
 
 
 @final
@@ -24,12 +32,13 @@ class Equations:
     """Equations of motion with accelerations, multipliers and friction forces as symbols.
 
     Attributes:
-        q, qd, a: coordinates, rates, accelerations, shape (n, 1).
-        lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
-        F: friction forces of the contacts [N].
+        forces: applied forces.
         held: constraints other than joints.
         turns: angles of loops that forces need.
         norms: number of Euler parameter norms, which are the last constraints.
+        q, qd, a: coordinates, rates, accelerations, shape (n, 1).
+        lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
+        F: friction forces of the contacts [N].
         phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
         contacts: of all joints with friction.
@@ -41,6 +50,7 @@ class Equations:
     """
 
     kin: Kinematics
+    forces: tuple[Force, ...]
     loops: tuple[Loop, ...]
     held: tuple[Held, ...]
     turns: tuple[Turn, ...]
@@ -87,10 +97,23 @@ class Equations:
         """Mass matrix M, shape (n, n)."""
         return ca.jacobian(self.balance, self.a)
 
+    @property
+    def angles(self) -> ca.SX:
+        """Symbols of the angles of loops, shape (k, 1)."""
+        return symbols_of(turn.angle for turn in self.turns)
+
+    @property
+    def multipliers(self) -> dict[str, str]:
+        """Name -> unit of the multipliers of all constraints, redundant ones included."""
+        found: dict[str, str] = {}
+        for part in (*self.loops, *self.held):
+            found |= zip(part.labels, part.units, strict=True)
+        links = (x for x in self.kin.topology.links if x.joint.quaternion is not None)
+        return found | {f"{link.joint.name}_norm": "J" for link in links}
+
 
 def equations(
     topology: Topology,
-    joints: Sequence[Joint],
     forces: Sequence[Force],
     constraints: Sequence[Constraint],
     q: ca.SX,
@@ -102,8 +125,7 @@ def equations(
     """Write the equations of motion of a mechanism.
 
     Args:
-        topology: tree and loops.
-        joints: all joints.
+        topology: bodies and joints.
         forces: all applied forces.
         constraints: other than joints.
         q, qd: symbols of the coordinates and their rates, shape (n, 1).
@@ -115,39 +137,44 @@ def equations(
     gravity = [f for f in forces if isinstance(f, Gravity)]
     g = sum((vector(f.g) for f in gravity), ca.SX(3, 1))
     kin = kinematics(topology, q, qd, a, t, g, cuts)
-    by_name = {joint.name: joint for joint in joints}
-    closed = loops(kin)
+    loops = tuple(loop_of(kin, joint) for joint in topology.loops)
+    held = tuple(constraint.held(kin) for constraint in constraints)
     norms, along, inertia = normalisations(kin)
-    held = tuple(c.held(kin, by_name) for c in constraints)
-    turns = Turns()
+    turns: dict[str, Turn] = {}
     kin = replace(kin, turns=turns)
-    phi = ca.vertcat(ca.SX(0, 1), *(part.phi for part in (*closed, *held)), norms)
-    kept = range(phi.numel()) if kept is None else kept
-    lam = ca.SX.sym("lam", len(kept))
-    every = ca.SX(phi.numel(), 1)
-    for k, row in enumerate(kept):
-        every[row] = lam[k]
-    contacts = tuple(_contacts(kin, joints))
-    rest = (f for f in forces if not isinstance(f, Gravity))
-    loads: list[Load | Axial] = [load for f in rest for load in f.loads(kin, by_name)]
-    loads += [load for c in contacts for load in _rubbing(kin, by_name[c.joint], c)]
-    weights = [load for f in gravity for load in f.loads(kin, by_name)]
-    power = _power(kin, [*loads, *weights]) + ca.dot(every, ca.jacobian(phi, t))
-    loads += _holding(held, every[sum(loop.phi.numel() for loop in closed) :, 0])
-    rows, world = balance(kin, loads, closed, every)
+    phi = ca.vertcat(ca.SX(0, 1), *(part.phi for part in (*loops, *held)), norms)
+    independent = [*(range(phi.numel()) if kept is None else kept)]
+    lam, every = ca.SX.sym("lam", len(independent)), ca.SX(phi.numel(), 1)
+    every[independent] = lam
+    sizes = (part.phi.numel() for part in (*loops, *held))
+    own = [every[i:j, 0] for i, j in pairwise(accumulate(sizes, initial=0))]
+    contacts = tuple(_contacts(kin))
+    loads = [load for f in forces if not isinstance(f, Gravity) for load in f.loads(kin)]
+    loads += [load for c in contacts for load in _rubbing(kin, c)]
+    weights = [load for f in gravity for load in f.loads(kin)]
+    power = sum((load.power(kin) for load in (*loads, *weights)), ca.SX(0))
+    power += ca.dot(every, ca.jacobian(phi, t))
+    of_held = zip(held, own[len(loops) :], strict=True)
+    in_parent = [loop.reaction(x) for loop, x in zip(loops, own, strict=False)]
+    loads += [load for part, x in of_held for load in part.loads(x)]
+    of_loops = list(zip(loops, in_parent, strict=True))
+    loads += [load for loop, wrench in of_loops for load in loop.loads(kin, wrench)]
+    rows, reactions = balance(kin, loads)
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (inertia * pushed)
-    phi = phi[list(kept), 0]
+    reactions |= {loop.joint.name: loop.on_child(wrench) for loop, wrench in of_loops}
+    reactions = {name: reactions[name] for name in topology.joints}
+    pressing = {loop.joint.name: wrench for loop, wrench in of_loops if loop.joint.closes}
+    pressing = reactions | pressing
+    phi = phi[independent, 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
-    reactions = {name: _without(world[name], name, kin, loads) for name in by_name}
-    own = {loop.joint.name: loop.reaction(every) for loop in closed if loop.joint.closes}
-    pressing = reactions | own
     return Equations(
         kin,
-        closed,
+        tuple(forces),
+        loops,
         held,
-        turns.found,
+        tuple(turns.values()),
         norms.numel(),
         q,
         qd,
@@ -159,9 +186,9 @@ def equations(
         ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),
         ca.densify(rows),
         contacts,
-        tuple(_normal(kin, c, by_name[c.joint], pressing) for c in contacts),
+        tuple(_normal(kin, c, pressing) for c in contacts),
         kinetic_energy(kin),
-        sum((f.energy(kin, by_name) for f in forces), ca.SX(0)),
+        sum((f.energy(kin) for f in forces), ca.SX(0)),
         power,
         reactions,
         pressing,
@@ -170,56 +197,15 @@ def equations(
 
 def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:
     """Return the normal force of each contact, rounded over the widths `eps` by `pressed` name."""
-    joints = {link.joint.name: link.joint for link in eq.kin.topology.links}
-    joints |= {loop.joint.name: loop.joint for loop in eq.loops}
-    return tuple(
-        _normal(
-            eq.kin,
-            replace(c, friction=replace(c.friction, eps=eps[c.pressed])),
-            joints[c.joint],
-            eq.pressing,
-        )
-        for c in eq.contacts
-    )
+    rounded = (replace(c, friction=replace(c.friction, eps=eps[c.pressed])) for c in eq.contacts)
+    return tuple(_normal(eq.kin, contact, eq.pressing) for contact in rounded)
 
 
-def _without(wrench: Wrench, name: str, kin: Kinematics, loads: Sequence[Load | Axial]) -> Wrench:
-    """Return the wrench that the constraints of a joint in the tree transmit, without axial
-    loads.
-    """
-    if name not in kin.topology.link_of:
-        return wrench
-    force, moment = ca.SX(wrench[0]), ca.SX(wrench[1])
-    link = kin.topology.link_of[name]
-    R = link.joint.pose(kin.q[link.rows, 0])[0]
-    for load in loads:
-        if isinstance(load, Axial) and load.joint.name == name:
-            own = ca.sparsify(R.T @ link.joint.axis(load.direction, R)) * load.value
-            if link.joint.linear(load.direction):
-                force -= own
-            else:
-                moment -= own
-    return force, moment
-
-
-def _holding(held: Sequence[Held], lam: ca.SX) -> list[Load | Axial]:
-    """Return loads of constraints other than joints, whose multipliers come first in `lam`."""
-    loads: list[Load | Axial] = []
-    first = 0
-    for part in held:
-        m = part.phi.numel()
-        loads += part.loads(lam[first : first + m, 0])
-        first += m
-    return loads
-
-
-def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
-    """Return the contacts of all joints with friction."""
-    found: list[Contact] = []
-    for joint in joints:
-        if joint.friction is None:
+def _contacts(kin: Kinematics) -> Iterator[Contact]:
+    """Yield the contacts of all joints with friction."""
+    for joint in kin.topology.joints.values():
+        if (friction := joint.friction) is None:
             continue
-        friction = joint.friction
         for direction in joint.rubs:
             name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
             rate = kin.spin(joint) if direction == "ball" else kin.rate(joint, direction)
@@ -227,38 +213,26 @@ def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
             law = SpatialSlip(friction.law) if direction == "ball" else friction.law
             pressed = name if direction in ("x", "y") else joint.name
             F = ca.SX.sym(f"{name}_friction", slip.numel())
-            found.append(Contact(name, joint.name, direction, friction, law, pressed, slip, F))
-    return found
+            yield Contact(name, joint.name, direction, friction, law, pressed, slip, F)
 
 
-def _rubbing(kin: Kinematics, joint: Joint, contact: Contact) -> list[Load | Axial]:
+def _rubbing(kin: Kinematics, contact: Contact) -> list[Load | Axial]:
     """Return the friction on the child of a joint, and on the parent."""
+    joint = kin.topology.joints[contact.joint]
     if contact.direction != "ball":
         return [Axial(joint, contact.direction, contact.load)]
     parent, child = body_of(joint.parent), body_of(joint.child)
-    R_WP = kin.motion[parent].R @ frame_at(kin.topology.bodies, joint.parent).R
-    moment, none = R_WP @ contact.load, ca.SX(3, 1)
+    moment = kin.motion[parent].R @ kin.frame(joint.parent).R @ contact.load
     return [
-        Load(body, none, kin.motion[body].p, sign * moment, none)
+        Load(body, ZERO, kin.motion[body].p, sign * moment, ZERO)
         for body, sign in ((child, 1), (parent, -1))
     ]
 
 
-def _normal(kin: Kinematics, contact: Contact, joint: Joint, reactions: dict[str, Wrench]) -> ca.SX:
+def _normal(kin: Kinematics, contact: Contact, pressing: Mapping[str, Wrench]) -> ca.SX:
     """Return the normal force of a contact [N]."""
-    F, T = reactions[joint.name]
+    joint, (F, T) = kin.topology.joints[contact.joint], pressing[contact.joint]
     if contact.direction not in ("x", "y"):
         return joint.normal_force(contact.friction, F, T)
     R = joint.bearing(contact.direction, kin.rotation(joint))
     return contact.friction.normal_force(("turn",), R @ F, R @ T)
-
-
-def _power(kin: Kinematics, loads: Sequence[Load | Axial]) -> ca.SX:
-    """Return the power of loads on the bodies [W]."""
-    total = ca.SX(0)
-    for load in loads:
-        if isinstance(load, Load):
-            total += load.power(kin)
-        else:
-            total += load.value * kin.rate(load.joint, load.direction)
-    return total

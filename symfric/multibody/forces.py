@@ -8,23 +8,21 @@ test checks it for every force).
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
-from symfric.multibody.joint import Joint
-from symfric.multibody.kinematics import Kinematics
-from symfric.multibody.spatial import GROUND, Vector, is_finite, is_vector, vector
+from symfric.multibody.joint import Joint, Keywords
+from symfric.multibody.kinematics import Kinematics, Motion
+from symfric.multibody.spatial import GROUND, Body, Vector, is_vector, vector
 from symfric.multibody.topology import body_of
 
 ZERO = ca.SX(3, 1)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Load:
+class Load(NamedTuple):
     """Force [N] at a point and a moment [N m] on a body, in world components.
 
     `arm` is the vector from the origin of the body to the point, in body components.
@@ -42,10 +40,14 @@ class Load:
         v = motion.v + ca.cross(motion.w, self.point - motion.p)
         return ca.dot(self.force, v) + ca.dot(self.moment, motion.w)
 
+    def moment_about(self, body: Body, motion: Motion) -> ca.SX:
+        """Return the moment about the centre of mass of the body, in the body's components."""
+        com = motion.point(body.c)[0]
+        arm = motion.R.T @ (self.point - com) if self.arm is None else self.arm - body.c
+        return motion.R.T @ self.moment + ca.cross(arm, motion.R.T @ self.force)
 
-@final
-@dataclass(frozen=True, eq=False)
-class Axial:
+
+class Axial(NamedTuple):
     """Force [N] or moment [N m] on the child of a joint in one of its directions.
 
     Its opposite acts on the parent.
@@ -55,20 +57,48 @@ class Axial:
     direction: str
     value: ca.SX
 
+    def power(self, kin: Kinematics) -> ca.SX:
+        """Return the power on both bodies [W]."""
+        return self.value * kin.rate(self.joint, self.direction)
+
+    def loads(self, kin: Kinematics) -> tuple[Load, Load]:
+        """Return the loads on both bodies of a joint that closes a loop."""
+        joint, relative = self.joint, kin.relative(self.joint)
+        along = relative.R_WP @ joint.axis(self.direction, relative.R) * self.value
+        force, moment = (along, ZERO) if joint.linear(self.direction) else (ZERO, along)
+        return (
+            Load(body_of(joint.child), force, relative.p_WC, moment),
+            Load(body_of(joint.parent), -force, relative.p_WC, -moment),
+        )
+
 
 @dataclass(frozen=True, eq=False)
-class Force(ABC):
-    """Applied force on bodies."""
+class Part(Keywords, ABC):
+    """Force or constraint of a mechanism."""
+
+    kind: ClassVar[str] = "part"
+    """Name of the type in messages."""
 
     name: str
 
     def places(self) -> Iterable[str]:
-        """Yield the "body.frame" texts it names."""
+        """Return the "body.frame" texts it names."""
         return ()
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Yield the joints it names, each with a direction."""
+        """Return the joints it names, each with a direction."""
         return ()
+
+    def problems(self) -> Iterator[str]:
+        """Yield problems of its numbers."""
+        return iter(())
+
+
+@dataclass(frozen=True, eq=False)
+class Force(Part):
+    """Applied force on bodies."""
+
+    kind: ClassVar[str] = "force"
 
     def problems(self) -> Iterator[str]:
         """Yield messages about numbers that are not finite."""
@@ -81,13 +111,13 @@ class Force(ABC):
     @property
     def conservative(self) -> bool:
         """True if its power is exactly the change of its potential energy."""
-        return False
+        return all(equals(getattr(self, name, 0.0), 0.0) for name in ("damping", "actuator"))
 
     @abstractmethod
-    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield the loads on the bodies."""
 
-    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+    def energy(self, kin: Kinematics) -> ca.SX:
         """Return the potential energy [J]; zero if it has none."""
         return ca.SX(0)
 
@@ -99,21 +129,16 @@ class Gravity(Force):
 
     g: Vector = (0.0, 0.0, -9.81)
 
-    @property
-    def conservative(self) -> bool:
-        """Always True for gravity."""
-        return True
-
-    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield the weight of every body at its centre of mass."""
         for name, body in kin.topology.bodies.items():
             if name != GROUND:
                 com, _ = kin.motion[name].point(body.c)
                 yield Load(name, body.mass * vector(self.g), com, arm=body.c)
 
-    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+    def energy(self, kin: Kinematics) -> ca.SX:
         """Return -m g . p."""
-        weights = self.loads(kin, joints)
+        weights = self.loads(kin)
         return sum((-ca.dot(w.force, w.point) for w in weights if isinstance(w, Load)), ca.SX(0))
 
 
@@ -139,20 +164,11 @@ class SpringDamper(Force):
         """Yield the two places between which it acts."""
         return (self.a, self.b)
 
-    @property
-    def conservative(self) -> bool:
-        """True for a pure spring."""
-        return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
-
-    @property
-    def _linear(self) -> bool:
-        return all(equals(x, 0.0) for x in (self.free_length, self.damping, self.actuator))
-
-    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield opposite forces on the line between the points."""
         (p_a, v_a), (p_b, v_b) = kin.point(self.a), kin.point(self.b)
         d = p_b - p_a
-        if self._linear:
+        if all(equals(x, 0.0) for x in (self.free_length, self.damping, self.actuator)):
             pull = self.stiffness * d
         else:
             length = ca.sqrt(ca.dot(d, d))
@@ -160,10 +176,10 @@ class SpringDamper(Force):
             if not equals(self.damping, 0.0):
                 f += self.damping * ca.dot(d, v_b - v_a) / length
             pull = f / length * d
-        yield Load(body_of(self.a), pull, p_a, arm=kin.offset(self.a))
-        yield Load(body_of(self.b), -pull, p_b, arm=kin.offset(self.b))
+        yield Load(body_of(self.a), pull, p_a, arm=kin.frame(self.a).p)
+        yield Load(body_of(self.b), -pull, p_b, arm=kin.frame(self.b).p)
 
-    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+    def energy(self, kin: Kinematics) -> ca.SX:
         """Return stiffness (l - free_length)^2 / 2."""
         d = kin.point(self.b)[0] - kin.point(self.a)[0]
         if equals(self.free_length, 0.0):
@@ -197,14 +213,9 @@ class JointSpringDamper(Force):
         """Yield the joint along whose direction it acts."""
         return ((self.joint, self.direction),)
 
-    @property
-    def conservative(self) -> bool:
-        """True for a pure spring."""
-        return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
-
-    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield one load along the direction of its joint: actuator, spring and damper."""
-        joint = joints[self.joint]
+        joint = kin.topology.joints[self.joint]
         direction = joint.way(self.direction)
         f = ca.SX(self.actuator)
         if not equals(self.stiffness, 0.0):
@@ -213,11 +224,11 @@ class JointSpringDamper(Force):
             f -= self.damping * kin.rate(joint, direction)
         yield Axial(joint, direction, f)
 
-    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+    def energy(self, kin: Kinematics) -> ca.SX:
         """Return stiffness (s - rest)^2 / 2."""
         if equals(self.stiffness, 0.0):
             return ca.SX(0)
-        joint = joints[self.joint]
+        joint = kin.topology.joints[self.joint]
         s, _ = kin.along(joint, joint.way(self.direction))
         return self.stiffness * (s - self.rest) ** 2 / 2
 
@@ -235,6 +246,11 @@ class UserForce(Force):
     place: str
     expression: Callable[[Kinematics], tuple[Vector, Vector]]
 
+    @property
+    def conservative(self) -> bool:
+        """Always False."""
+        return False
+
     def problems(self) -> Iterator[str]:
         """Yield a message if the expression is not a function."""
         if not callable(self.expression):
@@ -244,16 +260,13 @@ class UserForce(Force):
         """Yield the place at which it acts."""
         return (self.place,)
 
-    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield force and moment of the user's expression."""
         given: Any = self.expression(kin)
         pair: Sequence[Any] = given if isinstance(given, tuple | list) else ()
-        if len(pair) != 2 or not all(is_vector(x) and is_finite(vector(x)) for x in pair):
-            raise checks.refused(
-                f"force '{self.name}' > expression",
-                "a force and a moment, three numbers or expressions each",
-                given,
-            )
+        if len(pair) != 2 or not all(map(is_vector, pair)):
+            what = "a force and a moment, three numbers or expressions each"
+            raise checks.refused(f"force '{self.name}' > expression", what, given)
         force, moment = vector(pair[0]), vector(pair[1])
-        at, arm = kin.point(self.place)[0], kin.offset(self.place)
+        at, arm = kin.point(self.place)[0], kin.frame(self.place).p
         yield Load(body_of(self.place), force, at, moment, arm)

@@ -4,7 +4,6 @@ import casadi as ca
 
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Variables
-from symfric.multibody.kinematics import angles
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.slips import slips
 from symfric.multibody.spatial import GROUND
@@ -40,41 +39,48 @@ def functions(
     axis are evaluated at the angle nearest to the start.
     """
     eq = mechanism.prepare(p, formulation).eq
-    q, qd, a, lam = eq.q, eq.qd, eq.a, eq.lam
-    u, parameters = (symbols_of(group) for group in (mechanism.inputs, p))
-    still = [ca.SX.zeros(x.numel()) for x in (a, lam, eq.F)]
-    (bias,) = ca.substitute([eq.balance], [a, lam, eq.F], still)
-    if asking := [c for c in eq.contacts if c.law.inputs]:
+    where = f"mechanism '{mechanism.name}'"
+    if applied := [c for c in eq.contacts if c.law.inputs]:
         raise ValueError(
-            f"mechanism '{mechanism.name}' > joint '{asking[0].joint}' > friction > law: expected "
+            f"{where} > joint '{applied[0].joint}' > friction > law: expected "
             "one that needs only v and N, got "
-            f"{type(asking[0].friction.law).__name__}, whose force in stick depends on the motion; "
-            "use `build` for a model"
+            f"{type(applied[0].friction.law).__name__}, whose force in stick depends on the motion;"
+            " use `build` for a model"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
-    z = stacked(s.symbol for c in contacts for s in c.states)
     forces = stacked(c.force for c in contacts)
     for c in contacts:
         if c.N is not c.normal:
             forces = ca.substitute(forces, c.N, c.normal)
-    moved = ca.substitute(eq.balance, eq.F, forces)
+    if ca.depends_on(forces, eq.F):
+        pressed = (c.contact.joint for c in contacts if ca.depends_on(c.normal, eq.F))
+        names = ", ".join(f"'{name}'" for name in dict.fromkeys(pressed))
+        raise ValueError(
+            f"{where} > joint {names} > friction: expected a normal force that does not depend on "
+            "friction; use `build` for a model, or a constant normal force"
+        )
+    still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]
+    (bias,) = ca.substitute([eq.balance], [eq.a, eq.lam, eq.F], still)
     bodies = [m for name, m in eq.kin.motion.items() if name != GROUND]
     poses = ca.horzcat(ca.SX(3, 0), *(ca.horzcat(m.R, m.p) for m in bodies))
+    u, parameters = (symbols_of(group) for group in (mechanism.inputs, p))
     every = {
-        "q": q, "qd": qd, "a": a, "lam": lam, "z": z, "u": u, "p": parameters, "t": eq.kin.t,
+        "q": eq.q, "qd": eq.qd, "a": eq.a, "lam": eq.lam,
+        "z": symbols_of(v for c in contacts for v in c.states), "u": u, "p": parameters,
+        "t": eq.kin.t,
     }  # fmt: skip
-
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
 
     def function(name: str, arguments: str, **results: ca.SX) -> ca.Function:
         expressions = [ca.densify(result) for result in results.values()]
-        expressions = ca.substitute(expressions, [angles(eq.turns)], [turned])
+        expressions = ca.substitute(expressions, [eq.angles], [turned])
         named = arguments.split()
         if ca.depends_on(ca.veccat(*expressions), eq.kin.t):
             named.append("t")
         symbols = [every[argument] for argument in named]
         return ca.Function(name, symbols, expressions, named, list(results), {"cse": True})
 
+    moved = ca.substitute(eq.balance, eq.F, forces)
     made = (
         function("mass", "q p", M=eq.mass),
         function("bias", "q qd u p", bias=bias),

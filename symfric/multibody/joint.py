@@ -125,17 +125,13 @@ class JointFriction:
                 yield "normal: expected the level of the friction moment [N m], got none"
         elif turns and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"
-        limits = {
-            "radius": (self.radius, True), "length": (self.length, True),
-            "width": (self.width, True), "preload": (self.preload, False),
-            "normal": (self.normal, False), "eps": (self.eps, True),
-        }  # fmt: skip
-        for name, (value, strict) in limits.items():
-            if is_symbolic(value) or (value is None and name not in ("preload", "eps")):
-                continue
-            size = as_number(value)
-            if size is None or not (0 < size < inf or (size == 0 and not strict)):
-                yield f"{name}: expected a number {'>' if strict else '>='} 0, got {value!r}"
+        for name in ("radius", "length", "width", "preload", "normal", "eps"):
+            value, size = getattr(self, name), as_number(getattr(self, name))
+            sign = ">=" if name in ("preload", "normal") else ">"
+            good = size is not None and (0 < size < inf or (size == 0 and sign == ">="))
+            absent = value is None and name not in ("preload", "eps")
+            if not (good or absent or is_symbolic(value)):
+                yield f"{name}: expected a number {sign} 0, got {value!r}"
 
     @property
     def arm(self) -> Scalar:
@@ -147,13 +143,6 @@ class JointFriction:
         squares = sum((f * f for f in components), start=self.eps * self.eps)
         return ca.sqrt(squares) - self.eps
 
-    def stations(self, F: ca.SX, T: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Return the bearing forces f_x1, f_y1, f_x2, f_y2 [N]."""
-        if self.length is None:
-            return -F[0], -F[1], ca.SX(0), ca.SX(0)
-        fx2, fy2 = -T[1] / self.length, T[0] / self.length
-        return -F[0] - fx2, -F[1] - fy2, fx2, fy2
-
     def normal_force(self, rubs: Sequence[str], F: ca.SX, T: ca.SX) -> ca.SX:
         """Return the sum of the bearing forces [N] under the reaction F, T.
 
@@ -161,7 +150,10 @@ class JointFriction:
         """
         if self.normal is not None:
             return ca.SX(self.normal)
-        fx1, fy1, fx2, fy2 = self.stations(F, T)
+        fx1, fy1, fx2, fy2 = -F[0], -F[1], ca.SX(0), ca.SX(0)
+        if self.length is not None:
+            fx2, fy2 = -T[1] / self.length, T[0] / self.length
+            fx1, fy1 = fx1 - fx2, fy1 - fy2
         forces: list[tuple[ca.SX, ...]]
         if "ball" in rubs:
             forces = [(F[0], F[1], F[2])]
@@ -244,9 +236,7 @@ COMPONENTS = (*FORCE_NAMES, "Mx", "My", "Mz")
 
 def unit(k: int) -> ca.SX:
     """Return a motion along or about the axis k, shape (3, 1)."""
-    column = ca.SX(3, 1)
-    column[k] = 1
-    return column
+    return ca.SX.eye(3)[:, k]
 
 
 @dataclass(frozen=True, eq=False)

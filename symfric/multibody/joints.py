@@ -40,14 +40,10 @@ class Closing(Joint):
         return direction == "slide"
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return the pose; not used, because the joint always closes a loop and has no
-        coordinates.
-        """
+        """Raise an error: the joint always closes a loop and has no coordinates."""
         raise NotImplementedError
 
-    def subspace(self, q: ca.SX) -> Pair:
-        """Return the subspace; not used, because the joint always closes a loop."""
-        raise NotImplementedError
+    subspace = pose
 
 
 @final

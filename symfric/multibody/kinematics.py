@@ -2,19 +2,18 @@
 outwards.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import pi
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import stacked, symbols_of
+from symfric.foundation.variable import stacked
 from symfric.model.kinds import POSITION
 from symfric.multibody.joint import Joint
-from symfric.multibody.spatial import GROUND
+from symfric.multibody.spatial import GROUND, Frame
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
 
 
@@ -68,40 +67,8 @@ PARALLEL = 1e-9
 """Differences of the derivatives of a rate between positions that are rounding."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """Angle as a state, and its rate [rad/s]."""
-
-    angle: Variable
-    rate: ca.SX
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Moved:
-    """Coordinates and rates of the tree and their start, SX (n, 1)."""
-
-    q: ca.SX
-    qd: ca.SX
-    start: ca.SX
-
-    def turned(self, rate: ca.SX) -> tuple[ca.SX, ca.SX] | None:
-        """Return how far a joint of this rate has turned, now and at the start; None in space."""
-        slopes = ca.densify(ca.jacobian(rate, self.qd))
-        at = ca.symvar(slopes)
-        anywhere = np.random.default_rng(0)
-        numbers = ca.Function("slopes", [stacked(at)], [slopes])
-        found = [numbers(anywhere.uniform(-1, 1, len(at))).full() for _ in range(3)]
-        if np.ptp(found, axis=0).max(initial=0.0) > PARALLEL:
-            return None
-        a = ca.sparsify(ca.DM(found[0].round(9)))
-        return a @ self.q, a @ self.start
-
-
-@final
-class Turns:
-    """Collection of the angles, over full turns, of joints that close loops; mutable.
+class Turn(NamedTuple):
+    """Angle of a joint that closes a loop, over full turns, as a state, and its rate [rad/s].
 
     The pose of two bodies gives the angle between them modulo 2 pi. A force that grows with the
     angle needs all of it: the angle becomes a state phi of the model, with the relative angular
@@ -111,45 +78,26 @@ class Turns:
         phi' = a' q'  with constant a,   so that   phi - phi_0 = a' (q - q_0)
     """
 
-    def __init__(self) -> None:
-        self._found: dict[str, Turn] = {}
-
-    def __call__(
-        self, joint: Joint, direction: str, angle: ca.SX, rate: ca.SX, moved: "Moved"
-    ) -> ca.SX:
-        """Return the angle of a joint as a symbol, given that of its pose, its rate and the
-        motion.
-        """
-        k = joint.directions[direction]
-        name = joint.coordinate(k)
-        if name not in self._found:
-            made, near = moved.turned(rate), joint.starts[k]
-            if made is not None:
-                near = made[0] if joint.start is None else near + made[0] - made[1]
-            start = angle + 2 * pi * ca.floor((near - angle) / (2 * pi) + 0.5)
-            state = Variable(
-                name, "rad", start=start, doc="angle of a joint that closes a loop", kind=POSITION
-            )
-            self._found[name] = Turn(state, rate)
-        return self._found[name].angle.symbol
-
-    @property
-    def found(self) -> tuple[Turn, ...]:
-        """Angles that were requested."""
-        return tuple(self._found.values())
+    angle: Variable
+    rate: ca.SX
 
 
-def angles(turns: Sequence[Turn]) -> ca.SX:
-    """Return their symbols, shape (k, 1)."""
-    return symbols_of(turn.angle for turn in turns)
+def constant_slopes(rate: ca.SX, qd: ca.SX) -> ca.SX | None:
+    """Return the derivatives a' of `rate` by the rates `qd`; None if they depend on positions."""
+    slopes = ca.densify(ca.jacobian(rate, qd))
+    at = ca.symvar(slopes)
+    numbers = ca.Function("slopes", [stacked(at)], [slopes])
+    anywhere = np.random.default_rng(0)
+    found = [numbers(anywhere.uniform(-1, 1, len(at))).full() for _ in range(3)]
+    if np.ptp(found, axis=0).max(initial=0.0) > PARALLEL:
+        return None
+    return ca.SX(ca.sparsify(ca.DM(found[0].round(9))))
 
 
 ZERO = ca.SX(3, 1)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(NamedTuple):
     """Motion of a body B relative to the world W.
 
     Attributes:
@@ -180,21 +128,8 @@ class Motion:
         """Return position and velocity in the world of a point fixed to the body."""
         return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
-    def cut(self, cuts: Cuts, link: int) -> "Motion":
-        """Return the same motion in new symbols."""
-        return Motion(*(cuts(link, getattr(self, part.name)) for part in fields(self)))
 
-    def acceleration(self, offset: ca.SX) -> ca.SX:
-        """Return the acceleration, less gravity, of a point fixed to the body, in components of
-        B.
-        """
-        w, r = self.w_B, offset
-        return self.dv_B + ca.cross(self.dw_B, r) + ca.cross(w, ca.cross(w, r))
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Relative:
+class Relative(NamedTuple):
     """Pose and motion of a joint's child frame in its parent frame, in the parent's components.
 
     Attributes:
@@ -228,22 +163,22 @@ class Kinematics:
     motion: dict[str, Motion]
     t: ca.SX
     cuts: Cuts | None = None
-    turns: Turns | None = None
+    turns: dict[str, Turn] | None = None
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
         """Return position and velocity in the world of the origin of the frame "body.frame"."""
         body, _, frame = place.partition(".")
         if body not in self.motion or frame not in self.topology.bodies[body].frames:
             raise ValueError(f"kinematics: expected a place 'body.frame', got {place}")
-        return self.motion[body].point(self.offset(place))
+        return self.motion[body].point(self.frame(place).p)
 
-    def offset(self, place: str) -> ca.SX:
-        """Return the position of the frame "body.frame" on its body, in the body's components."""
-        return frame_at(self.topology.bodies, place).p
+    def frame(self, place: str) -> Frame:
+        """Return the frame "body.frame" on its body."""
+        return frame_at(self.topology.bodies, place)
 
     def relative(self, joint: Joint) -> Relative:
         """Return pose and motion of the child frame of `joint` in its parent frame."""
-        P, C = (frame_at(self.topology.bodies, place) for place in (joint.parent, joint.child))
+        P, C = self.frame(joint.parent), self.frame(joint.child)
         parent, child = self.motion[body_of(joint.parent)], self.motion[body_of(joint.child)]
         R_WP = parent.R @ P.R
         p_WP, v_WP = parent.point(P.p)
@@ -282,14 +217,25 @@ class Kinematics:
             return self.q[link.first + joint.directions[direction]], rate
         relative = self.relative(joint)
         s = joint.displacement(direction, relative.R, relative.p)
-        if self.turns is None or joint.linear(direction):
-            return s, rate
-        return self.turns(joint, direction, s, rate, self._moved), rate
+        if self.turns is not None and not joint.linear(direction):
+            s = self._counted(self.turns, joint, joint.directions[direction], s, rate)
+        return s, rate
 
-    @property
-    def _moved(self) -> Moved:
-        links = self.topology.links
-        return Moved(self.q, self.qd, stacked(x for link in links for x in link.joint.starts))
+    def _counted(
+        self, turns: dict[str, Turn], joint: Joint, k: int, angle: ca.SX, rate: ca.SX
+    ) -> ca.SX:
+        """Return the state, kept in `turns`, that is the `angle` of a pose over full turns."""
+        name = joint.coordinate(k)
+        if name not in turns:
+            near, slopes = ca.SX(joint.starts[k]), constant_slopes(rate, self.qd)
+            if slopes is not None:
+                starts = stacked(x for link in self.topology.links for x in link.joint.starts)
+                moved = slopes @ self.q
+                near = moved if joint.start is None else near + moved - slopes @ starts
+            start = angle + 2 * pi * ca.floor((near - angle) / (2 * pi) + 0.5)
+            doc = "angle of a joint that closes a loop"
+            turns[name] = Turn(Variable(name, "rad", start=start, doc=doc, kind=POSITION), rate)
+        return turns[name].angle.symbol
 
     def rate(self, joint: Joint, direction: str) -> ca.SX:
         """Return the rate of the displacement or angle of a joint in one of its `directions`."""
@@ -302,13 +248,7 @@ class Kinematics:
 
 
 def kinematics(
-    topology: Topology,
-    q: ca.SX,
-    qd: ca.SX,
-    qdd: ca.SX,
-    t: ca.SX,
-    g: ca.SX = ZERO,
-    cuts: Cuts | None = None,
+    topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX, t: ca.SX, g: ca.SX, cuts: Cuts | None
 ) -> Kinematics:
     """Return the motions of all bodies, by recursion from the ground outwards.
 
@@ -322,7 +262,7 @@ def kinematics(
     motion = {GROUND: Motion(ca.SX.eye(3), ZERO, ZERO, ZERO, ZERO, ca.sparsify(-g))}
     for k, link in enumerate(topology.links):
         own = _carried(motion[link.base], link, q, qd, qdd)
-        motion[link.body] = own if cuts is None else own.cut(cuts, k)
+        motion[link.body] = own if cuts is None else Motion(*(cuts(k, part) for part in own))
     return Kinematics(topology, q, qd, qdd, motion, t, cuts)
 
 

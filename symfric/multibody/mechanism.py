@@ -1,48 +1,41 @@
 """Builder: collects bodies, joints and forces, checks them and writes the model."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import packed
 from symfric.foundation.checks import kind, many, number, shown
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.shown import Showing, Shown
+from symfric.foundation.shown import Showing, Shown, Table, among, counted, figure_of
 from symfric.foundation.symbolic import plain, with_symbols
-from symfric.foundation.variable import starts_of, symbols_of
+from symfric.foundation.variable import symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
-from symfric.multibody.assembly import assemble, coordinates
+from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
-from symfric.multibody.forces import Force, Gravity
+from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
     Prepared,
     in_absolute_coordinates,
     infinite,
-    numeric,
-    undeclared,
-    with_cuts,
-    without_friction,
+    inseparable,
+    left_open,
+    undeclared_in_forces,
     without_inertia,
     written,
 )
-from symfric.multibody.results import results, sketch, thumbnail
-from symfric.multibody.results import shown as shown_of
+from symfric.multibody.results import sketch, thumbnail
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
-from symfric.multibody.topology import Topology, absolute, spanning_tree
+from symfric.multibody.start import following, project
+from symfric.multibody.topology import Topology, spanning_tree
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
-FORMULATIONS = ("joint", "absolute")
 
 
 class Mechanism(Showing):
@@ -80,9 +73,22 @@ class Mechanism(Showing):
             self.forces.append(Gravity("gravity", gravity))
 
     def shown(self) -> Shown:
-        """Describe the parts added so far."""
-        return shown_of(
-            self.name, self.bodies, self.joints, self.forces, self.constraints, self.inputs
+        """Describe the parts added so far as a table; `build` reports its mistakes."""
+        bodies = [body for body in self.bodies if body.name != GROUND]
+        loops = max(0, len(self.joints) - len(bodies))
+        rows = [(b.name, "body", f"{figure_of(b.mass)} kg", "") for b in bodies]
+        for j in self.joints:
+            law = type(j.friction.law).__name__ if j.friction is not None else ""
+            rows.append((j.name, type(j).__name__, f"{j.parent} - {j.child}", law))
+        for part in (*self.forces, *self.constraints):
+            ends = f"{part.a} - {part.b}" if isinstance(part, SpringDamper) else ""
+            rows.append((part.name, type(part).__name__, ends, ""))
+        inputs = f"inputs: {among(v.name for v in self.inputs)}"
+        return Shown(
+            f"mechanism '{self.name}': {counted(len(bodies), 'body', 'bodies')}, "
+            f"{counted(len(self.joints), 'joint')}, {counted(loops, 'closed loop')}",
+            table=Table(("name", "what", "", "friction"), tuple(rows)),
+            after=(inputs,) if self.inputs else (),
         )
 
     def thumbnail(self) -> "Figure | None":
@@ -91,9 +97,8 @@ class Mechanism(Showing):
             made = self.prepare()
         except ValueError:
             return None
-        drawn = sketch(made.eq, self.joints, self.forces, {})
-        places = ca.Function("places", [made.eq.q], [drawn.places])(made.q0)
-        return thumbnail(drawn, places.full())
+        drawn = sketch(made.eq, {})
+        return thumbnail(drawn, made.numbers(drawn.places)[0])
 
     def to_pack(self) -> dict[str, Any]:
         """Return all added parts."""
@@ -116,11 +121,7 @@ class Mechanism(Showing):
         ideal: bool = False,
     ) -> None:
         """Add a rigid body; see `Body`."""
-        if isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-            numbers = plain((mass, inertia, com))
-            self.bodies.append(Body(name, *numbers, ideal=ideal))
-        else:
-            self._wrong.append(f"body > name: expected a text, got {shown(name)}")
+        self._take(self.bodies, Body(name, mass, inertia, com, ideal=ideal), Body)
 
     def frame(
         self,
@@ -191,16 +192,7 @@ class Mechanism(Showing):
         if index not in (None, 0, 1):
             raise ValueError(f"mechanism '{self.name}': index: expected 0 or 1, got {index!r}")
         chosen = (0 if formulation == "absolute" else 1) if index is None else index
-        made = self.prepare(p, formulation)
-        u = tuple(self.inputs)
-        p = tuple(p)
-        guess = without_friction(made, p, u)
-        parts = made.eq, tuple(self.joints), tuple(self.forces)
-        more = partial(results, *parts, made.open_reactions), partial(sketch, *parts)
-        cut = with_cuts(made, self.joints, self.forces)
-        return assemble(
-            self.name, made.eq, made.q, made.qd, made.labels, guess, p, u, more, chosen, cut
-        )
+        return assemble(self.name, self.prepare(p, formulation), tuple(self.inputs), chosen)
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
         """Return the equations of motion with their variables, checked.
@@ -208,30 +200,20 @@ class Mechanism(Showing):
         Raises:
             ValueError: all mistakes at once, each with its path.
         """
-        check_names(f"mechanism '{self.name}' formulation", [formulation], FORMULATIONS)
+        check_names(f"mechanism '{self.name}' formulation", [formulation], ("joint", "absolute"))
         where = f"mechanism '{self.name}' > p"
         p = many(where, p, "variables")
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
-        symbols = symbols_of(p)
-        values = ca.DM(starts_of(p))
-        bodies, tree = self._hung(symbols, values)
-        made = self._written(tree, symbols, values)
-        u = symbols_of(self.inputs)
-        loose = undeclared(made.eq, self.joints, self.forces, symbols, u)
-        self._refuse([*made.problems, *made.misfits, *_left_open(made), *loose])
-        self._refuse(infinite(made, self.joints, self.forces, symbols, values))
-        self._refuse(without_inertia(made, symbols, values))
+        made = written(self._tree(p), self.forces, self.constraints, p)
+        loose = undeclared_in_forces(made, tuple(self.inputs))
+        self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
+        self._refuse(infinite(made))
+        self._refuse(without_inertia(made))
         if formulation == "absolute":
-            self._refuse(_inseparable(bodies, symbols, values))
-            by_name = {body.name: body for body in bodies}
-            names = [body.name for body in bodies if body.name != GROUND]
-            made = in_absolute_coordinates(
-                absolute(by_name, self.joints, names), made, self.joints, self.forces,
-                self.constraints, symbols, values,
-            )  # fmt: skip
-            self._refuse(made.problems)
-            self._refuse(_left_open(made))
+            self._refuse(inseparable(made))
+            made = in_absolute_coordinates(made, self.constraints)
+            self._refuse([*made.problems, *left_open(made)])
         return made
 
     def _refuse(self, problems: Iterable[str]) -> None:
@@ -239,8 +221,8 @@ class Mechanism(Showing):
         if found:
             raise ValueError("\n".join(found))
 
-    def _hung(self, p: ca.SX, values: ca.DM, closed: bool = True) -> tuple[list[Body], Topology]:
-        """Return the bodies in their places and their spanning tree.
+    def _tree(self, p: Variables, closed: bool = True) -> Topology:
+        """Return the bodies with their frames and the spanning tree of the joints.
 
         `closed`: True if the start has to close the loops.
 
@@ -248,57 +230,37 @@ class Mechanism(Showing):
             ValueError: all mistakes that can be found without equations, and those of the start.
         """
         bodies, problems = self._placed()
-        u = symbols_of(self.inputs)
-        problems += checks.naming(
-            bodies, self.joints, self.forces, self.constraints, tuple(self.inputs)
-        )
-        weights = list(checks.weights(bodies, p, values))
-        bearings = list(checks.bearings(self.joints, p, u))
+        u = tuple(self.inputs)
+        problems += checks.naming(bodies, self.joints, (*self.forces, *self.constraints), u)
+        weights = list(checks.weights(bodies, p))
+        bearings = list(checks.bearings(self.joints, symbols_of(p), symbols_of(u)))
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
-        loose = list(checks.connected(bodies, tree))
+        loose = list(checks.connected(tree))
         if weights and not bearings and not loose:
             # the start does not depend on masses
-            unit = {
-                b.name: replace(b, mass=1.0, inertia=(1.0, 1.0, 1.0), com=(0.0, 0.0, 0.0))
-                for b in bodies
-            }
-            made = self._written(replace(tree, bodies=unit), p, values)
+            unit = {b.name: Body(b.name, 1.0, (1.0, 1.0, 1.0), frames=b.frames) for b in bodies}
+            made = written(replace(tree, bodies=unit), self.forces, self.constraints, p)
             weights += [*made.problems, *(made.misfits if closed else ())]
         self._refuse([*weights, *bearings, *loose])
-        return bodies, tree
+        return tree
 
     def _placed(self) -> tuple[list[Body], list[str]]:
-        """Return the bodies with their frames."""
+        """Return the bodies with their frames, and the mistakes found so far."""
         problems = list(self._wrong)
         if not isinstance(self.name, str) or not self.name.isidentifier():  # pyright: ignore[reportUnnecessaryIsInstance]
             problems.append(f"name: expected a C identifier, got {shown(self.name)}")
-        names = [body.name for body in self.bodies]
+        placed = {body.name: dict(body.frames) for body in self.bodies}
         places = [place for place, _ in self.frames]
-        for place in places:
+        for place, at in self.frames:
             body, _, frame = place.partition(".")
-            if body not in names or not frame:
+            if body not in placed or not frame:
                 problems.append(f"frame '{place}': expected 'body.frame' of a known body")
+            else:
+                placed[body][frame] = at
             if places.count(place) > 1:
                 problems.append(f"frame '{place}': expected every name once")
-        placed = [
-            replace(
-                body,
-                frames=body.frames
-                | {
-                    place.partition(".")[2]: frame
-                    for place, frame in self.frames
-                    if place.partition(".")[0] == body.name
-                },
-            )
-            for body in self.bodies
-        ]
-        return placed, problems
-
-    def _written(self, tree: Topology, p: ca.SX, values: ca.DM) -> Prepared:
-        """Return the equations in joint coordinates."""
-        q, qd = coordinates(tree)
-        return written(tree, self.joints, self.forces, self.constraints, q, qd, p, values)
+        return [replace(body, frames=placed[body.name]) for body in self.bodies], problems
 
     def assembled(self, p: Variables = ()) -> "Mechanism":
         """Return a copy whose joints start at the nearest position and velocity that close all
@@ -312,52 +274,25 @@ class Mechanism(Showing):
         Raises:
             ValueError: all mistakes at once, each with its path; there is no position near.
         """
-        symbols = symbols_of(p)
-        values = ca.DM(starts_of(p))
-        _, tree = self._hung(symbols, values, closed=False)
-        made = self._written(tree, symbols, values)
+        made = written(self._tree(p, closed=False), self.forces, self.constraints, p)
         self._refuse(made.problems)
-        at = numeric(made.eq, symbols, values)
-        near = checks.project(at, made.q0)
+        at = made.position
+        near = project(at, made.q0)
         if near is None:
             self._refuse(["start: expected positions from which the loops can be closed"])
             near = made.q0
-        _, J, phi_t = (part.full() for part in at(near))
-        rates = checks.following(J, made.qd0, phi_t[:, 0])
-        start = {
-            link.joint.name: replace(
-                link.joint,
-                start=tuple(near[link.rows].tolist()),
-                rate=tuple(rates[link.rows].tolist()),
+        _, J, phi_t = at(near)
+        rates = following(J, made.qd0, phi_t)
+        links = made.eq.kin.topology.link_of
+        copy = packed.shallow(self)
+        copy.joints = [
+            replace(
+                joint,
+                start=tuple(near[links[joint.name].rows].tolist()),
+                rate=tuple(rates[links[joint.name].rows].tolist()),
             )
-            for link in tree.links
-        }
-        copy = Mechanism(self.name)
-        copy.bodies, copy.forces, copy.inputs = self.bodies, self.forces, self.inputs
-        copy.constraints = self.constraints
-        copy.frames, copy.joints = self.frames, [start.get(j.name, j) for j in self.joints]
+            if joint.name in links
+            else joint
+            for joint in self.joints
+        ]
         return copy
-
-
-def _inseparable(bodies: Iterable[Body], p: ca.SX, values: ca.DM) -> Iterator[str]:
-    """Yield messages about bodies that have no equations of their own."""
-    for body in bodies:
-        strict = replace(body, ideal=False)
-        if body.ideal and body.name != GROUND and any(strict.problems(p, values)):
-            yield (
-                f"body '{body.name}': expected a rigid body in absolute coordinates, got a "
-                "massless link, a point or an unphysical body; use joint coordinates"
-            )
-
-
-def _left_open(made: Prepared) -> Iterator[str]:
-    """Yield messages about friction that depends on undetermined reactions."""
-    for name in made.undetermined:
-        yield (
-            f"joint '{name}' > friction: expected reactions that the motion determines, got a "
-            f"normal force that the redundant constraints {', '.join(made.redundant)} leave open; "
-            "close the loop with a joint of fewer constraints: PlanarRevolute, PlanarPrismatic or "
-            "PinInSlot in a planar mechanism, a ball or a PointOnLine in space"
-        )
-    if made.singular:
-        yield "start: expected independent constraints, got a singular position; start elsewhere"

@@ -1,6 +1,6 @@
-"""Results of a mechanism: its outputs, its sketch, a small figure, and a table of its parts."""
+"""Results of a mechanism: its outputs, its sketch and a small figure."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -9,53 +9,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import equals
-from symfric.foundation.parameters import Variable
-from symfric.foundation.shown import Shown, Table, among, counted, figure_of
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
-from symfric.multibody.constraints import Constraint
 from symfric.multibody.equations import Equations
-from symfric.multibody.forces import Axial, Force, SpringDamper
-from symfric.multibody.joint import COMPONENTS, FORCE_NAMES, Joint
+from symfric.multibody.forces import SpringDamper
+from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
 from symfric.multibody.joints import Distance
-from symfric.multibody.kinematics import Kinematics, angles
-from symfric.multibody.spatial import GROUND, Body
-from symfric.multibody.topology import body_of, frame_at
+from symfric.multibody.kinematics import Motion
+from symfric.multibody.spatial import GROUND
+from symfric.multibody.topology import body_of
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 Put = Callable[[Sequence[ca.SX]], list[ca.SX]]
 """Expressions in accelerations and friction forces -> the same in the symbols of the model."""
 
 
-def results(
-    eq: Equations,
-    joints: Iterable[Joint],
-    forces: Iterable[Force],
-    undetermined: Sequence[str],
-    p: ca.SX,
-    put: Put,
-) -> dict[str, Output]:
+def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> dict[str, Output]:
     """Return all further results by name.
 
     Args:
         eq: equations of the mechanism.
-        joints, forces: all of them.
         undetermined: names of joints whose reactions are not unique; they are left out.
         p: symbols of the parameters.
         put: converts expressions to the symbols of the model.
     """
-    by_name = {joint.name: joint for joint in joints}
     found = [
-        *_reactions(eq, [j for j in by_name.values() if j.name not in undetermined]),
+        *_reactions(eq, undetermined),
         *_centres(eq),
-        *_work(eq, by_name, forces, ca.vertcat(eq.q, angles(eq.turns), p)),
+        *_work(eq, ca.vertcat(eq.q, eq.angles, p)),
     ]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
@@ -66,23 +52,25 @@ def results(
     }
 
 
-def _reactions(eq: Equations, joints: Sequence[Joint]) -> Iterator[tuple[str, Output]]:
+def _reactions(eq: Equations, undetermined: Sequence[str]) -> Iterator[tuple[str, Output]]:
     """Yield force [N] and moment [N m] on the child of each joint about its joint point.
 
     They are in the axes of the joint's frame on the child; friction, motors and springs along or
     about the axis of the joint are not included.
     """
-    for joint in joints:
-        column = ca.vertcat(*eq.reactions[joint.name])
+    for name, joint in eq.kin.topology.joints.items():
+        if name in undetermined:
+            continue
+        column = ca.vertcat(*eq.reactions[name])
         for component in joint.transmits:
             unit, what = ("N", "force") if component in FORCE_NAMES else ("N m", "moment")
             value = column[COMPONENTS.index(component)]
-            doc = f"{what} of joint '{joint.name}' on its child along {component[1]} of its frame"
-            yield f"{joint.name}_{component}", Output(value, unit, doc)
+            doc = f"{what} of joint '{name}' on its child along {component[1]} of its frame"
+            yield f"{name}_{component}", Output(value, unit, doc)
         if isinstance(joint, Distance):
             relative = eq.kin.relative(joint)
             along = ca.dot(relative.R @ column[:3], relative.p)
-            yield f"{joint.name}_tension", Output(-along / joint.length, "N", "force in the rod")
+            yield f"{name}_tension", Output(-along / joint.length, "N", "force in the rod")
 
 
 def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
@@ -97,39 +85,30 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
             yield f"{name}_v{axis}", Output(v[i], "m/s", f"its velocity along {axis}")
 
 
-def _work(
-    eq: Equations, joints: dict[str, Joint], forces: Iterable[Force], still: ca.SX
-) -> Iterator[tuple[str, Output]]:
+def _work(eq: Equations, still: ca.SX) -> Iterator[tuple[str, Output]]:
     """Yield powers [W] that change the sum of kinetic energy and of potentials of q alone.
 
     A potential that depends on anything but `still` (for example, a spring attached to an input or
     to time) does not count as one: the whole power of its force is included.
     """
     kin, conserved = eq.kin, eq.kinetic
-    positions = ca.vertcat(eq.q, angles(eq.turns))
+    positions = ca.vertcat(eq.q, eq.angles)
     rates = ca.vertcat(eq.qd, stacked(turn.rate for turn in eq.turns))
-    for force in forces:
-        energy = ca.SX(force.energy(kin, joints))
+    for force in eq.forces:
+        energy = ca.SX(force.energy(kin))
         own = not strays(energy, still)
         if own:
             conserved += energy
         if own and force.conservative:
             continue
-        power = ca.SX(0)
-        for load in force.loads(kin, joints):
-            if isinstance(load, Axial):
-                power += load.value * kin.rate(load.joint, load.direction)
-            else:
-                power += load.power(kin)
+        power = sum((load.power(kin) for load in force.loads(kin)), ca.SX(0))
         if own:
             power += ca.jtimes(energy, positions, rates)
         yield f"{force.name}_work_rate", Output(power, "W", f"power input of '{force.name}'", WORK)
     if eq.contacts:
         taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))
-        yield (
-            "friction_work_rate",
-            Output(taken, "W", "power input of friction, above zero where it drives", WORK),
-        )
+        doc = "power input of friction, above zero where it drives"
+        yield "friction_work_rate", Output(taken, "W", doc, WORK)
     if eq.m and not eq.phi_t.is_zero():
         drive = ca.dot(eq.lam, eq.phi_t)
         yield "drive_work_rate", Output(drive, "W", "power input of prescribed motions", WORK)
@@ -138,28 +117,6 @@ def _work(
 
 CONSTRAINT = {"N": "m", "N m": "rad", "N/m": "m^2"}
 """Unit of a multiplier -> that of its constraint: their product is an energy."""
-
-
-def multiplier_units(eq: Equations) -> dict[str, str]:
-    """Return name of a multiplier -> its unit; "" if the unit of the user's expression is unknown.
-
-    A constraint on places has a force as multiplier, one on directions a moment; that of a rod, on
-    the square of its length, a force over length.
-    """
-    found: dict[str, str] = {}
-    for loop in eq.loops:
-        m = loop.phi.numel()
-        for i in range(m):
-            label = f"{loop.joint.name}_lambda" + (f"_{i + 1}" if m > 1 else "")
-            found[label] = "N/m" if isinstance(loop.joint, Distance) else _of(loop.C_v[i, :])
-    found |= {label: part.unit for part in eq.held for label in part.labels}
-    found |= {f"{link.joint.name}_norm": "J" for link in eq.kin.topology.links}
-    return found
-
-
-def _of(along: ca.SX) -> str:
-    """Return the unit of the multiplier of a constraint with the rate `along` times a velocity."""
-    return "N m" if along.nnz() == 0 or along.is_zero() else "N"
 
 
 def constraint_units(units: list[str]) -> tuple[str, str, str]:
@@ -177,45 +134,39 @@ AWAY = 1e-6
 """Extent across a plane, relative to that in it, below which all lies in the plane."""
 
 
-def sketch(
-    eq: Equations, joints: Iterable[Joint], forces: Iterable[Force], scales: Mapping[str, float]
-) -> Sketch:
+def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
     """Return the sketch of a mechanism.
 
     Args:
         eq: its equations.
-        joints, forces: drawn in addition to bodies.
         scales: contact -> velocity [m/s] below which it counts as sticking.
     """
-    drawn = [f for f in forces if isinstance(f, SpringDamper)]
-    held = dict.fromkeys(place for joint in joints for place in (joint.parent, joint.child))
-    bodies = eq.kin.topology.bodies
+    kin = eq.kin
+    bodies, joints = kin.topology.bodies, kin.topology.joints.values()
+    springs = [f for f in eq.forces if isinstance(f, SpringDamper)]
+    held = {place for joint in joints for place in (joint.parent, joint.child)}
+    pulled = [place for force in springs for place in force.places()]
     named = (f"{body}.{frame}" for body, b in bodies.items() for frame in b.frames if frame)
-    pulled = (place for force in drawn for place in force.places())
-    used = {place: k for k, place in enumerate({**held, **dict.fromkeys((*named, *pulled))})}
-    only = {place for force in drawn for place in force.places()} - held.keys()
-    columns = [_frame(eq.kin, place) for place in used]
+    ends = (place for joint in joints for place in (joint.parent, joint.child))
+    used = {place: k for k, place in enumerate(dict.fromkeys((*ends, *named, *pulled)))}
+    columns = [_column(kin.motion[body_of(p)], kin.frame(p).R, kin.frame(p).p) for p in used]
     parts: list[Part] = []
-    for name in eq.kin.motion:
+    for name, motion in kin.motion.items():
         own = [(place, k) for place, k in used.items() if body_of(place) == name]
-        corners = tuple(k for place, k in own if place not in only)
-        ends = tuple(k for place, k in own if place in only)
-        parts.append(Part(name, len(columns), corners, ends, fixed=name == GROUND))
-        columns.append(_centre(eq.kin, name))
-    marks = [_joint(eq, joint, used, scales) for joint in joints]
-    for force in drawn:
+        corners = tuple(k for place, k in own if place in held or place not in pulled)
+        far = tuple(k for place, k in own if place not in held and place in pulled)
+        parts.append(Part(name, len(columns), corners, far, fixed=name == GROUND))
+        columns.append(_column(motion, ca.SX.eye(3), bodies[name].c))
+    marks: list[Mark] = []
+    for joint in joints:
+        slips = ((c.name, scales[c.name]) for c in eq.contacts
+                 if c.joint == joint.name and c.name in scales)  # fmt: skip
+        slips = tuple((f"{name}_slip", scale) for name, scale in slips)
+        marks.append(_mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips))
+    for force in springs:
         symbol = DAMPER if equals(force.stiffness, 0.0) else SPRING
         marks.append(_mark(force.name, symbol, (force.a, force.b), used))
     return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks))
-
-
-def _joint(eq: Equations, joint: Joint, used: dict[str, int], scales: Mapping[str, float]) -> Mark:
-    slips = tuple(
-        (f"{c.name}_slip", scales[c.name])
-        for c in eq.contacts
-        if c.joint == joint.name and c.name in scales
-    )
-    return _mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips)
 
 
 def _mark(
@@ -232,17 +183,9 @@ def _mark(
     return Mark(name, symbol, used[ends[0]], used[ends[1]], slips, grounded)
 
 
-def _frame(kin: Kinematics, place: str) -> ca.SX:
-    """Return axes and position of the frame "body.frame", shape (12, 1)."""
-    frame, motion = frame_at(kin.topology.bodies, place), kin.motion[body_of(place)]
-    return ca.densify(ca.vertcat(ca.vec(motion.R @ frame.R), motion.point(frame.p)[0]))
-
-
-def _centre(kin: Kinematics, name: str) -> ca.SX:
-    """Return axes of a body and its centre of mass, shape (12, 1)."""
-    motion = kin.motion[name]
-    at = motion.point(kin.topology.bodies[name].c)[0]
-    return ca.densify(ca.vertcat(ca.vec(motion.R), at))
+def _column(motion: Motion, R: ca.SX, offset: ca.SX) -> ca.SX:
+    """Return axes and position of a place on a body, shape (12, 1)."""
+    return ca.densify(ca.vertcat(ca.vec(motion.R @ R), motion.point(offset)[0]))
 
 
 def thumbnail(drawn: Sketch, places: Array) -> "Figure":
@@ -259,7 +202,16 @@ def thumbnail(drawn: Sketch, places: Array) -> "Figure":
     flat = np.column_stack([at @ across, at @ up])
     figure = Figure(figsize=(SIZE, SIZE), layout="constrained")
     axis = figure.subplots()
-    _draw(axis, drawn, flat)
+    for k, part in enumerate(drawn.parts):
+        if not part.fixed:
+            for place in (*part.corners, *part.ends):
+                axis.plot(*flat[[part.centre, place]].T, color=colour(k), linewidth=2.2)
+            axis.plot(*flat[part.centre], "s", color=colour(k), markersize=4)
+    for mark in drawn.marks:
+        if mark.symbol.line:
+            axis.plot(*flat[[mark.a, mark.b]].T, color="0.35", linewidth=1.0, linestyle="--")
+        face = EDGE if mark.grounded else "white"
+        axis.plot(*flat[mark.b], "o", markersize=5, markerfacecolor=face, color=EDGE)
     axis.set_aspect("equal", "datalim")
     axis.margins(0.15)
     axis.tick_params(labelsize=6)
@@ -284,66 +236,9 @@ def _view(drawn: Sketch, places: Array) -> tuple[Array, Array]:
     return (across if across.sum() > 0 else -across), up
 
 
-def _draw(axis: "Axes", drawn: Sketch, flat: Array) -> None:
-    for k, part in enumerate(drawn.parts):
-        if part.fixed:
-            continue
-        for place in (*part.corners, *part.ends):
-            _line(axis, flat, (part.centre, place), color=colour(k), linewidth=2.2)
-        axis.plot(*flat[part.centre], "s", color=colour(k), markersize=4)
-    for mark in drawn.marks:
-        if mark.symbol.line:
-            _line(axis, flat, (mark.a, mark.b), color="0.35", linewidth=1.0, linestyle="--")
-        face = EDGE if mark.grounded else "white"
-        axis.plot(*flat[mark.b], "o", markersize=5, markerfacecolor=face, color=EDGE)
-
-
-def _line(axis: "Axes", flat: Array, ends: Sequence[int], **how: object) -> None:
-    axis.plot(flat[list(ends), 0], flat[list(ends), 1], **how)  # pyright: ignore[reportArgumentType]
-
-
 def _called(direction: Array) -> str:
     """Return the name of the world axis along a direction."""
     k = int(np.argmax(np.abs(direction)))
     if abs(direction[k]) < 1 - AWAY:
         return "oblique view"
     return ("" if direction[k] > 0 else "-") + "xyz"[k]
-
-
-def shown(
-    name: str,
-    bodies: Iterable[Body],
-    joints: Sequence[Joint],
-    forces: Iterable[Force],
-    constraints: Iterable[Constraint],
-    inputs: Sequence[Variable],
-) -> Shown:
-    """Describe a mechanism as a table of its parts; `build` reports its mistakes."""
-    bodies = [body for body in bodies if body.name != GROUND]
-    loops = max(0, len(joints) - len(bodies))
-    counts = [
-        counted(len(bodies), "body", "bodies"),
-        counted(len(joints), "joint"),
-        counted(loops, "closed loop"),
-    ]
-    rows = [(b.name, "body", f"{figure_of(b.mass)} kg", "") for b in bodies]
-    rows += [_shown_joint(joint) for joint in joints]
-    for force in forces:
-        ends = _between(force.a, force.b) if isinstance(force, SpringDamper) else ""
-        rows.append((force.name, type(force).__name__, ends, ""))
-    rows += [(c.name, type(c).__name__, "", "") for c in constraints]
-    after = [f"inputs: {among(v.name for v in inputs)}"] if inputs else []
-    return Shown(
-        f"mechanism '{name}': {', '.join(counts)}",
-        table=Table(("name", "what", "", "friction"), tuple(rows)),
-        after=tuple(after),
-    )
-
-
-def _shown_joint(joint: Joint) -> tuple[str, ...]:
-    rubs = type(joint.friction.law).__name__ if joint.friction is not None else ""
-    return joint.name, type(joint).__name__, _between(joint.parent, joint.child), rubs
-
-
-def _between(a: str, b: str) -> str:
-    return f"{a} - {b}"

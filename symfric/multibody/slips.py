@@ -1,18 +1,17 @@
 """Friction laws in the contacts of a mechanism: their unknowns, states and events."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests
-from symfric.laws.base.law import FORCE, Switch
+from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
 from symfric.multibody.applied import Rest, applied_forces, capacity_of, forward, switches_at
 from symfric.multibody.equations import Equations
@@ -74,50 +73,39 @@ def slips(
         normal_at_start: normal force of each contact [N].
         groups: the contacts whose laws need the applied force.
     """
-    unknowns, pressing = _pressing(eq, normal_at_start)
+    unknowns, pressing = dict[str, Variable](), list[ca.SX]()
+    for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
+        law, pressed = contact.friction.law, contact.pressed
+        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
+            doc = f"normal force of joint '{contact.joint}' with {type(law).__name__}"
+            unknowns.setdefault(
+                pressed,
+                Variable(f"{pressed}_N", "N", start=start, nominal=max(1.0, abs(start)), doc=doc,
+                         kind=kinds.NORMAL_FORCE),
+            )  # fmt: skip
+            normal = unknowns[pressed].symbol
+        pressing.append(normal)
     levels = [capacity_of(c.law, N) if groups else N
               for c, N in zip(eq.contacts, pressing, strict=True)]  # fmt: skip
     applied = applied_forces(groups, levels)
-    slides = _slides(eq, groups)
+    slides = [c.slip for c in eq.contacts]
+    for rest in groups:
+        for i, g in zip(rest.members, rest.along, strict=True) if rest.direction else ():
+            # in a moving loop no velocity that determines a mode at the start is zero
+            slides[i] = forward(g) * smooth.sign(rest.rate, 0.0)
     found: list[Slip] = []
     for i, contact in enumerate(eq.contacts):
-        law = contact.law
+        law, N = contact.law, pressing[i]
         states = _states(contact, ca.SX(law.steady_state(slides[i], normal_at_start[i])))
         z, inputs = symbols_of(states), {FORCE: applied[i]} if i in applied else {}
         # a ball may turn about some axes only; what is put for the symbols of F must be dense
         rate, force = (
-            ca.densify(ca.SX(of(contact.slip, pressing[i], z, **inputs)))
-            for of in (law.rate, law.force)
+            ca.densify(ca.SX(of(contact.slip, N, z, **inputs))) for of in (law.rate, law.force)
         )
-        found.append(
-            Slip(contact, unknowns[i], pressing[i], eq.normals[i], states, rate, force, inputs)
-        )
+        own = unknowns.pop(contact.pressed, None)
+        unknown = () if own is None else (own,)
+        found.append(Slip(contact, unknown, N, eq.normals[i], states, rate, force, inputs))
     return tuple(found)
-
-
-def _pressing(
-    eq: Equations, normal_at_start: Sequence[float]
-) -> tuple[list[Variables], list[ca.SX]]:
-    """Return the unknown normal force of each contact that introduces it, and all normal forces."""
-    found, every, values = dict[str, Variable](), list[Variables](), list[ca.SX]()
-    for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
-        pressed, unknown, pressing = contact.pressed, (), normal
-        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(
-            contact.friction.law
-        ):
-            if pressed not in found:
-                scale = max(1.0, abs(start))
-                kind = type(contact.friction.law).__name__
-                doc = f"normal force of joint '{contact.joint}' with {kind}"
-                made = Variable(
-                    f"{pressed}_N", "N", start=start, nominal=scale, doc=doc,
-                    kind=kinds.NORMAL_FORCE,
-                )  # fmt: skip
-                found[pressed], unknown = made, (made,)
-            pressing = found[pressed].symbol
-        every.append(unknown)
-        values.append(pressing)
-    return every, values
 
 
 def _states(contact: Contact, begin: ca.SX) -> Variables:
@@ -133,18 +121,6 @@ def _states(contact: Contact, begin: ca.SX) -> Variables:
         )
         for i, s in enumerate(contact.law.states)
     )
-
-
-def _slides(eq: Equations, groups: Sequence[Rest]) -> list[ca.SX]:
-    """Return sliding velocities that determine the modes at the start; in a moving loop none is
-    zero.
-    """
-    found = [c.slip for c in eq.contacts]
-    for rest in groups:
-        for i, g in zip(rest.members, rest.along, strict=True):
-            if rest.direction:
-                found[i] = forward(g) * smooth.sign(rest.rate, 0.0)
-    return found
 
 
 def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -> tuple[Event, ...]:
@@ -179,13 +155,10 @@ def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
         )
     for s in found:
         reset = {f"{contact.name}_{state}": value for state, value in s.reset.items()}
-        yield _event(contact.name, s, reset | (rest if s.halts else {}))
-
-
-def _event(name: str, s: Switch, reset: Mapping[str, Scalar]) -> Event:
-    return Event(
-        f"{name}_{s.name}", s.expression, s.direction, reset=reset, at_start=s.at_start, rtol=s.rtol
-    )
+        yield Event(
+            f"{contact.name}_{s.name}", s.expression, s.direction,
+            reset=reset | (rest if s.halts else {}), at_start=s.at_start, rtol=s.rtol,
+        )  # fmt: skip
 
 
 def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
+from symfric.foundation.variable import Variable, at_start
 
 Vector = Sequence[Any] | ca.SX | ca.DM
 """Three numbers or symbols."""
@@ -30,27 +31,16 @@ def vector(values: Vector) -> ca.SX:
 
 
 def is_vector(values: Any) -> bool:
-    """Return True if `values` are three finite numbers or scalar symbols."""
-    if isinstance(values, ca.DM):
-        return values.numel() == 3 and values.is_regular()
-    if isinstance(values, ca.SX):
-        return values.numel() == 3
-    return hasattr(values, "__len__") and len(values) == 3 and all(map(is_scalar, values))
-
-
-def is_finite(values: ca.SX) -> bool:
-    """Return True if the numbers among the entries of `values` are finite."""
-    entries = (ca.SX(entry) for entry in ca.vertsplit(ca.densify(values)))
-    return all(not entry.is_constant() or abs(float(entry)) < ca.inf for entry in entries)
+    """Return True if `values` are three finite numbers or scalar expressions."""
+    entries = ca.SX(values).elements() if isinstance(values, ca.SX | ca.DM) else values
+    return hasattr(entries, "__len__") and len(entries) == 3 and all(map(is_scalar, entries))
 
 
 def is_scalar(value: Any) -> bool:
-    """Return True if `value` is a finite number or one symbol."""
-    if is_number(value):
-        return isfinite(value)
-    if isinstance(value, ca.DM):
-        return value.numel() == 1 and value.is_regular()
-    return isinstance(value, ca.SX) and value.numel() == 1
+    """Return True if `value` is a finite number or a scalar expression."""
+    if isinstance(value, ca.SX | ca.DM):
+        return value.numel() == 1 and (is_symbolic(value) or isfinite(float(value)))
+    return is_number(value) and isfinite(value)
 
 
 def skew(a: ca.SX) -> ca.SX:
@@ -92,14 +82,6 @@ def rotation(p: ca.SX) -> ca.SX:
     """Return R(p) = E G' = (e0^2 - e'e) I + 2 e e' + 2 e0 e~."""
     e0, e = p[0], p[1:4]
     return (e0 * e0 - ca.dot(e, e)) * ca.SX.eye(3) + 2 * (e @ e.T) + 2 * e0 * skew(e)
-
-
-def turned(p: ca.SX, a: ca.SX) -> ca.SX:
-    """Return B(p, a) = d(R(p) a)/dp, shape (3, 4), for p of any length."""
-    e0, e = p[0], p[1:4]
-    first = 2 * (e0 * a + ca.cross(e, a))
-    rest = 2 * (e @ a.T + ca.dot(e, a) * ca.SX.eye(3) - a @ e.T - e0 * skew(a))
-    return ca.horzcat(first, rest)
 
 
 def euler_parameters(R: ca.DM) -> ca.DM:
@@ -155,7 +137,8 @@ class Frame:
 
 
 def _unit(name: str, a: Any) -> ca.DM:
-    numbers = is_vector(a) and not any(map(is_symbolic, ca.vertsplit(ca.SX(vector(a)))))
+    """Return the direction of length one of three numbers."""
+    numbers = is_vector(a) and not is_symbolic(vector(a))
     length = float(ca.norm_2(ca.DM(vector(a)))) if numbers else 0.0
     if not 0.0 < length < ca.inf:
         raise ValueError(f"frame: {name}: expected three numbers that are not all zero, got {a}")
@@ -165,7 +148,6 @@ def _unit(name: str, a: Any) -> ca.DM:
 Array = NDArray[np.float64]
 GROUND = "ground"
 """Name of the fixed body."""
-MOMENTS = "write (Jxx, Jyy, Jzz) or (Jxx, Jyy, Jzz, Jxy, Jxz, Jyz)"
 TRIANGLE = 1e-9
 """Relative rounding of principal moments that is not a mistake."""
 
@@ -208,14 +190,13 @@ class Body:
         """Centre of mass from the origin of the body [m], shape (3, 1)."""
         return vector(self.com)
 
-    def problems(self, p: ca.SX, values: ca.DM) -> Iterator[str]:
-        """Yield problems of the numbers, with symbols `p` replaced by `values`."""
+    def problems(self, p: Sequence[Variable]) -> Iterator[str]:
+        """Yield problems of the numbers, with the parameters `p` at their start values."""
         wrong = list(self._no_numbers())
         if wrong:
             yield from wrong
             return
-        both = ca.substitute(ca.vertcat(self.mass, ca.vec(ca.densify(self.J))), p, ca.SX(values))
-        numbers = ca.DM(both).full().ravel()
+        numbers = at_start(ca.vertcat(self.mass, ca.vec(ca.densify(self.J))), p).full().ravel()
         if not np.isfinite(numbers).all():
             given = ", ".join(_short(dict.fromkeys(numbers)))
             yield f"mass, inertia: expected finite numbers, got {given}"
@@ -229,15 +210,16 @@ class Body:
 
     def _no_numbers(self) -> Iterator[str]:
         """Yield values that are not numbers, or of a wrong count."""
-        given: Any = self.inertia
+        inertia: Any = self.inertia
         if not is_scalar(self.mass):
             yield f"mass: expected a number [kg], got {shown(self.mass)}"
-        count = len(given) if hasattr(given, "__len__") else 0
-        if count not in (3, 6):
-            got = count or shown(given)
-            yield f"inertia: expected 3 or 6 numbers [kg m^2], got {got}; {MOMENTS}"
-        elif not all(map(is_scalar, given)):
-            yield f"inertia: expected 3 or 6 numbers [kg m^2], got {shown(given)}; {MOMENTS}"
+        count = len(inertia) if hasattr(inertia, "__len__") else 0
+        if count not in (3, 6) or not all(map(is_scalar, inertia)):
+            got = count if count not in (0, 3, 6) else shown(inertia)
+            yield (
+                f"inertia: expected 3 or 6 numbers [kg m^2], got {got}; write (Jxx, Jyy, Jzz) or "
+                "(Jxx, Jyy, Jzz, Jxy, Jxz, Jyz)"
+            )
         if not is_vector(self.com):
             yield f"com: expected three numbers [m], got {shown(self.com)}"
 

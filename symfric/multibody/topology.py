@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final
+from itertools import accumulate
+from typing import Any, final
 
 import casadi as ca
 
@@ -71,9 +72,15 @@ class Link:
 @final
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Links in the order from the ground outwards, and the joints that close loops."""
+    """Bodies and joints by name, and the tree of joints with coordinates.
+
+    Attributes:
+        links: from the ground outwards.
+        loops: joints that close loops.
+    """
 
     bodies: Mapping[str, Body]
+    joints: Mapping[str, Joint]
     links: tuple[Link, ...]
     loops: tuple[Joint, ...]
 
@@ -82,7 +89,7 @@ class Topology:
         """Number of coordinates."""
         return sum(link.n for link in self.links)
 
-    @cached_property
+    @property
     def depth(self) -> int:
         """Number of links of the longest chain."""
         links = {GROUND: 0}
@@ -109,7 +116,7 @@ def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topolo
         ends = {id(j): (body_of(j.parent), body_of(j.child)) for j in rest}
         ready = [j for j in rest if not j.closes and sum(e in depth for e in ends[id(j)]) == 1]
         if not ready:
-            break
+            return _topology(bodies, joints, links, rest)
         best = max(ready, key=lambda j: (j.constrains, -max(depth.get(e, 0) for e in ends[id(j)])))
         parent, child = ends[id(best)]
         reverse = parent not in depth
@@ -119,31 +126,28 @@ def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topolo
         at_base, at_body = frame_at(bodies, here), frame_at(bodies, there)
         links.append(Link(base, body, best, reverse, at_base, at_body))
         rest.remove(best)
-    return Topology(bodies, _numbered(links), tuple(rest))
 
 
-def absolute(bodies: Mapping[str, Body], joints: Sequence[Joint], names: Sequence[str]) -> Topology:
-    """Return free bodies, with Euler parameters at their centres of mass; all joints close
-    loops.
+def absolute(
+    bodies: Mapping[str, Body], joints: Sequence[Joint], starts: Mapping[str, tuple[Any, Any]]
+) -> Topology:
+    """Return free bodies, with Euler parameters at their centres of mass; all joints close loops.
+
+    `starts` are positions and rates by body.
     """
     links = [
-        Link(
-            GROUND,
-            name,
-            Floating(name, GROUND, name),
-            False,
-            Frame(),
-            Frame(at=bodies[name].c),
-        )
-        for name in names
-    ]
-    return Topology(bodies, _numbered(links), tuple(joints))
+        Link(GROUND, name, Floating(name, GROUND, name, *start), False, Frame(),
+             Frame(at=bodies[name].c))
+        for name, start in starts.items()
+    ]  # fmt: skip
+    return _topology(bodies, joints, links, joints)
 
 
-def _numbered(links: Sequence[Link]) -> tuple[Link, ...]:
-    found: list[Link] = []
-    first = 0
-    for link in links:
-        found.append(replace(link, first=first))
-        first += link.n
-    return tuple(found)
+def _topology(
+    bodies: Mapping[str, Body], joints: Sequence[Joint], links: Sequence[Link],
+    loops: Sequence[Joint],
+) -> Topology:  # fmt: skip
+    """Return the topology with the coordinates of its links numbered."""
+    first = accumulate((link.n for link in links), initial=0)
+    numbered = tuple(replace(link, first=k) for link, k in zip(links, first, strict=False))
+    return Topology(bodies, {joint.name: joint for joint in joints}, numbered, tuple(loops))

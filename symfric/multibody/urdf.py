@@ -3,9 +3,9 @@
 import re
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,24 +20,11 @@ from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import GROUND, Vector, unphysical
-from symfric.multibody.urdf_file import (
-    Carried,
-    Inertial,
-    Urdf,
-    UrdfJoint,
-    carried,
-    holding,
-    merged,
-    parse,
-)
-from symfric.multibody.urdf_notes import Array
+from symfric.multibody.urdf_file import Array, Inertial, Urdf, UrdfJoint, parse
 
 KINDS: dict[str, type[Joint]] = {
-    "revolute": Revolute,
     "continuous": Revolute,
-    "prismatic": Prismatic,
-    "planar": Planar,
-    "floating": Floating,
+    **{kind.__name__.lower(): kind for kind in (Revolute, Prismatic, Planar, Floating)},
 }
 FLOATING = "floating_base"
 """Joint of a root link that moves freely."""
@@ -102,9 +89,8 @@ def read_urdf(
         checks.number("urdf: level", level, lower=0.0)
     checks.named("urdf: bearings", bearings)
     for name, bearing in (bearings or {}).items():
-        checks.kind(
-            f"urdf: bearing '{name}'", bearing, JointFriction, "JointFriction(law, radius=...)"
-        )
+        what = "JointFriction(law, radius=...)"
+        checks.kind(f"urdf: bearing '{name}'", bearing, JointFriction, what)
     for name, value in (("floating", floating), ("strict", strict)):
         checks.flag(f"urdf: {name}", value)
     urdf, held = holding(parse(source, strict))
@@ -119,14 +105,13 @@ def read_urdf(
     for what, given in (("bearings", bearings), ("laws", laws)):
         check_names(f"urdf '{urdf.name}' {what}", given or {}, [j.name for j in moved])
     m = Mechanism(_identifier(urdf.name), gravity)
-    _add_bodies(m, urdf, places, weights, names)
+    _add_bodies(m, places, weights, names)
     if not grounded:
         m.joint(Floating(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
     for joint in moved:
-        friction = (bearings or {}).get(joint.name) or tag_friction(
-            joint, (laws or {}).get(joint.name, law), level
-        )
+        own = (laws or {}).get(joint.name, law)
+        friction = (bearings or {}).get(joint.name) or tag_friction(joint, own, level)
         left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
@@ -173,15 +158,68 @@ def relative(law: Law) -> Law:
     return with_values(law, {name: x / top for name, x in numbers.items()}) if top else law
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Names:
+class Carried(NamedTuple):
+    """Pose of a link in the link whose body it is part of."""
+
+    body: str
+    R: Array
+    p: Array
+
+    def beyond(self, joint: UrdfJoint) -> "Carried":
+        """Return the pose of the child of `joint`, at zero."""
+        return Carried(self.body, self.R @ joint.R, self.p + self.R @ joint.p)
+
+
+def carried(urdf: Urdf) -> dict[str, Carried]:
+    """Return the place of every link: a body of its own, or fixed to another one."""
+    found = {urdf.root: Carried(urdf.root, np.eye(3), np.zeros(3))}
+    for joint in urdf.outwards():
+        own = Carried(joint.child, np.eye(3), np.zeros(3))
+        found[joint.child] = found[joint.parent].beyond(joint) if joint.kind == "fixed" else own
+    return found
+
+
+def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
+    """Return mass, centre of mass and inertia about it of all links of a body."""
+    parts = [
+        (at, part)
+        for link, at in places.items()
+        if at.body == body and (part := urdf.links[link]) is not None
+    ]
+    mass = sum(part.mass for _, part in parts)
+    moment = sum((part.mass * (at.p + at.R @ part.com) for at, part in parts), np.zeros(3))
+    com = moment / mass if mass else moment
+    inertia = np.zeros((3, 3))
+    for at, part in parts:
+        d = at.p + at.R @ part.com - com
+        inertia += at.R @ part.J @ at.R.T + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Inertial(mass, com, inertia)
+
+
+def holding(urdf: Urdf) -> tuple[Urdf, tuple[str, ...]]:
+    """Return the robot with joints fixed that move only massless links, and their names.
+
+    Such joints have no inertia and no effect. A massless link that carries a heavy one, however far
+    out, is different: its joints are the axes of one joint.
+    """
+    heavy = {link for link, weight in urdf.links.items() if weight is not None}
+    for joint in reversed(tuple(urdf.outwards())):
+        if joint.child in heavy:
+            heavy.add(joint.parent)
+    held = tuple(j.name for j in urdf.joints if j.kind != "fixed" and j.child not in heavy)
+    if not held:
+        return urdf, ()
+    joints = tuple(replace(j, kind="fixed") if j.name in held else j for j in urdf.joints)
+    return replace(urdf, joints=joints), held
+
+
+class _Names(NamedTuple):
     """Names in the mechanism, of bodies by link and of joints; changed names; problems."""
 
-    links: dict[str, str] = field(default_factory=dict[str, str])
-    joints: dict[str, str] = field(default_factory=dict[str, str])
-    changed: dict[str, str] = field(default_factory=dict[str, str])
-    problems: list[str] = field(default_factory=list[str])
+    links: dict[str, str]
+    joints: dict[str, str]
+    changed: dict[str, str]
+    problems: list[str]
 
 
 def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) -> Iterator[str]:
@@ -207,7 +245,7 @@ def _identifier(text: str) -> str:
 
 def _names(urdf: Urdf, grounded: bool) -> _Names:
     """Return unique C identifiers; joints keep their names first, because results contain them."""
-    names = _Names(links={urdf.root: GROUND} if grounded else {})
+    names = _Names({urdf.root: GROUND} if grounded else {}, {}, {}, [])
     taken = {GROUND: "the ground", "gravity": "the weight", FLOATING: "the root's joint"}
     groups = (
         ("joint", names.joints, [joint.name for joint in urdf.joints if joint.kind != "fixed"]),
@@ -232,23 +270,17 @@ def _names(urdf: Urdf, grounded: bool) -> _Names:
 
 
 def _add_bodies(
-    m: Mechanism,
-    urdf: Urdf,
-    places: Mapping[str, Carried],
-    weights: Mapping[str, Inertial],
-    names: _Names,
+    m: Mechanism, places: Mapping[str, Carried], weights: Mapping[str, Inertial], names: _Names
 ) -> None:
     """Add the bodies, with every link as a frame."""
     for link, weight in weights.items():
         if names.links[link] != GROUND:
             six = weight.J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
             ideal = weight.mass == 0 or any(unphysical(weight.J))
-            m.body(names.links[link], weight.mass, six.tolist(), _plain(weight.com), ideal)
+            m.body(names.links[link], weight.mass, six.tolist(), weight.com.tolist(), ideal)
     for link, at in places.items():
         name = names.links[link] if names.links[link] != GROUND else _identifier(link)
-        m.frame(
-            f"{names.links[at.body]}.{name}", _plain(at.p), _plain(at.R[:, 2]), _plain(at.R[:, 0])
-        )
+        m.frame(f"{names.links[at.body]}.{name}", at.p.tolist(), *at.R.T[[2, 0]].tolist())
 
 
 def _hang(
@@ -260,43 +292,29 @@ def _hang(
     start: float,
 ) -> Iterator[str]:
     """Add a joint with its frames and its input; yield the parts that are left out."""
-    name, on = names.joints[joint.name], places[joint.parent]
-    parent, child = names.links[on.body], names.links[joint.child]
-    across = np.eye(3)[int(np.argmin(np.abs(joint.axis)))]
-    R, p = on.R @ joint.R, on.p + on.R @ joint.p
+    name, at = names.joints[joint.name], places[joint.parent].beyond(joint)
     # a dot separates joints and links of one name
-    ends = f"{parent}.{name}.parent", f"{child}.{name}.child"
-    z, x = joint.axis, across
+    ends = f"{names.links[at.body]}.{name}.parent", f"{names.links[joint.child]}.{name}.child"
+    z, x = joint.axis, np.eye(3)[int(np.argmin(np.abs(joint.axis)))]
     if joint.kind == "floating":
         z, x = np.eye(3)[2], np.eye(3)[0]
-    m.frame(ends[0], _plain(p), _plain(R @ z), _plain(R @ x))
-    m.frame(ends[1], (0.0, 0.0, 0.0), _plain(z), _plain(x))
+    m.frame(ends[0], at.p.tolist(), (at.R @ z).tolist(), (at.R @ x).tolist())
+    m.frame(ends[1], (0.0, 0.0, 0.0), z.tolist(), x.tolist())
     kind = KINDS[joint.kind]
     single = len(kind.directions) == 1
     m.joint(kind(name, *ends, start=start if single else None, friction=friction))
     if single and joint.mimic is None:
         torque = m.input(f"tau_{name}", "N m" if "turn" in kind.directions else "N")
-        motor = JointSpringDamper(f"motor_{name}", name, _direction(kind), actuator=torque)
-        m.force(motor)
+        m.force(JointSpringDamper(f"motor_{name}", name, actuator=torque))
     elif not single and (joint.damping or joint.friction):
         yield f"<dynamics> of {joint.kind} joint '{joint.name}'"
 
 
-def _direction(kind: type[Joint]) -> str:
-    return "turn" if "turn" in kind.directions else "slide"
-
-
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:
     """Add gears that make joints follow those they mimic."""
-    directions = {joint.name: _direction(type(joint)) for joint in m.joints}
+    directions = {joint.name: joint.way("") for joint in m.joints}
     for joint in moved:
         if joint.mimic is not None:
             a, b = names.joints[joint.mimic.joint], names.joints[joint.name]
             ratio, offset = joint.mimic.multiplier, joint.mimic.offset
             m.constraint(Gear(f"{b}_mimic", a, b, ratio, offset, directions[a], directions[b]))
-
-
-def _plain(values: Array) -> tuple[float, float, float]:
-    """Return three floats."""
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -1,30 +1,34 @@
-"""URDF file as data: links, joints, and bodies of links that are fixed to each other."""
+"""URDF file as data: links and joints, with mistakes, doubts and omitted parts."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import cos, isfinite, sin
 from pathlib import Path
-from typing import final
+from typing import NamedTuple, final
 from xml.parsers import expat
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.multibody.spatial import unphysical
-from symfric.multibody.urdf_notes import Array, Notes
 
+Array = NDArray[np.float64]
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
 """Joints of one coordinate."""
 LIMITS = ("lower", "upper", "effort", "velocity")
 POINT = 1e-15
 """Inertia over mass [m^2] that is rounding: a radius of gyration of 30 nm."""
+APPEARANCE = {"visual", "collision", "material"}
+"""Tags that a mechanism does not need."""
+SNAP = 1e-15
+"""Limit below which entries of rotation matrices are 0: a quarter turn must not leave 6e-17."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Inertial:
+class Inertial(NamedTuple):
     """Mass [kg], centre of mass [m] and inertia about it [kg m^2], in the axes of the link."""
 
     mass: float
@@ -32,9 +36,7 @@ class Inertial:
     J: Array
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Mimic:
+class Mimic(NamedTuple):
     """Joint that follows another one: q = multiplier q_joint + offset."""
 
     joint: str
@@ -114,6 +116,75 @@ class Urdf:
                 yield joint
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class Notes:
+    """Notes on a file: problems, implausible values, and omitted tags -> their places.
+
+    A strict reader treats doubts as problems.
+    """
+
+    strict: bool = False
+    problems: list[str] = field(default_factory=list[str])
+    doubts: list[str] = field(default_factory=list[str])
+    left_out: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
+
+    def others(self, where: str, tag: ET.Element, known: Iterable[str]) -> None:
+        """Note the tags inside `tag` that are not known."""
+        for other in tag:
+            if other.tag.startswith("xacro:"):
+                self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
+            elif other.tag not in {*known, *APPEARANCE}:
+                self.left(other.tag, where)
+
+    def doubt(self, text: str) -> None:
+        """Note an implausible value that other tools accept."""
+        (self.problems if self.strict else self.doubts).append(text)
+
+    def left(self, tag: str, where: str) -> None:
+        """Note a tag that is left out, once for every place."""
+        places = self.left_out.setdefault(tag, [])
+        if where not in places:
+            places.append(where)
+
+    def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
+        """Return the numbers in an attribute, as many as in `default`, the value of a missing
+        one.
+        """
+        text = default if tag is None else tag.get(key, default)
+        n = len(default.split())
+        try:
+            found = [float(word) for word in text.split()]
+        except ValueError:
+            found = []
+        if len(found) != n or not all(isfinite(x) for x in found):
+            several = "a number" if n == 1 else f"{n} numbers"
+            self.problems.append(f"{where}: expected {several} in {key}, got '{text}'")
+            found = [float(word) for word in default.split()]
+        return np.array(found)
+
+    def number(self, where: str, tag: ET.Element | None, key: str, default: str = "0") -> float:
+        """Return the number in an attribute."""
+        return float(self.numbers(where, tag, key, default)[0])
+
+    def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
+        """Return rotation and position in the tag <origin> of `tag`."""
+        origin, at = tag.find("origin"), f"{where} > origin"
+        turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
+        return turn, self.numbers(at, origin, "xyz", "0 0 0")
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return R_z(yaw) R_y(pitch) R_x(roll): rotations about the fixed axes x, y, z in turn."""
+    (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (roll, pitch, yaw))
+    R = np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip
+    return np.where(np.abs(R) < SNAP, 0.0, R)
+
+
 def parse(source: str | Path, strict: bool = False) -> Urdf:
     """Read a URDF file.
 
@@ -188,15 +259,13 @@ def _inertial(tag: ET.Element, notes: Notes) -> Inertial | None:
         notes.problems.append(f"{where} > mass: expected >= 0 kg, got {mass:g}")
         return None
     J = given if np.abs(given).max() > POINT * mass else np.zeros((3, 3))
-    for text in unphysical(J, point=True) if mass else _weightless(J):
+    doubts = unphysical(J, point=True)
+    if mass == 0:
+        text = "mass: expected > 0 kg, because there is an inertia, got 0"
+        doubts = iter([text] if J.any() else [])
+    for text in doubts:
         notes.doubt(f"{where} > {text}")
     return Inertial(mass, com, R @ J @ R.T) if mass or J.any() else None
-
-
-def _weightless(J: Array) -> Iterator[str]:
-    """Yield a message about an inertia without a mass."""
-    if J.any():
-        yield "mass: expected > 0 kg, because there is an inertia, got 0"
 
 
 def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
@@ -228,21 +297,19 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     for key, value in (("damping", damping), ("friction", friction)):
         if value < 0:
             notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {value:g}")
-    ends = {key: _end(where, tag.find(key), key, notes) for key in ("parent", "child")}
+    ends: list[str] = []
+    for key in ("parent", "child"):
+        end = tag.find(key)
+        ends.append("" if end is None else end.get("link", ""))
+        if not ends[-1]:
+            notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
     R, p = notes.pose(where, tag)
     return UrdfJoint(
-        name, kind, ends["parent"], ends["child"], R, p, axis / (length or 1.0), damping, friction,
+        name, kind, *ends, R, p, axis / (length or 1.0), damping, friction,
         {key: notes.number(f"{where} > limit", limit, key) for key in LIMITS
          if limit is not None and key in limit.attrib},
         _mimic(where, mimic, notes),
     )  # fmt: skip
-
-
-def _end(where: str, tag: ET.Element | None, key: str, notes: Notes) -> str:
-    link = "" if tag is None else tag.get("link", "")
-    if not link:
-        notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
-    return link
 
 
 def _mimic(where: str, tag: ET.Element | None, notes: Notes) -> Mimic | None:
@@ -312,60 +379,3 @@ def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:
                 f"joint '{joint.name}' > mimic: expected joints of kind {', '.join(SINGLE)} whose "
                 f"chain ends in one that mimics no other, got '{joint.mimic.joint}'"
             )
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """Pose of a link in the link whose body it is part of."""
-
-    body: str
-    R: Array
-    p: Array
-
-
-def carried(urdf: Urdf) -> dict[str, Carried]:
-    """Return the place of every link: a body of its own, or fixed to another one."""
-    found = {urdf.root: Carried(urdf.root, np.eye(3), np.zeros(3))}
-    for joint in urdf.outwards():
-        on = found[joint.parent]
-        found[joint.child] = (
-            Carried(on.body, on.R @ joint.R, on.p + on.R @ joint.p)
-            if joint.kind == "fixed"
-            else Carried(joint.child, np.eye(3), np.zeros(3))
-        )
-    return found
-
-
-def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
-    """Return mass, centre of mass and inertia about it of all links of a body."""
-    parts = [
-        (at, part)
-        for link, at in places.items()
-        if at.body == body and (part := urdf.links[link]) is not None
-    ]
-    mass = sum(part.mass for _, part in parts)
-    moment = sum((part.mass * (at.p + at.R @ part.com) for at, part in parts), np.zeros(3))
-    com = moment / mass if mass else moment
-    inertia = np.zeros((3, 3))
-    for at, part in parts:
-        d = at.p + at.R @ part.com - com
-        inertia += at.R @ part.J @ at.R.T + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return Inertial(mass, com, inertia)
-
-
-def holding(urdf: Urdf) -> tuple[Urdf, tuple[str, ...]]:
-    """Return the robot with joints fixed that move only massless links, and their names.
-
-    Such joints have no inertia and no effect. A massless link that carries a heavy one, however far
-    out, is different: its joints are the axes of one joint.
-    """
-    heavy = {link for link, weight in urdf.links.items() if weight is not None}
-    for joint in reversed(tuple(urdf.outwards())):
-        if joint.child in heavy:
-            heavy.add(joint.parent)
-    held = tuple(j.name for j in urdf.joints if j.kind != "fixed" and j.child not in heavy)
-    if not held:
-        return urdf, ()
-    joints = tuple(replace(j, kind="fixed") if j.name in held else j for j in urdf.joints)
-    return replace(urdf, joints=joints), held

@@ -1,15 +1,12 @@
 """Moving pictures of mechanisms."""
 
-from base64 import b64encode
-from collections.abc import Callable
-from io import BytesIO
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from string import Template
 from typing import Any
 
-import casadi as ca
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -18,8 +15,10 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.foundation.panels import blank, grid
+from symfric.foundation.shown import data_uri
 from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
+from symfric.foundation.variable import stacked
 from symfric.model.sketch import Sketch
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
@@ -60,15 +59,31 @@ def animate(
     times, speed = frame_times(float(trajectory.t[0]), float(trajectory.t[-1]), fps, speed)
     figure, pose = picture(trajectory, times, speed)
 
-    def show(k: int) -> None:
-        pose(k)
-        if progress is not None:
-            progress((k + 1) / times.size)
+    def frames() -> Iterator[None]:
+        for k in range(times.size):
+            pose(k)
+            if progress is not None:
+                progress((k + 1) / times.size)
+            yield
 
     if Path(path).suffix.lower() == ".html":
-        write_text(path, _page(figure, show, times.size, fps))
-    else:
-        _film(figure, show, times.size, fps, path)
+        sources = ",\n".join(f'"{data_uri(figure, dpi=100)}"' for _ in frames())
+        player = Template(Path(__file__).with_name("player.html").read_text("utf-8"))
+        settings = {"pictures": sources, "last": times.size - 1, "wait": round(1000 / fps)}
+        write_text(path, player.substitute(settings))
+        return
+    with written(path) as temporary:
+        if Path(path).suffix.lower() == ".mp4":
+            movie = FFMpegWriter(fps)  # type: ignore[arg-type]
+            with movie.saving(figure, str(temporary), dpi=100):
+                for _ in frames():
+                    movie.grab_frame()
+        else:  # `saving` would put a film together even after an interrupt
+            film = PillowWriter(fps)  # type: ignore[arg-type]
+            film.setup(figure, str(temporary), dpi=100)
+            for _ in frames():
+                film.grab_frame()
+            film.finish()
 
 
 def check_format(path: str | Path) -> None:
@@ -97,41 +112,6 @@ def frame_times(begin: float, end: float, fps: float, speed: float | None) -> tu
     return np.linspace(begin, end, max(2, round(span / speed * fps) + 1)), speed
 
 
-def _film(
-    figure: Figure, show: Callable[[int], None], count: int, fps: float, path: str | Path
-) -> None:
-    """Write a GIF or MP4."""
-
-    def grab(writer: AbstractMovieWriter) -> None:
-        for k in range(count):
-            show(k)
-            writer.grab_frame()
-
-    with written(path) as temporary:
-        if Path(path).suffix.lower() == ".mp4":
-            program = FFMpegWriter(fps)  # type: ignore[arg-type]
-            with program.saving(figure, str(temporary), dpi=100):
-                grab(program)
-        else:  # `saving` would put a film together even after an interrupt
-            film = PillowWriter(fps)  # type: ignore[arg-type]
-            film.setup(figure, str(temporary), dpi=100)
-            grab(film)
-            film.finish()
-
-
-def _page(figure: Figure, show: Callable[[int], None], count: int, fps: float) -> str:
-    """Return an HTML page that holds all pictures and needs nothing from elsewhere."""
-    pictures: list[str] = []
-    for k in range(count):
-        show(k)
-        buffer = BytesIO()
-        figure.savefig(buffer, dpi=100, format="png")
-        pictures.append(b64encode(buffer.getvalue()).decode())
-    sources = ",\n".join(f'"data:image/png;base64,{text}"' for text in pictures)
-    player = Template(Path(__file__).with_name("player.html").read_text("utf-8"))
-    return player.substitute(pictures=sources, last=count - 1, wait=round(1000 / fps))
-
-
 def picture(
     trajectory: Signals, times: Array, speed: float = 1.0
 ) -> tuple[Figure, Callable[[int], None]]:
@@ -154,8 +134,8 @@ def picture(
     poses = Poses(columns[:, :9].reshape(-1, 3, 3, times.size), columns[:, 9:], paths)
     sticks = _sticks(trajectory, sketch, times)
     view = look(sketch, poses)
-    figure, canvas = _flat(view) if view.planar else _spatial(view)
-    drawn = [canvas(stroke) for stroke in strokes(sketch, poses, view, sticks)]
+    figure, axes = _flat(view) if view.planar else _spatial(view)
+    drawn = [_added(figure, axes, stroke) for stroke in strokes(sketch, poses, view, sticks)]
     title = figure.axes[0].set_title("", loc="left", fontsize="medium")
     factor = "" if abs(speed - 1) < 1e-9 else f"  ({speed:.3g} x)"
     if sticks:
@@ -179,8 +159,8 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
     if not marks:
         return {}
     names = list(dict.fromkeys(name for mark in marks for name, _ in mark.slips))
-    column = ca.vertcat(*(trajectory.model.expression(name) for name in names))
-    slip = dict(zip(names, trajectory.of(ca.vertcat(column, 0), times), strict=False))
+    column = stacked([*(trajectory.model.expression(name) for name in names), 0])
+    slip = dict(zip(names, trajectory.of(column, times), strict=False))
     return {
         mark.name: np.all([np.abs(slip[name]) < limit for name, limit in mark.slips], axis=0)
         for mark in marks
@@ -200,11 +180,8 @@ def _legend(figure: Figure) -> None:
     )  # fmt: skip
 
 
-Canvas = Callable[[Stroke], Callable[[int], None]]
-
-
-def _flat(view: View) -> tuple[Figure, Canvas]:
-    """Axes that show a plane along its normal."""
+def _flat(view: View) -> tuple[Figure, Array]:
+    """Return axes that show a plane along its normal, and the projection on them."""
     axes = np.stack([view.right, view.up])
     low, high = axes @ view.low, axes @ view.high
     low, high = np.minimum(low, high), np.maximum(low, high)
@@ -219,47 +196,40 @@ def _flat(view: View) -> tuple[Figure, Canvas]:
     ax.set_aspect("equal")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set(xlabel=f"{_direction(view.right)} [{unit}]", ylabel=f"{_direction(view.up)} [{unit}]")
-
-    def add(stroke: Stroke) -> Callable[[int], None]:
-        points = factor * np.einsum("ac,nck->ank", axes, stroke.points)
-        (line,) = ax.plot([], [], **_style(stroke))
-
-        def put(k: int) -> None:
-            line.set_data(points[0, :, k], points[1, :, k])
-            _fill(line, stroke, k)
-
-        return put
-
-    return figure, add
+    return figure, factor * axes
 
 
-def _spatial(view: View) -> tuple[Figure, Canvas]:
-    """Axes with three directions of one scale."""
+def _spatial(view: View) -> tuple[Figure, Array]:
+    """Return axes with three directions of one scale, and the projection on them."""
     figure = blank(7.2, 6.4, free=True)
     ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
     size = view.high - view.low
     size = np.maximum(size, 0.15 * size.max())
     middle = (view.low + view.high) / 2
     for k, axis in enumerate("xyz"):
+        ticks = MaxNLocator(max(2, round(6 * size[k] / size.max())))
         getattr(ax, f"set_{axis}lim")(middle[k] - size[k] / 2, middle[k] + size[k] / 2)
         getattr(ax, f"set_{axis}label")(f"{axis} [m]")
-        getattr(ax, f"{axis}axis").set_major_locator(
-            MaxNLocator(max(2, round(6 * size[k] / size.max())))
-        )
+        getattr(ax, f"{axis}axis").set_major_locator(ticks)
     ax.set_box_aspect(size, zoom=1.12)
     figure.subplots_adjust(left=0.0, right=0.95, bottom=0.04, top=0.93)
     ax.view_init(ELEVATION, AZIMUTH)
+    return figure, np.eye(3)
 
-    def add(stroke: Stroke) -> Callable[[int], None]:
-        (line,) = ax.plot([], [], [], **_style(stroke))
 
-        def put(k: int) -> None:
-            line.set_data_3d(*stroke.points[:, :, k].T)
-            _fill(line, stroke, k)
+def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]:
+    """Add a stroke to the figure; return the function that shows it in picture k."""
+    points = np.einsum("ac,nck->kan", axes, stroke.points)
+    canvas: Any = figure.axes[0]
+    (line,) = canvas.plot(*([] for _ in axes), **_style(stroke))
+    place = line.set_data if len(axes) == 2 else line.set_data_3d
 
-        return put
+    def put(k: int) -> None:
+        place(*points[k])
+        if stroke.sticks is not None:
+            line.set_markerfacecolor(STICKS if stroke.sticks[k] else SLIDES)
 
-    return figure, add
+    return put
 
 
 def _direction(axis: Array) -> str:
@@ -291,9 +261,3 @@ def _style(stroke: Stroke) -> dict[str, Any]:
                   "markerfacecolor": EDGE if stroke.sticks is None else SLIDES},
     }  # fmt: skip
     return styles[stroke.role]
-
-
-def _fill(line: Line2D, stroke: Stroke, k: int) -> None:
-    """Fill a joint by what its contacts do."""
-    if stroke.sticks is not None:
-        line.set_markerfacecolor(STICKS if stroke.sticks[k] else SLIDES)

@@ -83,8 +83,49 @@ class Ensemble(Showing):
         )
 
     def shown(self) -> Shown:
-        """Members, failures, what was varied, and where signals end."""
-        return _shown(self)
+        """Describe members, failures, varied numbers, and the signals at the last time."""
+        members, times = self.attempts.size, self.t.shape[-1]
+        first, last = np.min(self.t), np.max(self.t)
+        span = f"{last:g} s"
+        if times > 1:
+            span = f"{counted(times, 'time')} from {first:g} to {last:g} s"
+        done = int(np.isfinite(self.reached).sum())
+        left = f", {members - done} members not started" if done < members else ""
+        lines = [f"{self.status.name}: {counted(self.attempts.sum(), 'attempt')} in all{left}"]
+        ranges: list[str] = []
+        for name, values in self.varied.items():
+            unit = "" if self.unit(name) in ("", "1") else f" {self.unit(name)}"
+            ranges.append(f"{name} from {values.min():.6g} to {values.max():.6g}{unit}")
+        if ranges:
+            lines.append(f"varied: {', '.join(ranges)}")
+        if self.fixed:
+            known = ((n, v, self.unit(n)) for n, v in self.fixed.items())
+            lines.append(f"fixed: {valued(known)}")
+        for number, why in list(self.failed.items())[:3]:
+            lines.append(f"member {number} failed: {why}")
+        if self.doubtful:
+            number, why = next(iter(self.doubtful.items()))
+            lines.append(f"doubtful: {len(self.doubtful)}, the first is {number}: {why}")
+        if len(self.failed) > 3:
+            lines.append(f"failed: {len(self.failed)}, members {among(map(str, self.failed))}")
+        mapped = any(isinstance(values, np.memmap) for values in self.signals.values())
+        read = (members * times if mapped else members) <= MOST
+        rows = [(name, unit, *self._ends(name, read)) for name, unit in self.units.items()]
+        header = ("signal", "unit", "least", "median", "greatest")
+        return Shown(
+            f"ensemble of '{self.scene}': {counted(members, 'member')} at {span}",
+            tuple(lines),
+            Table(header, tuple(rows), numbers=(2, 3, 4)),
+            ("over the members, at the last time",) if read else (),
+        )
+
+    def _ends(self, name: str, read: bool) -> Iterable[str]:
+        """Return least, median and greatest value of a signal at the last time, if it is `read`."""
+        values = np.asarray(self.signals[name][:, -1]) if read else np.zeros(0)
+        values = values[np.isfinite(values)]
+        if not values.size:
+            return "", "", ""
+        return (f"{x:.6g}" for x in (values.min(), np.median(values), values.max()))
 
     def thumbnail(self) -> "Figure | None":
         """Return the first signal of the first members over time, small; None for ends alone."""
@@ -130,14 +171,12 @@ class Ensemble(Showing):
         signals are over `t` alone, where short events get lost: ask for more times by `t_eval`, or
         simulate such a member alone. NaN of members without a value.
         """
-        return {name: self._extreme(name) for name in self.signals}
-
-    def _extreme(self, name: str) -> tuple[Array, Array]:
-        values = self.signals[name]
-        least, most = np.fmin.reduce(values, axis=1), np.fmax.reduce(values, axis=1)
-        if name in self.reach:
-            least, most = np.fmin(least, self.reach[name][0]), np.fmax(most, self.reach[name][1])
-        return least, most
+        found: dict[str, tuple[Array, Array]] = {}
+        for name, values in self.signals.items():
+            least, most = np.fmin.reduce(values, axis=1), np.fmax.reduce(values, axis=1)
+            low, high = self.reach.get(name, (least, most))
+            found[name] = np.fmin(least, low), np.fmax(most, high)
+        return found
 
     def plot(
         self, *names: str, over: str = "", at: float | str = "end", path: str | Path | None = None
@@ -226,13 +265,11 @@ class Ensemble(Showing):
         columns = self._columns(names)
         flat = {name: values.ravel() for name, values in columns.items()}
         members = np.arange(len(self))
-        if self.t.shape[-1] == 1:
-            index = pandas.Index(members, name="member")
-            if self.t.ndim == 1:
-                del flat["t"]
-        else:
-            del flat["t"]
+        index = pandas.Index(members, name="member")
+        if self.t.shape[-1] > 1:
             index = pandas.MultiIndex.from_product([members, self.t], names=["member", "t"])
+        if self.t.ndim == 1:
+            del flat["t"]
         frame = pandas.DataFrame(flat, index=index)
         frame.attrs.update(self._about | {"units": self._units(columns)})
         return frame
@@ -249,12 +286,11 @@ class Ensemble(Showing):
         coordinates["t"] = ("t", self.t, unit) if over_t else ("member", self.t[:, 0], unit)
         for name, values in self.varied.items():
             coordinates[name] = ("member", values, {"units": self.unit(name)})
-        arrays = {
-            name: (("member", "t"), self.signals[name], {"units": self.units[name]})
-            if over_t
-            else ("member", self.signals[name][:, 0], {"units": self.units[name]})
-            for name in self._chosen(names)
-        }
+        arrays: dict[str, Any] = {}
+        for name in self._chosen(names):
+            values, its_unit = self.signals[name], {"units": self.units[name]}
+            both = (("member", "t"), values, its_unit)
+            arrays[name] = both if over_t else ("member", values[:, 0], its_unit)
         return xarray.Dataset(arrays, coords=coordinates, attrs=self._about)
 
     def _chosen(self, names: Sequence[str]) -> list[str]:
@@ -289,52 +325,3 @@ def load_ensemble(path: str | Path) -> Ensemble:
             version.
     """
     return ENSEMBLE.load(path)
-
-
-def _shown(runs: Ensemble) -> Shown:
-    """Number of members, their ends, and least, middle and greatest value at the last time."""
-    members, times = runs.attempts.size, runs.t.shape[-1]
-    first, last = np.min(runs.t), np.max(runs.t)
-    span = f"{counted(times, 'time')} from {first:g} to {last:g} s" if times > 1 else f"{last:g} s"
-    done = int(np.isfinite(runs.reached).sum())
-    left = f", {members - done} members not started" if done < members else ""
-    lines = [f"{runs.status.name}: {counted(runs.attempts.sum(), 'attempt')} in all{left}"]
-    if runs.varied:
-        lines.append("varied: " + ", ".join(_range(runs, name) for name in runs.varied))
-    if runs.fixed:
-        known = ((n, v, runs.unit(n)) for n, v in runs.fixed.items())
-        lines.append(f"fixed: {valued(known)}")
-    for number, why in list(runs.failed.items())[:3]:
-        lines.append(f"member {number} failed: {why}")
-    if runs.doubtful:
-        first, why = next(iter(runs.doubtful.items()))
-        lines.append(f"doubtful: {len(runs.doubtful)}, the first is {first}: {why}")
-    if len(runs.failed) > 3:
-        lines.append(f"failed: {len(runs.failed)}, members {among(map(str, runs.failed))}")
-    rows = list[tuple[str, ...]]()
-    mapped = any(isinstance(values, np.memmap) for values in runs.signals.values())
-    read = (members * times if mapped else members) <= MOST
-    for name in runs.signals:
-        rows.append((name, runs.units[name], *(_ends(runs, name) if read else ("", "", ""))))
-    header = ("signal", "unit", "least", "median", "greatest")
-    return Shown(
-        f"ensemble of '{runs.scene}': {counted(members, 'member')} at {span}",
-        tuple(lines),
-        Table(header, tuple(rows), numbers=(2, 3, 4)),
-        ("over the members, at the last time",) if read else (),
-    )
-
-
-def _range(runs: Ensemble, name: str) -> str:
-    values, unit = runs.varied[name], runs.unit(name)
-    said = "" if unit in ("", "1") else f" {unit}"
-    return f"{name} from {values.min():.6g} to {values.max():.6g}{said}"
-
-
-def _ends(runs: Ensemble, name: str) -> tuple[str, str, str]:
-    values = np.asarray(runs.signals[name][:, -1])
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return "", "", ""
-    low, middle, high = (f"{x:.6g}" for x in (values.min(), np.median(values), values.max()))
-    return low, middle, high

@@ -73,46 +73,39 @@ def main(model: Model, units: dict[str, str]) -> list[Group]:
     speeds = [n for n, u in units.items() if u in rates and n not in own and not kind.get(n)]
     energies = [n for n in units if kind.get(n) == ENERGY]
     powers = [] if energies else [n for n in model.outputs if units.get(n) == POWER]
-    return [
-        group
-        for title, names in (
-            ("position", places),
-            ("speed", [] if places else speeds),
-            ("friction", forces),
-            ("energy", energies),
-            ("power of friction", powers),
-        )
-        for group in by_unit(title, [n for n in names if n in units], units)
-    ]
+    titled = {
+        "position": places, "speed": [] if places else speeds, "friction": forces,
+        "energy": energies, "power of friction": powers,
+    }  # fmt: skip
+    return [group for title, names in titled.items() for group in by_unit(title, names, units)]
 
 
 def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
     """All signals of `units`: one each where these are at most `apart`, else by kind and unit."""
     kind = kinds(model)
-    norm = [n for n in units if kind.get(n) == CONSTRAINTS]
+    norm = {n: n for n in units if kind.get(n) == CONSTRAINTS}
     rest = [n for n in units if n not in norm]
+    last = [Group(CONSTRAINTS, "", norm, norms=True)] if norm else []
     if len(units) <= apart:
-        found = [Group("", units[n], {n: n}) for n in rest]
-    else:
-        named = {n: kind.get(n, "") for n in rest}
-        if is_mechanism(model):  # multipliers and sliding velocities say nothing of their own
-            named = {n: k for n, k in named.items() if k}
-        named = {n: f"power of {k}" if (k, units[n]) == (FRICTION, POWER) else k
-                 for n, k in named.items()}  # fmt: skip
-        titles = dict.fromkeys(named.values())
-        found = [
-            group
-            for title in titles
-            for group in by_unit(title, [n for n, k in named.items() if k == title], units)
-        ]
-    return [*found, *([Group(CONSTRAINTS, "", {n: n for n in norm}, norms=True)] if norm else [])]
+        return [*(Group("", units[n], {n: n}) for n in rest), *last]
+    titled: dict[str, list[str]] = {}
+    for n in rest:
+        title = kind.get(n, "")
+        if title or not is_mechanism(model):  # those are multipliers and sliding velocities
+            of_power = (title, units[n]) == (FRICTION, POWER)
+            titled.setdefault(f"power of {title}" if of_power else title, []).append(n)
+    groups = [group for title, names in titled.items() for group in by_unit(title, names, units)]
+    return [*groups, *last]
 
 
 def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Group]:
-    """Groups of one unit each; names lose the ending that all of a group have in common."""
+    """Return groups of one unit each of the names that have one; names lose the ending that all of
+    a group have in common.
+    """
     found: dict[str, list[str]] = {}
     for name in names:
-        found.setdefault(units[name], []).append(name)
+        if name in units:
+            found.setdefault(units[name], []).append(name)
     return [
         Group(title if len(own) > 1 else "", unit, dict(zip(own, shortened(own), strict=True)))
         for unit, own in found.items()

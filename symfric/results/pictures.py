@@ -71,13 +71,29 @@ def plot_trajectories(
     figure, axes = empty_panels(len(groups), width=8.5 if tall else 7.0, height=2.0)
     alone = all(len(g.names) == 1 for g in groups)
     _check_log(log, groups, trajectories)
-    span = [end for run in trajectories.values() for end in run.span]
-    by_t, unit_t = clock(span)
+    by_t, unit_t = clock([end for run in trajectories.values() for end in run.span])
     for axis, group in zip(axes, groups, strict=True):
         _panel(axis, group, trajectories, alone, by_t, not set(log).isdisjoint(group.names))
-    axes[0].set_title(_title(trajectories), loc="left", fontsize="medium")
-    _legend(figure, trajectories, alone)
-    axes[-1].set_xlabel(f"t [{unit_t}]")
+    laws = {friction_laws(run.model) for run in trajectories.values()}
+    law = f" with {min(laws)}" if len(laws) == 1 and min(laws) else ""
+    handles: list[Artist] = []
+    for r, label in enumerate(trajectories if list(trajectories) != [first.scene] else ()):
+        look = line(r) if alone else line(BLACK, r)
+        handles.append(Line2D([], [], label=label, linewidth=1.4, **look))
+    columns = min(4, len(handles))
+    return _finished(figure, axes, f"{first.scene}{law}", f"t [{unit_t}]", path, handles, columns)
+
+
+def _finished(
+    figure: Figure, axes: Sequence[Axes], title: str, xlabel: str, path: str | Path | None,
+    handles: Sequence[Artist] = (), columns: int = 1,
+) -> Figure:  # fmt: skip
+    """Add a title, the label of the abscissa, and a legend below the panels; save the figure."""
+    axes[0].set_title(title, loc="left", fontsize="medium")
+    axes[-1].set_xlabel(xlabel)
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", frameon=False, fontsize="small",
+                      ncols=columns)  # fmt: skip
     figure.align_ylabels(axes)
     return save(figure, path)
 
@@ -160,42 +176,26 @@ def level(axis: Axes, values: Sequence[Array]) -> None:
         axis.set_ylim(middle - (0.2 * size or 1.0), middle + (0.2 * size or 1.0))
 
 
-def _title(trajectories: Mapping[str, Signals]) -> str:
-    """Return the scene, and the laws where these are the same in all."""
-    first = next(iter(trajectories.values()))
-    laws = {friction_laws(run.model) for run in trajectories.values()}
-    (law,) = laws if len(laws) == 1 else ("",)
-    return f"{first.scene} with {law}" if law else first.scene
-
-
-def _legend(figure: Figure, trajectories: Mapping[str, Signals], alone: bool) -> None:
-    """Legend of the simulations below the panels; nothing for one without a name."""
-    first = next(iter(trajectories.values()))
-    if list(trajectories) == [first.scene]:
-        return
-    handles: list[Artist] = []
-    for r, label in enumerate(trajectories):
-        look = line(r) if alone else line(BLACK, r)
-        handles.append(Line2D([], [], label=label, linewidth=1.4, **look))
-    figure.legend(
-        handles=handles, loc="outside lower center", frameon=False, fontsize="small",
-        ncols=min(4, len(handles)),
-    )  # fmt: skip
+def _small(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    """Return a small figure with `count` panels in a column."""
+    figure = Figure(figsize=(5.2, height), layout="constrained")
+    axes = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    for axis in axes:
+        axis.tick_params(labelsize=7)
+        axis.grid(alpha=0.3)
+    return figure, axes
 
 
 def thumbnail(run: Signals) -> Figure:
     """Some signals over time, small: the first position, its rate and the first friction force."""
     names, (by_t, unit_t) = _few(run), clock(run.span)
-    figure = Figure(figsize=(5.2, 0.5 + 1.05 * len(names)), layout="constrained")
-    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    figure, axes = _small(len(names), 0.5 + 1.05 * len(names))
     for axis, name in zip(axes, names, strict=True):
         t, values = _thinned(run.t, run[name])
         axis.plot(by_t * t, values, linewidth=1.0, color=COLOURS[0])
         axis.set_ylabel(f"{name} [{run.units[name]}]", fontsize=7)
-        axis.tick_params(labelsize=7)
-        axis.grid(alpha=0.3)
     axes[-1].set_xlabel(f"t [{unit_t}]", fontsize=7)
-    figure.align_ylabels(list(axes))
+    figure.align_ylabels(axes)
     return figure
 
 
@@ -263,26 +263,24 @@ def plot_many(
     pick = slice(None) if ends else np.unique(np.linspace(0, t.size - 1, TIMES).astype(int))
     figure, axes = panels(len(shown), shared=not ends, height=2.0)
     by_t, unit_t = clock(t)
+    xlabel = f"t [{unit_t}]"
     for axis, name in zip(axes, shown, strict=True):
         values = np.asarray(signals[name][:, pick], dtype=float)
         factor, unit = readable(units[name], [values])
         if ends:
-            _histogram(axis, factor * values[:, -1])
-            axis.set_xlabel(f"{name} [{unit}] at the end")
+            finite = values[np.isfinite(values[:, -1]), -1]
+            spread = finite.size > 1 and np.ptp(finite) > 0
+            axis.hist(factor * finite, bins="auto" if spread else 1, color=colour(0), alpha=0.7)
+            xlabel = f"{name} [{unit}] at the end"
+            axis.set_xlabel(xlabel)
             axis.set_ylabel("members")
         else:
             _bands(axis, by_t * t[pick], factor * values)
             level(axis, [factor * values])
             axis.set_ylabel(f"{name} [{unit}]")
     members = next(iter(signals.values())).shape[0] if signals else 0
-    axes[0].set_title(f"{scene}, {members} members", loc="left", fontsize="medium")
-    if not ends:
-        axes[-1].set_xlabel(f"t [{unit_t}]")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False,
-                      fontsize="small")  # fmt: skip
-        figure.align_ylabels(axes)
-    return save(figure, path)
+    handles = axes[0].get_legend_handles_labels()[0]
+    return _finished(figure, axes, f"{scene}, {members} members", xlabel, path, handles, 6)
 
 
 def _bands(axis: Axes, t: Array, values: Array) -> None:
@@ -298,13 +296,6 @@ def _bands(axis: Axes, t: Array, values: Array) -> None:
         axis.fill_between(t, *edges, color=colour(0), alpha=opacity, linewidth=0, label=label)
     middle = np.nanmedian(values, axis=0)
     axis.plot(t, middle, color=colour(0), linewidth=1.4, label="median")
-
-
-def _histogram(axis: Axes, values: Array) -> None:
-    """Histogram of the ends."""
-    finite = values[np.isfinite(values)]
-    spread = finite.size > 1 and np.ptp(finite) > 0
-    axis.hist(finite, bins="auto" if spread else 1, color=colour(0), alpha=0.7)
 
 
 def plot_over(
@@ -337,18 +328,14 @@ def plot_over(
             _draw(axis, x[pick], factor * values[pick], k, label)
         level(axis, [factor * values])
         axis.set_ylabel(f"{name} [{unit_y}]")
-    _across(axes[-1], x)
-    axes[-1].set_xlabel(name_x if unit in ("", "1") else f"{name_x} [{unit}]")
-    first = next(iter(signals.values()))[1]
-    absent = int((~np.isfinite(first)).sum())
+    if x.size and x.min() > 0 and x.max() >= DECADES * x.min():
+        axes[-1].set_xscale("log")
+    absent = int((~np.isfinite(next(iter(signals.values()))[1])).sum())
     without = f", {absent} without a value" if absent else ""
     title = f"{scene}, {x.size} members{without}, {said}"
-    axes[0].set_title(title, loc="left", fontsize="medium")
-    if len(series) > 1:
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center",
-                      ncols=min(3, len(series)), frameon=False, fontsize="small")  # fmt: skip
-    figure.align_ylabels(axes)
-    return save(figure, path)
+    handles = axes[0].get_legend_handles_labels()[0] if len(series) > 1 else ()
+    xlabel = name_x if unit in ("", "1") else f"{name_x} [{unit}]"
+    return _finished(figure, axes, title, xlabel, path, handles, min(3, len(series)))
 
 
 def _series(
@@ -378,19 +365,10 @@ def _draw(axis: Axes, x: Array, y: Array, k: int, label: str) -> None:
                   alpha=0.7, rasterized=x.size > 5000)  # fmt: skip
 
 
-def _across(axis: Axes, x: Array) -> None:
-    """Logarithmic where the values go over decades."""
-    if x.size and x.min() > 0 and x.max() >= DECADES * x.min():
-        axis.set_xscale("log")
-
-
 def thumbnail_of_many(t: Array, values: Array, label: str) -> Figure:
     """Return the first members over time, small."""
-    figure = Figure(figsize=(5.2, 1.9), layout="constrained")
-    axis = figure.subplots()
+    figure, (axis,) = _small(1, 1.9)
     axis.plot(t, np.asarray(values[:SMALL]).T, linewidth=0.6, color=COLOURS[0], alpha=0.4)
     axis.set_xlabel("t [s]", fontsize=7)
     axis.set_ylabel(label, fontsize=7)
-    axis.tick_params(labelsize=7)
-    axis.grid(alpha=0.3)
     return figure

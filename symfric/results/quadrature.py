@@ -4,35 +4,21 @@ A run may rest for years and slip for a second: its steps go there, equally spac
 """
 
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from symfric.foundation.numeric import Scalar
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array], Mapping[str, Array]]
+Of = Callable[[ca.SX, Array], Array]
+"""Values of an expression at times."""
 ROUNDS, PARTS = 2, 16
 """How often the neighbourhood of an extreme is looked at again, and in how many parts."""
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 """Of Gauss quadrature on (-1, 1): exact to degree 9, beyond any dense output."""
 EXACT, HALVINGS = 1e-12, 24
 """Part of an integral by which two halves may differ from a whole; how often a step is halved."""
-
-
-class Run(Protocol):
-    """Run that is integrated."""
-
-    @property
-    def step_times(self) -> Array:
-        """Ends of the accepted steps [s]."""
-        ...
-
-    def of(self, expression: Scalar, times: ArrayLike | None = None, /) -> Array:
-        """Values of an expression."""
-        ...
 
 
 def looks(t: Array, steps: Array, jumps: Array) -> Array:
@@ -67,39 +53,40 @@ def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> d
     return dict(zip(names, best, strict=True))
 
 
-def integrals(run: Run, expression: ca.SX, times: Array) -> Array:
-    """Integrals of the rows of a column from the start up to `times`, shape (rows, times).
+def integrals(ends: Array, of: Of, expression: ca.SX, times: Array) -> Array:
+    """Return integrals of the rows of a column from the start to `times`, shape (rows, times).
 
-    Steps end at jumps of inputs and at events, so that the integrand is smooth inside each.
+    The steps between `ends` end at jumps of inputs and at events: the integrand is smooth in each.
     """
-    ends = run.step_times
     k = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, ends.size - 2)
-    whole = _pieces(run, expression, ends[:-1], ends[1:])
+    whole = _pieces(of, expression, ends[:-1], ends[1:])
     before = np.concatenate([np.zeros((whole.shape[0], 1)), np.cumsum(whole, axis=1)], axis=1)
-    return before[:, k] + _pieces(run, expression, ends[k], times)
+    return before[:, k] + _pieces(of, expression, ends[k], times)
 
 
-def integral_between(run: Run, expression: ca.SX, a: float, b: float) -> float:
-    """Integral of one expression from time a to b; a step is halved while its halves add detail."""
-    ends = run.step_times
+def integral_between(ends: Array, of: Of, expression: ca.SX, a: float, b: float) -> float:
+    """Return the integral of one expression from time a to b.
+
+    A step between `ends` is halved while its halves add detail.
+    """
     cuts = np.unique(np.concatenate([[a], ends[(ends > a) & (ends < b)], [b]]))
     left, right, done = cuts[:-1], cuts[1:], 0.0
     for _ in range(HALVINGS):
         middle = (left + right) / 2
-        halves = _pieces(run, expression, left, middle) + _pieces(run, expression, middle, right)
-        off = np.abs(halves - _pieces(run, expression, left, right))[0]
+        halves = _pieces(of, expression, left, middle) + _pieces(of, expression, middle, right)
+        off = np.abs(halves - _pieces(of, expression, left, right))[0]
         rough = off > EXACT * (abs(done) + np.abs(halves).sum())
         done += float(halves[0, ~rough].sum())
         left, middle, right = left[rough], middle[rough], right[rough]
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
-    return done + float(_pieces(run, expression, left, right).sum())
+    return done + float(_pieces(of, expression, left, right).sum())
 
 
-def _pieces(run: Run, expression: ca.SX, a: Array, b: Array) -> Array:
-    """Integrals over the intervals from a to b, each within a step, shape (rows, intervals)."""
+def _pieces(of: Of, expression: ca.SX, a: Array, b: Array) -> Array:
+    """Return integrals over intervals from a to b, each within a step, shape (rows, intervals)."""
     half = (b - a)[:, None] / 2
     at = (a + b)[:, None] / 2 + half * NODES
     if not at.size:
         return np.zeros((expression.numel(), 0))
-    values = np.atleast_2d(run.of(expression, at.ravel()))
+    values = np.atleast_2d(of(expression, at.ravel()))
     return np.einsum("rkg,g,k->rk", values.reshape(-1, *at.shape), WEIGHTS, half[:, 0])

@@ -4,6 +4,7 @@ The page is an archive: it holds the numbers, the laws with their
 equations, parameters and limits, and how to run it again.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from inspect import getdoc
@@ -17,22 +18,12 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.foundation.style import COLOURS
-from symfric.model import Contact
 from symfric.page import html
 from symfric.page.svg import Path as Line
 from symfric.page.svg import around, chart
 from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory
 
-CONTENTS = (
-    ("motion", "Motion"),
-    ("signals", "Signals"),
-    ("friction", "Friction"),
-    ("books", "Accuracy"),
-    ("laws", "Laws"),
-    ("settings", "Parameters"),
-    ("made", "How it was made"),
-)
 LINES = 4
 """Runs in one chart; a page with more has its friction in several."""
 
@@ -58,28 +49,27 @@ def report(
     Raises:
         ValueError: no run, or something else than runs.
     """
-    if not isinstance(runs, Trajectory | Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+    if isinstance(runs, Trajectory):
+        runs = {runs.scene: runs}
+    if not isinstance(runs, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused("report: runs", "a run of simulate, or {name: run}", runs)
-    named = checks.named(
-        "report: runs", {runs.scene: runs} if isinstance(runs, Trajectory) else runs
-    )
+    named = checks.named("report: runs", runs)
     if not named:
         raise ValueError("report: expected at least one run, got none")
     for name, run in named.items():
         checks.kind(f"report: runs {name}", run, Trajectory, "a run of simulate")
     parts = {
-        "motion": [_picture(named)],
-        "signals": [*_signals(named)],
-        "friction": [*_friction(named)],
-        "books": [*_books(named)],
-        "laws": [*_laws(named)],
-        "settings": [*_settings(settings or {})],
-        "made": [*_made(named, command)],
+        "motion": ("Motion", [_picture(named)]),
+        "signals": ("Signals", [*_signals(named)]),
+        "friction": ("Friction", [*_friction(named)]),
+        "books": ("Accuracy", [*_books(named)]),
+        "laws": ("Laws", [*_laws(named)]),
+        "settings": ("Parameters", [*_settings(settings or {})]),
+        "made": ("How it was made", [*_made(command)]),
     }
-    sections = {a: html.section(a, title, *parts[a]) for a, title in CONTENTS}
-    first = next(iter(named.values()))
-    heading = f"{first.scene} with {' and '.join(named)}"
-    links = [(a, title) for a, title in CONTENTS if sections[a]]
+    sections = {a: html.section(a, title, *blocks) for a, (title, blocks) in parts.items()}
+    heading = f"{next(iter(named.values())).scene} with {' and '.join(named)}"
+    links = [(a, title) for a, (title, _) in parts.items() if sections[a]]
     body = [html.title(heading), _verdict(named), html.contents(links), *sections.values()]
     text = html.page(heading, "en", "\n".join(part for part in body if part))
     if path is not None:
@@ -91,10 +81,9 @@ def _verdict(runs: Mapping[str, Trajectory]) -> str:
     """Return the ends of the runs."""
     ended = all(run.status.ok for run in runs.values())
     good = ended and not any(run.doubts for run in runs.values())
-    said = [f"{name}: {run.message}" for name, run in runs.items()]
-    return html.verdict(
-        "good" if good else "bad", "Done" if good else "In doubt" if ended else "Not finished", said
-    )
+    messages = [f"{name}: {run.message}" for name, run in runs.items()]
+    title = "Done" if good else "In doubt" if ended else "Not finished"
+    return html.verdict("good" if good else "bad", title, messages)
 
 
 def _picture(runs: Mapping[str, Trajectory]) -> str:
@@ -118,43 +107,31 @@ def _signals(runs: Mapping[str, Trajectory]) -> Iterator[str]:
         caption = f"{name}, {span}: over all accepted steps"
         yield html.table(caption, ("signal", "final", "least", "greatest", "unit"), rows, (1, 2, 3))
         if run.happened:
-            counts = {what: sum(w == what for _, w in run.happened) for _, what in run.happened}
-            yield html.paragraph(
-                "Events: " + ", ".join(f"{what} {n} times" for what, n in counts.items()) + "."
-            )
+            counts = Counter(name for _, name in run.happened).items()
+            events = ", ".join(f"{event} {n} times" for event, n in counts)
+            yield html.paragraph(f"Events: {events}.")
 
 
 def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Friction over the sliding velocity, a chart per contact."""
+    """Yield friction over the sliding velocity in the colours of the picture, by contact."""
     first = next(iter(runs.values()))
     for contact in first.model.contacts:
-        name = _force_name(contact)
-        if all(name in run.units for run in runs.values()):
-            kinds = {label: f"run{k % len(COLOURS)}" for k, label in enumerate(runs)}
-            for start in range(0, len(runs), LINES):
-                shown = dict([*runs.items()][start : start + LINES])
-                yield html.figure(_loop(shown, kinds, contact, name))
-
-
-def _force_name(contact: Contact) -> str:
-    return "friction" if contact.bare else f"{contact.name}_friction"
-
-
-def _loop(
-    runs: Mapping[str, Trajectory], kinds: Mapping[str, str], contact: Contact, name: str
-) -> str:
-    """Friction of one contact over its sliding velocity, in the colours of the picture above."""
-    lines: list[tuple[str, Any, Any]] = []
-    for label, run in runs.items():
-        own = next(c for c in run.model.contacts if c.name == contact.name)
-        lines.append((label, run.of(own.slip, run.looks), run.at_looks(name)))
-    slips, forces = (np.concatenate([line[k] for line in lines]) for k in (1, 2))
-    first = next(iter(runs.values()))
-    speed = "rad/s" if contact.turning else "m/s"
-    x = around("sliding velocity", speed, slips)
-    y = around(name, first.units[name], forces)
-    marks = [Line(kinds[label], across, up, label) for label, across, up in lines]
-    return chart(f"Friction over sliding velocity: {contact.name}", x, y, marks, height=300.0)
+        name = "friction" if contact.bare else f"{contact.name}_friction"
+        if not all(name in run.units for run in runs.values()):
+            continue
+        curves: list[Line] = []
+        for k, (label, run) in enumerate(runs.items()):
+            own = next(c for c in run.model.contacts if c.name == contact.name)
+            slip = run.of(own.slip, run.looks)
+            curves.append(Line(f"run{k % len(COLOURS)}", slip, run.at_looks(name), label))
+        for start in range(0, len(curves), LINES):
+            shown = curves[start : start + LINES]
+            slips, forces = [c.x for c in shown], [c.y for c in shown]
+            speed = "rad/s" if contact.turning else "m/s"
+            x = around("sliding velocity", speed, np.concatenate(slips))
+            y = around(name, first.units[name], np.concatenate(forces))
+            title = f"Friction over sliding velocity: {contact.name}"
+            yield html.figure(chart(title, x, y, shown, height=300.0))
 
 
 def _books(runs: Mapping[str, Trajectory]) -> Iterator[str]:
@@ -172,43 +149,33 @@ def _books(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 
 def _accuracy(run: Trajectory) -> tuple[str, ...]:
-    s = run.statistics
-    mechanism = is_mechanism(run.model) and run.status.ok
-    energy = f"{run.energy_balance().relative:.1e}" if mechanism else "–"
-    held = [run[name].max() for name in norms(run.model)[:1]]
-    return (
-        f"{s.error:.1e}" if np.isfinite(s.error) else "–",
-        energy,
-        f"{max(held):.1e}" if held else "–",
-        f"{s.steps}",
-        f"{s.rejections}",
-        f"{s.method} ({s.backend})",
-        f"{1e3 * s.run_time:.3g}",
-    )
+    s, energy, held = run.statistics, np.nan, np.nan
+    if is_mechanism(run.model) and run.status.ok:
+        energy = run.energy_balance().relative
+    for name in norms(run.model)[:1]:
+        held = run[name].max()
+    errors = (f"{x:.1e}" if np.isfinite(x) else "–" for x in (s.error, energy, held))
+    how = f"{s.method} ({s.backend})"
+    return (*errors, f"{s.steps}", f"{s.rejections}", how, f"{1e3 * s.run_time:.3g}")
 
 
 def _laws(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Equation, limits and numbers of every law with other numbers, once."""
-    told = set[str]()
+    """Yield equation, limits and numbers of every law with other numbers, once."""
+    laws: dict[str, Any] = {}
     for run in runs.values():
         for contact in run.model.contacts:
             law: Any = contact.law
-            numbers = parameters(law)
-            mark = f"{type(law)}{[(n, str(p.value)) for n, p in numbers.items()]}"
-            if mark not in told:
-                told.add(mark)
-                yield from _law(law, numbers)
-
-
-def _law(law: Any, numbers: Mapping[str, Parameter]) -> Iterator[str]:
-    title, _, rest = (getdoc(type(law)) or type(law).__name__).partition("\n")
-    yield html.heading(title)
-    for block in rest.strip("\n").replace("\nSource:", "\n\nSource:").split("\n\n"):
-        text = html.code if block.startswith(" ") else html.paragraph
-        yield text(block if block.startswith(" ") else " ".join(block.split()))
-    rows = [(n, _number(p.value), p.unit, p.doc) for n, p in numbers.items()]
-    yield html.table("Parameters of the law", ("name", "value", "unit", "meaning"), rows, (1,))
-    yield html.bullets(law.warnings() if hasattr(law, "warnings") else ())
+            numbers = [(n, str(p.value)) for n, p in parameters(law).items()]
+            laws.setdefault(f"{type(law)}{numbers}", law)
+    for law in laws.values():
+        title, _, rest = (getdoc(type(law)) or type(law).__name__).partition("\n")
+        yield html.heading(title)
+        for block in rest.strip("\n").replace("\nSource:", "\n\nSource:").split("\n\n"):
+            text = html.code if block.startswith(" ") else html.paragraph
+            yield text(block if block.startswith(" ") else " ".join(block.split()))
+        rows = [(n, _number(p.value), p.unit, p.doc) for n, p in parameters(law).items()]
+        yield html.table("Parameters of the law", ("name", "value", "unit", "meaning"), rows, (1,))
+        yield html.bullets(law.warnings() if hasattr(law, "warnings") else ())
 
 
 def _settings(settings: Mapping[str, Mapping[str, Parameter]]) -> Iterator[str]:
@@ -224,11 +191,10 @@ def _settings(settings: Mapping[str, Mapping[str, Parameter]]) -> Iterator[str]:
     yield html.table("As they were", ("name", *settings, "unit", "meaning"), rows, [*columns])
 
 
-def _made(runs: Mapping[str, Trajectory], command: str) -> Iterator[str]:
-    """Call and versions."""
+def _made(command: str) -> Iterator[str]:
+    """Yield call and versions."""
     yield html.code(command)
-    programs = ("symfric", "casadi", "numpy")
-    rows = [(name, version(name)) for name in programs]
+    rows = [(name, version(name)) for name in ("symfric", "casadi", "numpy")]
     rows += [("Python", python_version()), ("platform", platform())]
     yield html.table("Versions", ("what", ""), rows)
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing
 from symfric.foundation.status import Status
 from symfric.foundation.variable import strays
@@ -47,6 +46,10 @@ class Signals(Showing):
     delays: Callable[[], dict[str, Array]] | None = None
 
     @property
+    def _where(self) -> str:
+        return f"trajectory of '{self.scene}'"
+
+    @property
     def doubts(self) -> str:
         """Errors that its tolerances do not bound, in sentences; "" where none are known."""
         return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
@@ -56,17 +59,13 @@ class Signals(Showing):
         """Steps, evaluations, times."""
         return self.count()
 
-    @property
+    @cached_property
     def step_times(self) -> Array:
         """Ends of the accepted steps [s], shape (steps + 1,); `at(step_times)` has the signals.
 
         A run whose steps would take much memory has not kept them, and is run again for them, as it
         is for values between the times `t`.
         """
-        return self._ends
-
-    @cached_property
-    def _ends(self) -> Array:
         return self.ends()
 
     @cached_property
@@ -131,10 +130,9 @@ class Signals(Showing):
         Raises:
             ValueError: unknown names, with the nearest known one.
         """
-        where = f"trajectory of '{self.scene}'"
-        names = [checks.text(where, name, "the name of a signal") for name in names]
+        names = [checks.text(self._where, name, "the name of a signal") for name in names]
         known = self.units if all(n in self.units for n in names) else self.units | self.details
-        check_names(f"trajectory of '{self.scene}'", names, known)
+        checks.check_names(self._where, names, known)
 
     def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
         """Values of an expression in the symbols of the model: t, x, z, u, p.
@@ -149,14 +147,12 @@ class Signals(Showing):
         Raises:
             ValueError: a symbol that is none of the model's, a time outside the span.
         """
-        where = f"trajectory of '{self.scene}': of"
-        column, model = ca.SX(checks.expression(where, expression)), self.model
+        column, model = ca.SX(checks.expression(f"{self._where}: of", expression)), self.model
         known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
-        stray = strays(column, known)
-        if stray:
+        if stray := strays(column, known):
             raise ValueError(
-                f"trajectory of '{self.scene}': expected an expression in the symbols of its "
-                f"model, got {', '.join(stray)}"
+                f"{self._where}: expected an expression in the symbols of its model, got "
+                f"{', '.join(stray)}"
             )
         values = self.express(ca.vec(column), self.t if times is None else self._inside(times))
         return values[0] if column.is_scalar() else values
@@ -170,15 +166,15 @@ class Signals(Showing):
         return self.evaluate(self._inside(times))
 
     def _inside(self, times: ArrayLike) -> Array:
-        where = f"trajectory of '{self.scene}': times"
+        where = f"{self._where}: times"
         at = np.atleast_1d(checks.array(where, times, ndim=None, what="times [s]"))
         if at.ndim > 1:
             raise checks.refused(where, "a time or a sequence of times [s]", times)
         first, last = self.span
         if at.size and not (first <= at.min() and at.max() <= last):
             raise ValueError(
-                f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
-                f"got {at.min():g} ... {at.max():g} s"
+                f"{self._where}: expected times in [{first:g}, {last:g}] s, got {at.min():g} ... "
+                f"{at.max():g} s"
             )
         return at
 
@@ -202,7 +198,7 @@ class Signals(Showing):
         """
         self.check([name])
         at = self.t if times is None else self._inside(times)
-        return integrals(self, self.model.expression(name), at)[0]
+        return integrals(self.step_times, self.of, self.model.expression(name), at)[0]
 
     def work(self, force: str, rate: str, between: tuple[float, float] | None = None) -> float:
         """Integral of a force times a rate over time, such as the work of friction [J].
@@ -242,7 +238,7 @@ class Signals(Showing):
         free = ca.vertcat(model.vector("z"), model.vector("u"))
         if model.ode is None or ca.depends_on(signal, free):
             raise ValueError(
-                f"trajectory of '{self.scene}': area: expected an x of the states and time of "
+                f"{self._where}: area: expected an x of the states and time of "
                 f"explicit equations, got '{x}'; work(y, rate) takes its rate, where it is a signal"
             )
         rate = ca.jacobian(signal, model.vector("x")) @ model.ode + ca.jacobian(signal, model.t)
@@ -252,10 +248,10 @@ class Signals(Showing):
         a, b = self.span if times is None else self._inside(times).tolist()
         if not a <= b:
             raise ValueError(
-                f"trajectory of '{self.scene}': between: expected a first and a later time [s], "
-                f"got {a:g} and {b:g} s"
+                f"{self._where}: between: expected a first and a later time [s], got {a:g} and "
+                f"{b:g} s"
             )
-        return integral_between(self, expression, a, b)
+        return integral_between(self.step_times, self.of, expression, a, b)
 
     @cached_property
     def sensitivities(self) -> dict[str, dict[str, Array]]:
@@ -298,23 +294,20 @@ class Signals(Showing):
         """
         if self.pull_back is None:
             raise self._without_derivatives
-        where = f"trajectory of '{self.scene}'"
-        named = checks.named(f"{where}: gradient", weights, self.units)
-        given = {
-            name: checks.array(f"{where}: gradient: {name}", w, ndim=None)
-            for name, w in named.items()
-        }
-        odd = {name: w.shape for name, w in given.items() if w.shape not in ((), self.t.shape)}
-        if odd:
+        where = f"{self._where}: gradient"
+        named = checks.named(where, weights, self.units)
+        given = {n: checks.array(f"{where}: {n}", w, ndim=None) for n, w in named.items()}
+        odd = (f"{n} of shape {w.shape}" for n, w in given.items()
+               if w.shape not in ((), self.t.shape))  # fmt: skip
+        if shapes := ", ".join(odd):
             raise ValueError(
-                f"{where}: gradient: expected numbers or arrays of {self.t.size} weights, got "
-                + ", ".join(f"{name} of shape {shape}" for name, shape in odd.items())
+                f"{where}: expected numbers or arrays of {self.t.size} weights, got {shapes}"
             )
         return self.pull_back({n: np.broadcast_to(w, self.t.shape) for n, w in given.items()})
 
     @property
     def _without_derivatives(self) -> ValueError:
         return ValueError(
-            f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
+            f"{self._where}: expected sensitivities, got none; ask for them by "
             "simulate(..., sensitivities=[...])"
         )

@@ -1,8 +1,7 @@
 """Moving sketch as lines and markers: geometry alone, so that any program may draw it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +20,7 @@ UPRIGHT = 0.99
 """Component of the view along z beyond which z is no direction on the picture."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Poses:
+class Poses(NamedTuple):
     """Places of a sketch over the pictures.
 
     Attributes:
@@ -37,9 +34,7 @@ class Poses:
     paths: Array
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Stroke:
+class Stroke(NamedTuple):
     """Line or markers.
 
     Attributes:
@@ -58,9 +53,7 @@ class Stroke:
     sticks: Flags | None = None
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class View:
+class View(NamedTuple):
     """Direction from which a motion is seen.
 
     Attributes:
@@ -91,26 +84,28 @@ class View:
 
 def look(sketch: Sketch, poses: Poses) -> View:
     """Return the view that shows all places at all times."""
-    every = np.concatenate([a.transpose(1, 0, 2).reshape(3, -1) for a in (poses.at, poses.paths)],
-                           axis=1)  # fmt: skip
+    every = np.hstack([_points(poses.at), _points(poses.paths)])
     low, high = every.min(axis=1), every.max(axis=1)
     size = SYMBOL * sketch.symbols * max(float(np.max(high - low)), 1e-9)
     normal = _normal(sketch, poses)
-    if normal is None:
-        e, a = np.radians([ELEVATION, AZIMUTH])
-        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    else:
-        eye = normal
+    e, a = np.radians([ELEVATION, AZIMUTH])
+    oblique = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    eye = oblique if normal is None else normal
     return View(low - 4 * size, high + 4 * size, eye, normal is not None, size)
 
 
-def _normal(sketch: Sketch, poses: Poses) -> Array | None:
-    """Return the normal of the plane in which all moves, towards the eye; None if there is none.
+def _points(places: Array) -> Array:
+    """Return all places at all times as columns, shape (3, n)."""
+    return places.transpose(1, 0, 2).reshape(3, -1)
 
-    What moves along a line, or not at all, is seen along its hinges; without hinges, in the plane
-    that holds all its places, or from aside where these lie on a line, too.
+
+def _normal(sketch: Sketch, poses: Poses) -> Array | None:
+    """Return the normal of the plane in which everything moves, towards the eye; None in space.
+
+    A motion along a line, or none, is seen along its hinges; without hinges, in the plane
+    that holds all its places, or from the side if these lie on a line, too.
     """
-    moved = (poses.at - poses.at[:, :, :1]).transpose(1, 0, 2).reshape(3, -1)
+    moved = _points(poses.at - poses.at[:, :, :1])
     hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.symbol.hinge]
     directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
     if extent[1] > FLAT * extent[0]:
@@ -118,17 +113,17 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
     elif hinges:
         normal = hinges[0][:, 0]
     else:
-        moved = poses.at.transpose(1, 0, 2).reshape(3, -1)
+        moved = _points(poses.at)
         moved = moved - moved[:, :1]
         directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
         aside = _aside(directions[:, 0] if extent[0] > 0 else np.array([1.0, 0.0, 0.0]))
         normal = directions[:, 2] if extent[1] > FLAT * extent[0] else aside
-    extent = np.maximum(extent, 1e-300)
     across = [np.linalg.norm(np.cross(axis.T, normal), axis=1).max() for axis in hinges]
-    if np.abs(normal @ moved).max() > FLAT * extent[0] or max(across, default=0.0) > FLAT:
+    beyond = np.abs(normal @ moved).max() > FLAT * max(extent[0], 1e-300)
+    if beyond or max(across, default=0.0) > FLAT:
         return None
-    view = View(normal, normal, normal, True, 0.0)
-    return normal if view.right[np.argmax(np.abs(view.right))] > 0 else -normal
+    right = View(normal, normal, normal, True, 0.0).right
+    return normal if right[np.argmax(np.abs(right))] > 0 else -normal
 
 
 def _aside(line: Array) -> Array:
@@ -143,20 +138,21 @@ def _aside(line: Array) -> Array:
 def strokes(
     sketch: Sketch, poses: Poses, view: View, sticks: Mapping[str, Flags]
 ) -> Iterator[Stroke]:
-    """Everything that is drawn, from back to front.
+    """Yield everything that is drawn, from back to front.
 
     Args:
         sketch, poses: what, and where.
-        view: how it is looked at.
-        sticks: joint -> whether its contacts stick, per picture.
+        view: direction from which it is seen.
+        sticks: joint -> True if its contacts stick, per picture.
     """
-    moving = [part for part in sketch.parts if not part.fixed]
-    for k, path in enumerate(p for p, part in zip(poses.paths, sketch.parts, strict=True)
-                             if not part.fixed):  # fmt: skip
+    moving = [
+        (part, path) for part, path in zip(sketch.parts, poses.paths, strict=True) if not part.fixed
+    ]
+    for k, (_, path) in enumerate(moving):
         yield Stroke("path", np.repeat(path.T[:, :, None], poses.at.shape[2], axis=2), k)
     for mark in sketch.marks:
         yield from _behind(mark, poses, view)
-    for k, part in enumerate(moving):
+    for k, (part, _) in enumerate(moving):
         yield from _body(sketch, part, k, poses, view)
     for mark in sketch.marks:
         yield from _symbol(mark, poses, view)

@@ -1,7 +1,7 @@
 """Result of a simulation: named signals over time that plot, balance and save themselves."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -83,40 +83,6 @@ class EnergyBalance(Showing):
         }
 
 
-def energy_balance(trajectory: Signals) -> EnergyBalance:
-    """Return the balance of a model that has the detail "conserved" and powers of the kind `WORK`.
-
-    Raises:
-        ValueError: the model has no such details.
-    """
-    details = trajectory.details
-    if "conserved" not in details:
-        raise ValueError(
-            f"trajectory of '{trajectory.scene}': expected a mechanism, got a model that says "
-            "nothing of its energy; integral(name) integrates any of its signals"
-        )
-    start = trajectory.step_times[:1]
-    model, at = trajectory.model, np.concatenate([start, trajectory.t])
-    powers = [name for name, output in trajectory.model.further.items() if output.kind == WORK]
-    rates = {name.removesuffix("_work_rate"): name for name in powers}
-    column = stacked(model.expression(name) for name in rates.values())
-    energy, kinetic = trajectory.of(
-        ca.vertcat(model.expression("conserved"), model.expression("kinetic")), at
-    )
-    rows = integrals(trajectory, column, trajectory.t) if rates else np.zeros((0, 0))
-    work = dict(zip(rates, rows, strict=True))
-    gained = energy - energy[0]
-    potential = energy - kinetic
-    sizes = [kinetic, potential - potential[0], *work.values()]
-    return EnergyBalance(
-        trajectory.t,
-        energy[1:],
-        work,
-        gained[1:] - sum(work.values(), np.zeros(trajectory.t.size)),
-        max(float(np.abs(size).max()) for size in sizes),
-    )
-
-
 CHEAP = 200_000
 """Steps times signals of a run whose steps are looked at without being asked: some 20 ms."""
 
@@ -166,8 +132,41 @@ class Trajectory(Signals):
     keep: "Callable[[Trajectory], Kept] | None" = None
 
     def shown(self) -> Shown:
-        """Return the end of the run, and every signal with its extremes."""
-        return _shown(self)
+        """Return laws, the end of the run, and the start, end and extremes of every signal.
+
+        Extremes are those over all steps where these are known or cheap, else those at `t`.
+        """
+        counts, (first, last) = self.statistics, self.span
+        known = "extremes" in self.__dict__ or counts.steps * len(self.units) <= CHEAP
+        laws = friction(self.model)
+        happened = f", {counted(len(self.happened), 'event')}" if self.model.events else ""
+        lines = [
+            *([f"friction: {laws}"] if laws else []),
+            f"{self.status.name}: {self.message}",
+            f"{counted(counts.steps, 'step')} of {counts.method}{happened}, "
+            f"{counted(self.t.size, 'time')} in t",
+        ]
+        if isfinite(counts.error):
+            slopes = among(f"{name} {x:.0e}" for name, x in counts.sensitivity_errors.items())
+            derivatives = f", of derivatives by {slopes}" if slopes else ""
+            lines.append(f"measured error: {counts.error:.0e}{derivatives}")
+        after = [] if known else [f"least and greatest at {self.t.size} times; see extremes"]
+        if "further" in self.model.__dict__ and self.details:
+            after.append(f"further: {among(self.details)}")
+        header = ("signal", "unit", "first", "last", "least", "greatest")
+        table = Table(header, tuple(self._rows(known)), numbers=(2, 3, 4, 5))
+        title = f"run of '{self.scene}' from {first:g} to {last:g} s"
+        return Shown(title, tuple(lines), table, tuple(after))
+
+    def _rows(self, known: bool) -> Iterator[tuple[str, ...]]:
+        """Yield the rows of the table; `known`: True for extremes over all steps."""
+        if not self.t.size:
+            yield from ((name, unit, "", "", "", "") for name, unit in self.units.items())
+            return
+        ends = self.extremes if known else {n: (v.min(), v.max()) for n, v in self.signals.items()}
+        for name, unit in self.units.items():
+            numbers = (self[name][0], self[name][-1], *ends[name])
+            yield (name, unit, *(f"{x:.6g}" for x in numbers))
 
     def thumbnail(self) -> "Figure":
         """Some signals, small."""
@@ -179,9 +178,27 @@ class Trajectory(Signals):
         """Return the balance of a mechanism's energy: work by cause, and the unexplained rest.
 
         Raises:
-            ValueError: a model that does not keep books of its energy.
+            ValueError: a model without the detail "conserved" and powers of the kind `WORK`.
         """
-        return energy_balance(self)
+        if "conserved" not in self.details:
+            raise ValueError(
+                f"{self._where}: expected a mechanism, got a model that says nothing of its "
+                "energy; integral(name) integrates any of its signals"
+            )
+        model, at = self.model, np.concatenate([self.step_times[:1], self.t])
+        powers = [name for name, output in model.further.items() if output.kind == WORK]
+        column = stacked(model.expression(name) for name in powers)
+        energy, kinetic = self.of(
+            ca.vertcat(model.expression("conserved"), model.expression("kinetic")), at
+        )
+        rows = integrals(self.step_times, self.of, column, self.t) if powers else ()
+        names = (name.removesuffix("_work_rate") for name in powers)
+        work = dict(zip(names, rows, strict=True))
+        potential = energy - kinetic
+        sizes = [kinetic, potential - potential[0], *work.values()]
+        defect = (energy - energy[0])[1:] - sum(work.values(), np.zeros(self.t.size))
+        scale = max(float(np.abs(size).max()) for size in sizes)
+        return EnergyBalance(self.t, energy[1:], work, defect, scale)
 
     def plot(
         self,
@@ -251,7 +268,7 @@ class Trajectory(Signals):
     def packed_as(self) -> "Kept":
         """Return the run as data."""
         if self.keep is None:
-            raise ValueError(f"trajectory of '{self.scene}': expected one of simulate, got another")
+            raise ValueError(f"{self._where}: expected one of simulate, got another")
         return self.keep(self)
 
     def __copy__(self) -> "Trajectory":
@@ -324,56 +341,3 @@ class Trajectory(Signals):
     def to_json(self, path: str | Path) -> None:
         """Write `to_dict` as JSON."""
         write_text(path, json.dumps(self.to_dict()))
-
-
-def _shown(run: Signals) -> Shown:
-    """Scene, law, span, how it ended, and for each signal where it began, ended and went.
-
-    Extremes are those over all steps where these are known or cheap, else those at `t`.
-    """
-    counts, (first, last) = run.statistics, run.span
-    known = "extremes" in run.__dict__ or counts.steps * len(run.units) <= CHEAP
-    rubbing = friction(run.model)
-    took = f"{counted(counts.steps, 'step')} of {counts.method}"
-    happened = f", {counted(len(run.happened), 'event')}" if run.model.events else ""
-    lines = [
-        *([f"friction: {rubbing}"] if rubbing else []),
-        f"{run.status.name}: {run.message}",
-        f"{took}{happened}, {counted(run.t.size, 'time')} in t",
-        *_measured(run),
-    ]
-    after = [] if known else [f"least and greatest at {run.t.size} times; see extremes"]
-    if "further" in run.model.__dict__ and run.details:
-        after.append(f"further: {among(run.details)}")
-    return Shown(
-        f"run of '{run.scene}' from {first:g} to {last:g} s",
-        tuple(lines),
-        Table(
-            ("signal", "unit", "first", "last", "least", "greatest"),
-            tuple(_rows(run, known)),
-            numbers=(2, 3, 4, 5),
-        ),
-        tuple(after),
-    )
-
-
-def _measured(run: Signals) -> list[str]:
-    """Return the measured errors in words."""
-    counts = run.statistics
-    if not isfinite(counts.error):
-        return []
-    slopes = among(f"{name} {x:.0e}" for name, x in counts.sensitivity_errors.items())
-    derivatives = f", of derivatives by {slopes}" if slopes else ""
-    return [f"measured error: {counts.error:.0e}{derivatives}"]
-
-
-def _rows(run: Signals, known: bool) -> list[tuple[str, ...]]:
-    if not run.t.size:
-        return [(name, unit, "", "", "", "") for name, unit in run.units.items()]
-    ends = run.extremes if known else {n: (v.min(), v.max()) for n, v in run.signals.items()}
-    rows = list[tuple[str, ...]]()
-    for name, unit in run.units.items():
-        values = run[name]
-        numbers = (values[0], values[-1], *ends[name])
-        rows.append((name, unit, *(f"{x:.6g}" for x in numbers)))
-    return rows

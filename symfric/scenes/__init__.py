@@ -1,4 +1,4 @@
-"""Ready machines: each takes any friction law and gives a `Model`."""
+"""Predefined machines that accept any friction law."""
 
 from typing import TYPE_CHECKING
 
@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from symfric.scenes.base import GivenInput as GivenInput
     from symfric.scenes.base import Scene as Scene
     from symfric.scenes.base import contact as contact
-    from symfric.scenes.base import friction_states as friction_states
     from symfric.scenes.base import other_law as other_law
     from symfric.scenes.blocks import CoupledBlocks as CoupledBlocks
     from symfric.scenes.blocks import Drive as Drive

@@ -1,9 +1,8 @@
-"""Scene: a parametric machine that takes a friction law and gives a `Model`."""
+"""Scene: a parametric machine with a friction law, which gives a `Model`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from dataclasses import dataclass, field, fields
 from math import isfinite
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, ClassVar, Self, final
@@ -13,23 +12,29 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise, with_values
+from symfric.foundation.parameters import (
+    Parametric,
+    Variable,
+    parameters,
+    parametric,
+    symbolise,
+    with_values,
+)
 from symfric.foundation.shown import WIDTH
-from symfric.foundation.units import turned
 from symfric.foundation.variable import check_si, strays, symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
-from symfric.model import Contact, Model, Variables
-from symfric.model.forces import APPLIED
+from symfric.model import Contact, Model, Output, Variables
+from symfric.model.contact import APPLIED
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
-from symfric.scenes.presets import Preset
+from symfric.scenes.presets import Preset, presets_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 ALONG = {"x": ca.DM([0, 1, 0, 0, 0, 1, 1, 0, 0]), "z": ca.DM([1, 0, 0, 0, 1, 0, 0, 0, 1])}
-"""Direction of a rail -> axes of a place, column by column; the rail runs along the third."""
+"""Direction of a rail -> axes of a place, column by column; the rail runs along the third axis."""
 RAIL = Symbol("s", guide=True)
 TICK, HUB = Symbol("|"), Symbol("o")
 LINES = {line: Symbol(line=line, anchored=True) for line in ("spring", "damper")}
@@ -41,10 +46,10 @@ class Block:
     """Body on a rail.
 
     Attributes:
-        x, z: where it is [m], expressions of the model.
-        along: direction of its rail, "x" or "z"; no rail where empty.
-        slip: signal that is its sliding velocity; none where empty.
-        law: friction there, whose velocity scale says what counts as sticking.
+        x, z: position [m], expressions of the model.
+        along: direction of its rail, "x" or "z"; empty for no rail.
+        slip: name of its sliding velocity among the signals; empty for none.
+        law: its friction; a slip below the velocity scale of the law counts as sticking.
     """
 
     x: Scalar
@@ -62,15 +67,15 @@ def drawn(
     ticks: Sequence[tuple[Scalar, Scalar]] = (),
     hub: Block | None = None,
 ) -> Sketch:
-    """Return a machine that is drawn without being a mechanism.
+    """Return the drawing of a machine that is not a mechanism.
 
     Args:
         blocks: name -> body.
-        fixed: name -> place (x, z) [m] on the ground, or that moves as the ground does, as a road.
+        fixed: name -> place (x, z) [m] on the ground or on a moving ground such as a road.
         links: (line, from, to) between blocks and fixed places; a line is "spring" or "damper".
         hands: name -> angle [rad] and length [m] of a hand that turns about the origin.
-        ticks: places (x, z) [m] of marks on what moves below, as a belt.
-        hub: where the hands turn, if something rubs there.
+        ticks: places (x, z) [m] of marks on a moving ground such as a belt.
+        hub: centre of the hands, if it has friction.
     """
     columns: list[ca.SX] = []
     parts: list[Part] = []
@@ -103,15 +108,13 @@ def drawn(
 
 
 def around(way: Scalar, low: Scalar, high: Scalar) -> ca.SX:
-    """Return `way` [m] brought between `low` and `high` by whole turns, as a mark on a belt."""
+    """Return `way` [m] shifted into [low, high) by whole turns, as a mark on a belt."""
     length = high - low
     return ca.SX(way - length * ca.floor((way - low) / length))
 
 
 def _slips(block: Block) -> tuple[tuple[str, float], ...]:
-    """Return the sliding velocity of a block and what counts as rest; nothing for a law without
-    scale.
-    """
+    """Return the sliding velocity of a block and the velocity scale of its law, if it has one."""
     if not block.slip or block.law is None:
         return ()
     try:
@@ -124,55 +127,61 @@ def _slips(block: Block) -> tuple[tuple[str, float], ...]:
 @final
 @dataclass(frozen=True, eq=False)
 class GivenInput:
-    """Default input of a scene: the function of time, and its text."""
+    """Default input of a scene: a function of time, and its text."""
 
     text: str
     function: Callable[[ca.SX], ca.SX]
 
 
-@dataclass(frozen=True, eq=False)
+class _Published:
+    """Presets of a class of scenes, read when they are first used."""
+
+    def __get__(self, scene: "Scene | None", kind: "type[Scene]") -> Mapping[str, Preset]:
+        return presets_of(kind)
+
+
+@parametric
 class Scene(Parametric, ABC):
     """Machine with one friction law; `model()` writes its equations.
 
     Raises:
-        ValueError: a parameter of scene or law that is an array or an MX symbol; one machine has
-            one number or SX symbol each, many have an ensemble (`simulate_many`).
+        ValueError: a parameter of scene or law that is an array or an MX symbol. One machine has
+            one number or SX symbol each; `simulate_many` runs many.
     """
 
     t_end: ClassVar[float]
-    """Time [s] that shows what the scene is about, such as three stick-slip periods."""
+    """Time [s] of a typical motion, such as three stick-slip periods."""
 
     inputs: ClassVar[Mapping[str, GivenInput]] = {}
-    """Inputs by name, where none are given."""
+    """Default inputs by name."""
 
     integrals: ClassVar[Mapping[str, str]] = {}
-    """State -> the input that is its rate; the command line takes the state's samples for it."""
+    """State -> the input that is its rate; the command line takes samples of the state for it."""
 
-    presets: ClassVar[Mapping[str, Preset]] = {}
-    """Numbers of papers by name, see `preset`."""
+    presets = _Published()
+    """Numbers of papers by name, see `preset` and presets.toml."""
 
     law: Law
 
     @classmethod
     def places(cls) -> dict[str, str]:
-        """Places of laws other than `law`: the keyword, and its meaning, see `other_law`."""
-        return {item.name: item.metadata["place"] for item in fields(cls) if _is_place(item)}
+        """Return the places with a law of their own, see `other_law`: keyword -> meaning."""
+        return _marked(cls, "place")
 
     @classmethod
     def structures(cls) -> dict[str, str]:
-        """Fields that decide what equations there are: the keyword, and what it is."""
-        return {i.name: i.metadata["structure"] for i in fields(cls) if "structure" in i.metadata}
+        """Return the fields that determine the equations, see `structure`: keyword -> meaning."""
+        return _marked(cls, "structure")
 
     @classmethod
     def preset(cls, name: str, law: Law, **others: Any) -> Self:
-        """Return the scene with the numbers of a paper, and `law` with those that the paper gives
-        it.
+        """Return the scene and `law` with the numbers of a paper.
 
         Args:
             name: one of `presets`.
             law: any law; one that the paper does not use gets the levels of friction only.
-            others: further fields of the scene, such as `hinge`, a law that gets the numbers of
-                its place, too, or parameters in place of the paper's.
+            others: further fields of the scene: laws, such as `hinge`, which get the numbers of
+                their place, too, or parameters that replace those of the paper.
 
         Raises:
             ValueError: no such preset, or what the scene refuses.
@@ -184,30 +193,27 @@ class Scene(Parametric, ABC):
         chosen = cls.presets[name]
         laws = {"law": law} | {place: law for place in cls.places() if place in chosen.friction}
         laws |= {n: value for n, value in others.items() if isinstance(value, Law)}
-        given = {
-            n: chosen.friction[n].given(held) if n in chosen.friction else held
-            for n, held in laws.items()
-        }
-        arguments: dict[str, Any] = {**chosen.values, **others, **given}
+        laws |= {n: chosen.friction[n].given(laws[n]) for n in laws if n in chosen.friction}
+        arguments: dict[str, Any] = {**chosen.values, **others, **laws}
         return cls(**arguments)
 
     def law_of(self, place: str) -> Law:
-        """Return the law of one of `places`; `law` where that has none of its own."""
-        own = getattr(self, place)
-        return self.law if own is None else own
+        """Return the law of one of `places`, `law` by default."""
+        special = getattr(self, place)
+        return self.law if special is None else special
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        cls.__repr__ = Scene.__repr__  # or each dataclass would write one of a single line
+        cls.__repr__ = Scene.__repr__  # otherwise the dataclass writes one of a single line
 
     def __repr__(self) -> str:
-        """Return the call that makes it, in lines of a screen."""
+        """Return the call that makes the scene, in lines of a screen."""
         values = ", ".join(f"{item.name}={getattr(self, item.name)!r}" for item in fields(self))
         text = f"{type(self).__name__}({values})"
         return fill(text, WIDTH, subsequent_indent="    ", break_long_words=False)
 
     def thumbnail(self) -> "Figure | None":
-        """Its law, small."""
+        """Return the small figure of its law."""
         return self.law.thumbnail()
 
     def __post_init__(self) -> None:
@@ -246,16 +252,16 @@ class Scene(Parametric, ABC):
 def other_law(doc: str) -> Any:
     """Declare a field of a scene that holds the law of another place, or None.
 
-    Its parameters are added to those of `law`, with the endings _1 and _2 where names are shared.
+    Its parameters are added to those of `law`, with the endings _1 and _2 for shared names.
 
     Args:
-        doc: the place, and what it has without a law of its own.
+        doc: the place, and its friction by default.
     """
     return field(default=None, metadata={"place": doc})
 
 
 def structure(default: bool | int, doc: str) -> Any:
-    """Declare a field of a scene that decides what equations there are: a count, yes or no.
+    """Declare a field of a scene that determines its equations: a count or a truth value.
 
     It is chosen when the scene is made and leaves no switch in the equations; forms with names are
     declared by `option`.
@@ -263,8 +269,8 @@ def structure(default: bool | int, doc: str) -> Any:
     return field(default=default, metadata={"structure": doc})
 
 
-def _is_place(item: Any) -> bool:
-    return "place" in item.metadata
+def _marked(kind: type[Scene], mark: str) -> dict[str, str]:
+    return {item.name: item.metadata[mark] for item in fields(kind) if mark in item.metadata}
 
 
 def _is_scalar(value: Scalar) -> bool:
@@ -278,11 +284,10 @@ def contact(
     *, least: Scalar | None = None, bare: bool | None = None, turning: bool = False,
     **inputs: Scalar,
 ) -> Contact:  # fmt: skip
-    """Return `law` between bodies that slide at `v` under `N`: puts any law into equations of your
-    own.
+    """Return the contact of two bodies that slide at `v` under `N`, for equations of your own.
 
-    Write them with `force` of the contact and give it to the `Model`, which then has the states of
-    the law behind its own, its changes of mode as events, and error control that sees the slip:
+    Write them with `force` of the contact and pass the contact to the `Model`, which then has the
+    states of the law after its own, its changes of mode as events, and error control of the slip:
 
         x, v, pull = Variable("x", "m"), Variable("v", "m/s"), Variable("pull", "N")
         slip = contact("floor", LuGre(), v, 10.0)
@@ -291,22 +296,22 @@ def contact(
                      contacts=(slip,), outputs={"friction": Output(slip.force, "N")})
 
     Args:
-        name: what is rubbed against.
-        law: any law of a scalar slip; another one is another word here.
+        name: of the contact.
+        law: any law of a scalar slip.
         v: sliding velocity [m/s], a variable or an expression; `force` opposes it.
         N: normal force [N], a number, a variable or an expression.
         rest: state of the model -> its value at which `v` is exactly zero, for laws that stick; if
             omitted, the first state of the model in which `v` is linear is set.
-        least: smallest value of an `N` that changes, which the law must bear.
+        least: smallest value of a varying `N`, at which the law must be defined.
         bare: states and events have the names of the law (True) or "<name>_<state>" (False);
             None: names of the law if the model has one contact.
-        turning: `v` is a rate [rad/s] and `force` a moment [N m]: units of the states of the law.
+        turning: True if `v` is a rate [rad/s] and `force` a moment [N m].
         inputs: further inputs of the law. The applied force F_e, all forces but friction along
             the slip, follows from the equations if omitted; it must be given where these are
             implicit or have algebraic variables that depend on friction.
 
     Raises:
-        ValueError: no law, one that needs an input that is not offered, a load where N is 0, or a
+        ValueError: no law, a law that needs another input, a law that divides by N = 0, or a
             variable in other units than those of the SI.
     """
     where = f"contact '{checks.text('contact: name', name, 'a text, and then a law')}'"
@@ -316,14 +321,13 @@ def contact(
         raise checks.refused(f"{where}: N", "a normal force", N, "v comes before N")
     if (load := checks.as_number(N)) is not None and load < 0:
         raise checks.refused(f"{where}: N", "a normal force >= 0 N", N)
-    missing = [
-        f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs and i.name != APPLIED
-    ]
-    if missing:
+    needed = [i for i in law.inputs if i.name not in (*inputs, APPLIED)]
+    if needed:
         raise ValueError(
             f"{type(law).__name__}: expected a law that needs no more than v, N"
             f"{''.join(f', {offered}' for offered in inputs)} here, got one that needs "
-            f"{', '.join(missing)}; offer it by name, as in contact(..., dv=acceleration)"
+            f"{', '.join(f'{i.name} ({i.doc})' for i in needed)}; "
+            "offer it by name, as in contact(..., dv=acceleration)"
         )
     bottom = N if least is None else least
     if is_number(bottom) and bottom == 0 and divides_by_load(law):
@@ -339,10 +343,7 @@ def contact(
 
 
 def divides_by_load(law: Law) -> bool:
-    """Test for a law that is not finite without a normal force.
-
-    Symbols have the default values of their parameters.
-    """
+    """Return True if a law is not finite at N = 0; symbols get their default values."""
     known = parameters(law).items()
     law = with_values(law, {name: p.default for name, p in known if is_symbolic(p.value)})
     v, z = ca.SX(1.0), ca.SX([state.nominal for state in law.states])
@@ -353,33 +354,9 @@ def divides_by_load(law: Law) -> bool:
     return not found.is_regular()
 
 
-def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
-    """Return the internal states of `law` as model variables, starting in steady sliding at `v`."""
-    start = ca.SX(law.steady_state(ca.SX(v), N))
-    variables = tuple(
-        Variable(
-            s.name,
-            s.unit,
-            start=start[i],
-            nominal=s.nominal,
-            doc=s.doc or "internal friction state",
-        )
-        for i, s in enumerate(law.states)
-    )
-    return variables, symbols_of(variables)
-
-
-def in_turning(model: Model) -> Model:
-    """Return the same equations with the units of a machine that turns."""
-    changed: dict[str, Any] = {
-        letter: tuple(replace(v, unit=turned(v.unit)) for v in getattr(model, letter))
-        for letter in "xzup"
+def friction_outputs(slip: Contact, name: str) -> dict[str, Output]:
+    """Return the outputs friction and power of a contact that slides at the signal `name`."""
+    return {
+        "friction": Output(slip.force, slip.unit("N"), f"friction force opposing {name}"),
+        "power": Output(slip.force * slip.slip, "W", "power taken by friction"),
     }
-    outputs = {name: replace(o, unit=turned(o.unit)) for name, o in model.outputs.items()}
-    contacts = tuple(replace(c, turning=True) for c in model.contacts)
-    opening = partial(_turned_open, model) if contacts else None
-    return replace(model, **changed, outputs=outputs, contacts=contacts, opening=opening)
-
-
-def _turned_open(model: Model) -> Model:
-    return in_turning(model.open)

@@ -1,20 +1,21 @@
 """Sliding blocks: a positioning drive, Rabinowicz's block on a belt, two coupled blocks."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
-from typing import ClassVar, final
+from typing import ClassVar
 
 import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals, smallest
-from symfric.foundation.parameters import Variable, param, with_values
-from symfric.laws import BrownMcPhee, Law, LeineSwitch, LuGre
+from symfric.foundation.parameters import Variable, param, parametric, with_values
+from symfric.foundation.units import turned
+from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.model.kinds import FRICTION
 from symfric.model.sketch import Sketch
-from symfric.scenes import fields, jing_mi
+from symfric.scenes import fields
 from symfric.scenes.base import (
     Block,
     GivenInput,
@@ -22,20 +23,18 @@ from symfric.scenes.base import (
     around,
     contact,
     drawn,
-    in_turning,
+    friction_outputs,
     other_law,
     structure,
 )
-from symfric.scenes.presets import Numbers, Preset
 
 
 def sine(t: ca.SX) -> ca.SX:
-    """Force 2 sin(pi t) N: beyond the default break-away force of 1.18 N in both directions."""
+    """Return 2 sin(pi t) N, beyond the default break-away force of 1.18 N in both directions."""
     return 2 * ca.sin(ca.pi * t)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Drive(Scene):
     """Mass driven by a force, with friction and a constant offset force.
 
@@ -54,33 +53,32 @@ class Drive(Scene):
     N: Scalar = fields.LOAD(0.8 * 9.81, doc="normal force")
     offset: Scalar = param(0.0, unit="N", role="offset", doc="constant force opposing the input")
 
-    turning: bool = structure(default=False, doc="whether the axis turns")
+    turning: bool = structure(default=False, doc="True for an axis that turns")
 
     def __post_init__(self) -> None:
         checks.flag("Drive: turning", self.turning)
         super().__post_init__()
 
     def equations(self, p: Variables) -> Model:
-        """States x, v and those of the law; input force; outputs friction, power."""
-        x = Variable("x", "m", nominal=0.1, doc="position")
-        v = Variable("v", "m/s", nominal=0.1, doc="velocity")
-        force = Variable("force", "N", nominal=1.0, doc="driving force")
+        """Return the model: states x, v and those of the law; input force; friction, power."""
+        unit = turned if self.turning else str
+        x = Variable("x", unit("m"), nominal=0.1, doc="position")
+        v = Variable("v", unit("m/s"), nominal=0.1, doc="velocity")
+        force = Variable("force", unit("N"), nominal=1.0, doc="driving force")
         applied = force.symbol - self.offset
-        slip = contact("guide", self.law, v.symbol, self.N, rest={"v": 0.0}, F_e=applied)
-        model = Model(
+        slip = contact(
+            "guide", self.law, v.symbol, self.N, {"v": 0.0}, turning=self.turning, F_e=applied
+        )
+        return Model(
             name="drive",
             x=(x, v),
             u=(force,),
-            p=p,
+            p=tuple(replace(q, unit=unit(q.unit)) for q in p),
             ode=ca.vertcat(v.symbol, (applied - slip.force) / self.m),
             contacts=(slip,),
-            outputs={
-                "friction": Output(slip.force, "N", "friction force opposing v"),
-                "power": Output(slip.force * v.symbol, "W", "power taken by friction"),
-            },
+            outputs=friction_outputs(slip, "v"),
             sketch=partial(self._sketch, x.symbol),
         )
-        return in_turning(model) if self.turning else model
 
     def _sketch(self, x: ca.SX) -> Sketch:
         """Return the mass on its guide, or a hand that turns."""
@@ -92,16 +90,15 @@ class Drive(Scene):
 def drive(
     law: Law, *, turning: bool = False, free: Iterable[str] = (), **parameters: Scalar
 ) -> Model:
-    """Model of a mass with force input and friction `law`; `turning`: of an axis that turns.
+    """Return the model of a `Drive` with friction `law`.
 
-    `parameters` are m, N, offset and those of the law, by name. Those named in
-    `free` become symbols in `Model.p`.
+    `parameters` are m, N, offset and those of the law, by name. Those named in `free` become
+    symbols in `Model.p`.
     """
     return with_values(Drive(law, turning=turning), parameters).model(free)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Rabinowicz(Scene):
     """Block on a belt that moves at constant speed, held to the ground by a spring.
 
@@ -116,32 +113,6 @@ class Rabinowicz(Scene):
     """
 
     t_end: ClassVar[float] = 20.0
-    presets: ClassVar[Mapping[str, Preset]] = {
-        "jing_mi_table_3": Preset(
-            "block of table 2, every law with its own numbers of table 3",
-            jing_mi.SOURCE + "2 and 3",
-            {"m": 0.8, "k": 2.1, "v_belt": 0.1, "g": 9.81},
-            {"law": jing_mi.BELT},
-        ),
-        "canudas_de_wit": Preset(
-            "stick-slip of the LuGre paper: F_C = 1 N and F_S = 1.5 N as coefficients under 10 N",
-            "Canudas de Wit, Olsson, Astrom, Lischinsky, A New Model for Control of Systems with "
-            "Friction",
-            {"m": 1.0, "k": 2.0, "v_belt": 0.1, "g": 10.0},
-            {
-                "law": Numbers(
-                    {"mu_s": 0.15, "mu_d": 0.1, "sigma_2": 0.4},
-                    {LuGre: {"sigma_0": 1e5, "sigma_1": 1e5**0.5, "v_s": 1e-3}},
-                )
-            },
-        ),
-        "nikravesh": Preset(
-            "block on a belt with Brown-McPhee friction",
-            "Nikravesh, Planar Multibody Dynamics, 2nd edition, example 14.3",
-            {"m": 1.0, "k": 10.0, "v_belt": 0.1, "g": 9.81},
-            {"law": Numbers({"mu_s": 0.2, "mu_d": 0.15}, {BrownMcPhee: {"v_t": 1e-3}})},
-        ),
-    }
 
     m: Scalar = fields.MASS(0.8, doc="mass of the block")
     k: Scalar = fields.SPRING(2.1, doc="spring stiffness")
@@ -149,7 +120,7 @@ class Rabinowicz(Scene):
     g: Scalar = fields.GRAVITY(9.81)
 
     def equations(self, p: Variables) -> Model:
-        """States x, v and those of the law; outputs v_rel, friction, power."""
+        """Return the model: states x, v and those of the law; outputs v_rel, friction, power."""
         x = Variable("x", "m", nominal=0.1, doc="spring elongation")
         v = Variable("v", "m/s", nominal=0.1, doc="velocity of the block")
         N, v_rel = self.m * self.g, v.symbol - self.v_belt
@@ -164,8 +135,7 @@ class Rabinowicz(Scene):
             contacts=(slip,),
             outputs={
                 "v_rel": Output(v_rel, "m/s", "velocity of the block relative to the belt"),
-                "friction": Output(slip.force, "N", "friction force opposing v_rel"),
-                "power": Output(slip.force * v_rel, "W", "power taken by the contact"),
+                **friction_outputs(slip, "v_rel"),
             },
             t=t,
             sketch=partial(self._sketch, x.symbol, t),
@@ -184,16 +154,15 @@ class Rabinowicz(Scene):
 
 
 def rabinowicz(law: Law, *, free: Iterable[str] = (), **parameters: Scalar) -> Model:
-    """Model of a block on a belt with friction `law`.
+    """Return the model of a block on a belt, `Rabinowicz`, with friction `law`.
 
-    `parameters` are m, k, v_belt, g and those of the law, by name. Those named in
-    `free` become symbols in `Model.p`.
+    `parameters` are m, k, v_belt, g and those of the law, by name. Those named in `free` become
+    symbols in `Model.p`.
     """
     return with_values(Rabinowicz(law), parameters).model(free)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class CoupledBlocks(Scene):
     """Two blocks on a belt, each held to the ground by a spring, with a spring between them.
 
@@ -211,20 +180,8 @@ class CoupledBlocks(Scene):
     """
 
     t_end: ClassVar[float] = 20.0
-    presets: ClassVar[Mapping[str, Preset]] = {
-        "galvanetto": Preset(
-            "two-block model without units: the second block breaks away at 1.3 times the force of "
-            "the first, both fall as 1/(1 + 3 |v|); mu_d of laws that have one is ours",
-            "Galvanetto and Bishop 1994, as quoted: alpha = 1.2, beta = 1.3, gamma = 3",
-            {"m_1": 1.0, "m_2": 1.0, "k_1": 1.0, "k_2": 1.0, "k_c": 1.2, "v_belt": 0.1, "g": 1.0},
-            {
-                "law": Numbers({"mu_s": 1.0, "mu_d": 0.7}, {LeineSwitch: {"delta": 3.0}}),
-                "block_2": Numbers({"mu_s": 1.3, "mu_d": 0.9}, {LeineSwitch: {"delta": 3.0}}),
-            },
-        )
-    }
 
-    block_2: Law | None = other_law("second block; `law` without")
+    block_2: Law | None = other_law("second block; `law` by default")
     m_1: Scalar = fields.MASS(0.8, doc="mass of the first block")
     m_2: Scalar = fields.MASS(0.8, doc="mass of the second block")
     k_1: Scalar = fields.SPRING(2.1, doc="its spring to the ground")
@@ -236,58 +193,48 @@ class CoupledBlocks(Scene):
     g: Scalar = fields.GRAVITY(9.81)
 
     def equations(self, p: Variables) -> Model:
-        """States x_1, x_2, v_1, v_2 and those of the laws; friction and power of both."""
+        """Return the model: states x_1, x_2, v_1, v_2 and those of the laws; friction, power."""
+        starts = {1: self.start_1, 2: self.start_2}
         x_1, x_2 = (
             Variable(f"x_{i}", "m", start=start, nominal=0.1, doc=f"elongation of spring {i}")
-            for i, start in ((1, self.start_1), (2, self.start_2))
+            for i, start in starts.items()
         )
         v_1, v_2 = (
-            Variable(f"v_{i}", "m/s", nominal=0.1, doc=f"velocity of block {i}") for i in (1, 2)
+            Variable(f"v_{i}", "m/s", nominal=0.1, doc=f"velocity of block {i}") for i in starts
         )
         between = self.k_c * (x_2.symbol - x_1.symbol)
         pulls = (-self.k_1 * x_1.symbol + between, -self.k_2 * x_2.symbol - between)
-        sliding = tuple(v.symbol - self.v_belt for v in (v_1, v_2))
-        one, two = (
+        laws, masses = (self.law, self.law_of("block_2")), (self.m_1, self.m_2)
+        slips = tuple(
             contact(
-                f"block_{i + 1}", law, sliding[i], mass * self.g,
-                rest={f"v_{i + 1}": self.v_belt}, bare=False, F_e=pulls[i],
+                f"block_{i}", law, v.symbol - self.v_belt, m * self.g, {f"v_{i}": self.v_belt},
+                bare=False, F_e=pull,
             )
-            for i, (law, mass) in enumerate(
-                ((self.law, self.m_1), (self.law_of("block_2"), self.m_2))
-            )
+            for i, law, v, m, pull in zip(starts, laws, (v_1, v_2), masses, pulls, strict=True)
         )  # fmt: skip
-        t = ca.SX.sym("t")
+        rates = ((F - c.force) / m for F, c, m in zip(pulls, slips, masses, strict=True))
+        t, outputs = ca.SX.sym("t"), dict[str, Output]()
+        for i, slip in enumerate(slips, start=1):
+            doc = f"velocity of block {i} relative to the belt"
+            outputs[f"v_rel_{i}"] = Output(slip.slip, "m/s", doc)
+        for what in ("friction", "power"):
+            for i, slip in enumerate(slips, start=1):
+                output = friction_outputs(slip, f"v_rel_{i}")[what]
+                kind = FRICTION if what == "friction" else ""
+                outputs[f"{what}_{i}"] = replace(output, kind=kind)
         return Model(
             name="coupled_blocks",
             x=(x_1, x_2, v_1, v_2),
             p=p,
-            ode=ca.vertcat(
-                v_1.symbol,
-                v_2.symbol,
-                (pulls[0] - one.force) / self.m_1,
-                (pulls[1] - two.force) / self.m_2,
-            ),
-            contacts=(one, two),
-            outputs={
-                "v_rel_1": Output(sliding[0], "m/s", "velocity of block 1 relative to the belt"),
-                "v_rel_2": Output(sliding[1], "m/s", "velocity of block 2 relative to the belt"),
-                "friction_1": Output(
-                    one.force, "N", "friction force opposing v_rel_1", kind=FRICTION
-                ),
-                "friction_2": Output(
-                    two.force, "N", "friction force opposing v_rel_2", kind=FRICTION
-                ),
-                "power_1": Output(one.force * sliding[0], "W", "power taken by contact 1"),
-                "power_2": Output(two.force * sliding[1], "W", "power taken by contact 2"),
-            },
+            ode=ca.vertcat(v_1.symbol, v_2.symbol, *rates),
+            contacts=slips,
+            outputs=outputs,
             t=t,
             sketch=partial(self._sketch, x_1.symbol, x_2.symbol, t),
         )
 
     def _sketch(self, x_1: ca.SX, x_2: ca.SX, t: ca.SX) -> Sketch:
-        """Return the blocks on the belt, whose marks move with it; each hangs on a spring of
-        its own.
-        """
+        """Return the blocks on the belt, whose marks move with it, and their springs."""
         stiff = smallest(self.k_1, self.k_2)
         way = 0.15 * self.m_1 * self.g / stiff if not equals(stiff, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]
@@ -297,10 +244,7 @@ class CoupledBlocks(Scene):
                 "block_2": Block(x_2 + 2 * way, 0.0, "x", "v_rel_2", self.law_of("block_2")),
             },
             {"wall_1": (-way, 0.5 * way), "wall_2": (way, 0.5 * way)},
-            [
-                ("spring", "wall_1", "block_1"),
-                ("spring", "wall_2", "block_2"),
-                ("spring", "block_1", "block_2"),
-            ],
+            [("spring", f"wall_{i}", f"block_{i}") for i in (1, 2)]
+            + [("spring", "block_1", "block_2")],
             ticks=marks,
         )

@@ -1,4 +1,4 @@
-"""Ready machines by name."""
+"""Predefined machines by name."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -14,7 +14,7 @@ S = TypeVar("S", bound=Scene, covariant=True)
 
 @final
 class Catalogue(Mapping[str, type[S]]):
-    """Scenes by name, each loaded when it is taken: one that rubs alone loads no mechanism."""
+    """Scenes by name, each loaded when it is first used."""
 
     def __init__(self, places: Mapping[str, str]) -> None:
         self._places = dict(places)
@@ -43,7 +43,7 @@ _MECHANISMS = {
     "arm": "spatial Arm",
 }
 MECHANISMS: "Catalogue[MechanismScene]" = Catalogue(_MECHANISMS)
-"""Scenes of several bodies, with the same law in several joints."""
+"""Scenes with several bodies and the law in several joints, by name."""
 
 ALL_SCENES: Catalogue[Scene] = Catalogue(
     {
@@ -58,4 +58,4 @@ ALL_SCENES: Catalogue[Scene] = Catalogue(
         **_MECHANISMS,
     }
 )
-"""Every scene by the name the command line uses."""
+"""All scenes by the name on the command line."""

@@ -1,4 +1,4 @@
-"""Parameters of machines: unit, role and bounds of each kind, written once."""
+"""Parameter fields shared by many scenes: unit, role and bounds."""
 
 from functools import partial
 
@@ -7,6 +7,7 @@ from symfric.foundation.parameters import param
 MASS = partial(param, unit="kg", role="mass", lower=1e-12)
 INERTIA = partial(param, unit="kg m^2", role="inertia", lower=1e-12)
 SIZE = partial(param, unit="m", role="geometry", lower=1e-12)
+PLACE = partial(param, unit="m", role="geometry")
 STATIONS = partial(SIZE, doc="distance of the bearing stations")
 SPRING = partial(param, unit="N/m", role="stiffness", lower=0.0)
 SHAFT = partial(param, unit="N m/rad", role="stiffness", lower=0.0)

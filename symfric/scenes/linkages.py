@@ -1,14 +1,12 @@
 """Plane linkages with friction in their hinges: pendulums, one on a box, and a four-bar."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
 from math import pi
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar
 
 from symfric.foundation.numeric import Scalar, atan, cos, equals, is_number, sin, sqrt
-from symfric.foundation.parameters import param
-from symfric.laws import BrownMcPhee, Law
+from symfric.foundation.parameters import parametric
+from symfric.laws import Law
 from symfric.model import Model, Variables
 from symfric.multibody import (
     Distance,
@@ -18,18 +16,17 @@ from symfric.multibody import (
     Prismatic,
     Revolute,
 )
-from symfric.scenes import fields, jing_mi
+from symfric.scenes import fields
 from symfric.scenes.base import Scene, other_law
-from symfric.scenes.presets import Numbers, Preset
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class MechanismScene(Scene):
     """Machine described by a `Mechanism`; `mechanism()` may be changed before it is built."""
 
     @abstractmethod
     def mechanism(self) -> Mechanism:
-        """Bodies, joints and forces."""
+        """Return bodies, joints and forces."""
 
     def equations(self, p: Variables) -> Model:
         """Return the model in joint coordinates."""
@@ -37,23 +34,21 @@ class MechanismScene(Scene):
 
 
 def reach(scene: str, square: Scalar, expected: str) -> Scalar:
-    """Return the root of `square` > 0, a distance that links of these lengths must bridge at the
-    start.
+    """Return the root of `square`, a distance that the links must bridge at the start.
 
     Raises:
-        ValueError: they do not, or lie in line, where rates of the loop are not determined.
+        ValueError: `square` <= 0: the links do not reach, or lie in line, where the rates of the
+            loop are not determined.
     """
     if is_number(square) and not float(square) > 0.0:
         raise ValueError(f"{scene}: expected {expected} at the start, got links that do not reach")
     return sqrt(square)
 
 
-BEARING = Numbers({"mu_s": 0.1, "mu_d": 0.08}, {BrownMcPhee: {"v_t": 0.01}})
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class SliderCrank(MechanismScene):
     """Crank, a slider and a massless rod between them; one degree of freedom.
 
@@ -62,48 +57,33 @@ class SliderCrank(MechanismScene):
 
         slider^2 = l^2 - (b - r sin(crank))^2 - (c - e + r cos(crank))^2
 
-    The slider swings back and forth and gathers and returns most of the crank's energy, so the
-    rod's force changes its sign and its size by orders of magnitude.
+    The slider stores and returns most of the crank's energy, so the rod's force changes its sign,
+    and its magnitude by orders.
 
-    `guide` is the law of the slider's guide, whose stations and width are `a`; without it only the
-    crank's bearing rubs.
+    `guide` is the law of the slider's guide, whose stations and width are `a`; by default only the
+    bearing of the crank has friction.
 
     Defaults: Haug's spatial example, friction in the bearing of the crank; t_end = 0.25 s.
     """
 
     t_end: ClassVar[float] = 0.25
-    presets: ClassVar[Mapping[str, Preset]] = {
-        "haug": Preset(
-            "crank of the spatial example with friction in its bearing",
-            "Haug, spatial slider-crank example, data as in public codes",
-            {"m_crank": 0.5, "m_slider": 5.0, "J": 0.2, "r": 0.08, "l": 0.3, "b": 0.1, "c": 0.12}
-            | {"e": 0.02, "a": 0.1, "R": 0.1, "omega": 120.0, "g": 9.8},
-            {"law": BEARING},
-        ),
-        "haug_with_guide": Preset(
-            "the same with friction in the guide of the slider, too",
-            "Haug, spatial slider-crank example; the coefficients of its bearing",
-            {"omega": 120.0, "g": 9.8},
-            {"law": BEARING, "guide": BEARING},
-        ),
-    }
 
-    guide: Law | None = other_law("guide of the slider; without friction where not given")
+    guide: Law | None = other_law("guide of the slider; no friction by default")
     m_crank: Scalar = fields.MASS(0.5, doc="mass of the crank")
     m_slider: Scalar = fields.MASS(5.0, doc="mass of the slider")
     J: Scalar = fields.INERTIA(0.2, doc="inertia of the crank about x")
     r: Scalar = fields.SIZE(0.08, doc="crank radius")
     l: Scalar = fields.SIZE(0.3, doc="length of the rod")  # noqa: E741
-    b: Scalar = param(0.1, unit="m", role="geometry", doc="position of the crank along y")
-    c: Scalar = param(0.12, unit="m", role="geometry", doc="position of the crank along z")
-    e: Scalar = param(0.02, unit="m", role="geometry", doc="height of the rod's end on the slider")
+    b: Scalar = fields.PLACE(0.1, doc="position of the crank along y")
+    c: Scalar = fields.PLACE(0.12, doc="position of the crank along z")
+    e: Scalar = fields.PLACE(0.02, doc="height of the rod's end on the slider")
     a: Scalar = fields.STATIONS(0.1)
     R: Scalar = fields.SIZE(0.1, doc="radius of the crank's bearing")
     omega: Scalar = fields.TURN(120.0, doc="angular velocity at the start")
     g: Scalar = fields.GRAVITY(9.8)
 
     def mechanism(self) -> Mechanism:
-        """Two bodies, a bearing, a guide and a rod."""
+        """Return two bodies, a bearing, a guide and a rod."""
         m = Mechanism("slider_crank", gravity=(0.0, 0.0, -self.g))
         m.body("wheel", self.m_crank, (self.J, self.J, self.J))
         m.body("block", self.m_slider, (0.2, 0.2, 0.2))
@@ -119,9 +99,7 @@ class SliderCrank(MechanismScene):
         speed = self.b * self.r * self.omega / start
         bearing = JointFriction(self.law, radius=self.R, length=self.a)
         m.joint(Revolute("crank", "ground.bearing", "wheel.bearing", 0.0, self.omega, bearing))
-        guide = (
-            None if self.guide is None else JointFriction(self.guide, length=self.a, width=self.a)
-        )
+        guide = self.guide and JointFriction(self.guide, length=self.a, width=self.a)
         m.joint(Prismatic("slider", "ground.guide", "block.guide", start, speed, guide))
         m.joint(Distance("rod", "wheel.pin", "block.pin", length=self.l))
         return m
@@ -131,8 +109,7 @@ HINGE = (0.0, -1.0, 0.0)
 """Axis of a hinge: angles turn x towards z, against the clock as seen on the page."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Pendulum(MechanismScene):
     """Rod on a hinge with friction.
 
@@ -152,7 +129,7 @@ class Pendulum(MechanismScene):
     g: Scalar = fields.GRAVITY(9.81)
 
     def mechanism(self) -> Mechanism:
-        """One body, one hinge."""
+        """Return one body and one hinge."""
         m = Mechanism("pendulum", gravity=(0.0, 0.0, -self.g))
         m.body("rod", self.m, (self.J, self.J, self.J))
         m.frame("ground.hinge", z=HINGE, x=(0.0, 0.0, -1.0))
@@ -162,18 +139,17 @@ class Pendulum(MechanismScene):
         return m
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class DoublePendulum(MechanismScene):
     """Two equal rods, the second one hinged to the end of the first, with friction in both hinges.
 
     phi_1 is the angle of the first rod from hanging, phi_2 that of the second from the first. Its
-    motion is chaotic: small tolerances show the same path for a few seconds only.
+    motion is chaotic: runs of small tolerances agree for a few seconds only.
     """
 
     t_end: ClassVar[float] = 5.0
 
-    lower: Law | None = other_law("hinge phi_2 between the rods; `law` without")
+    lower: Law | None = other_law("hinge phi_2 between the rods; `law` by default")
     m: Scalar = fields.MASS(1.0, doc="mass of each rod")
     L: Scalar = fields.SIZE(1.0, doc="length of each rod")
     R: Scalar = fields.SIZE(0.02, doc="radius of the bearings")
@@ -181,7 +157,7 @@ class DoublePendulum(MechanismScene):
     g: Scalar = fields.GRAVITY(9.81)
 
     def mechanism(self) -> Mechanism:
-        """Two bodies in a chain."""
+        """Return two bodies in a chain."""
         m = Mechanism("double_pendulum", gravity=(0.0, 0.0, -self.g))
         J = self.m * self.L * self.L / 12
         down = (0.0, 0.0, -1.0)
@@ -196,37 +172,26 @@ class DoublePendulum(MechanismScene):
         return m
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class PendulumBox(MechanismScene):
     """Box on rough ground and a pendulum on it, friction under the box and in the hinge.
 
     x is the position of the box, phi the angle of the pendulum from hanging; the normal force
     under the box is the whole vertical reaction, that of the hinge the size of its reaction.
-    `hinge` is the law of the hinge, with its own parameters (endings _1 and _2 where box and hinge
-    share a name); without it the hinge has the law of the box.
+    `hinge` is the law of the hinge, by default that of the box; parameters of the same name get
+    the endings _1 and _2.
 
     Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 6 and 7 (box 6 kg,
-    pendulum 20 kg on 0.3 m, from 30 degrees), with a point mass. Its 1.8 kg m^2 are m L^2, so that
-    they may be the inertia of that about the hinge; the preset has them about the mass, where the
-    standard deviation of positions at equal times is that of its table 8. The text does not decide.
-    No radius of the hinge is given; 0.01 m here.
-    Limits: the ground does not pull: while N > 0 the box does not lift off, which is not checked.
+    pendulum 20 kg on 0.3 m, from 30 degrees), with a point mass. Its 1.8 kg m^2 equal m L^2, and
+    may be meant about the hinge; the preset has them about the mass, with which the standard
+    deviation of positions at equal times is that of its table 8. The text does not decide. No
+    radius of the hinge is given; 0.01 m here.
+    Limits: the ground does not pull; lift-off of the box, at N < 0, is not checked.
     """
 
     t_end: ClassVar[float] = 15.0
-    presets: ClassVar[Mapping[str, Preset]] = {
-        "jing_mi_table_7": Preset(
-            "box and pendulum of table 6, every law with its own numbers in floor and hinge; its "
-            "1.8 kg m^2 are about the mass (the text does not say where), and the radius of the "
-            "hinge, over which those of the hinge act, is not given: 0.01 m here",
-            jing_mi.SOURCE + "6 and 7",
-            {"m_box": 6.0, "m": 20.0, "L": 0.3, "J": 1.8, "R": 0.01, "phi_0": pi / 6, "g": 9.81},
-            {"law": jing_mi.BOX, "hinge": jing_mi.HINGE},
-        )
-    }
 
-    hinge: Law | None = other_law("hinge of the pendulum; the law of the box without")
+    hinge: Law | None = other_law("hinge of the pendulum; the law of the box by default")
     m_box: Scalar = fields.MASS(6.0, doc="mass of the box")
     m: Scalar = fields.MASS(20.0, doc="mass of the pendulum")
     L: Scalar = fields.SIZE(0.3, doc="distance of hinge and mass")
@@ -236,7 +201,7 @@ class PendulumBox(MechanismScene):
     g: Scalar = fields.GRAVITY(9.81)
 
     def mechanism(self) -> Mechanism:
-        """Two bodies, a slide and a hinge."""
+        """Return two bodies, a slide and a hinge."""
         m = Mechanism("pendulum_box", gravity=(0.0, 0.0, -self.g))
         along, down = (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)
         m.body("box", self.m_box, (0.1, 0.1, 0.1))
@@ -252,39 +217,35 @@ class PendulumBox(MechanismScene):
         return m
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class FourBar(MechanismScene):
     """Crank, coupler and rocker between two hinges of the ground, friction in the hinges.
 
     crank and rocker are angles against x, coupler the angle of the coupler against the crank. The
     fourth hinge, between coupler and rocker, closes the loop as a `PlanarRevolute`: a `Revolute`
-    would fix what the plane fixes already, and leave the reactions out of the plane open. `pin` is
-    the law of its friction; without it it has none. Laws of other places have their own parameters,
-    with the endings _1, _2, ... where they share a name.
+    would leave the reactions out of the plane undetermined. `pin` is the law of its friction; by
+    default it has none. Parameters of several laws with the same name get the endings _1, _2, ...
 
     Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
     """
 
     t_end: ClassVar[float] = 3.0
 
-    hinge_coupler: Law | None = other_law("hinge between crank and coupler; `law` without")
-    hinge_rocker: Law | None = other_law("hinge of the rocker at the ground; `law` without")
-    pin: Law | None = other_law("pin between coupler and rocker; without friction where not given")
+    hinge_coupler: Law | None = other_law("hinge between crank and coupler; `law` by default")
+    hinge_rocker: Law | None = other_law("hinge of the rocker at the ground; `law` by default")
+    pin: Law | None = other_law("pin between coupler and rocker; no friction by default")
     crank: Scalar = fields.SIZE(0.1, doc="length of the crank")
     coupler: Scalar = fields.SIZE(0.35, doc="length of the coupler")
     rocker: Scalar = fields.SIZE(0.3, doc="length of the rocker")
     base: Scalar = fields.SIZE(0.4, doc="distance of the fixed hinges")
-    density: Scalar = param(
-        2.0, unit="kg/m", role="mass", doc="mass of the links per length", lower=1e-12
-    )
+    density: Scalar = fields.MASS(2.0, unit="kg/m", doc="mass of the links per length")
     R: Scalar = fields.SIZE(0.01, doc="radius of the hinges")
     angle: Scalar = fields.ANGLE(1.0, doc="angle of the crank at the start")
     omega: Scalar = fields.TURN(10.0, doc="angular velocity of the crank at the start")
     g: Scalar = fields.GRAVITY(9.81)
 
     def closed(self) -> tuple[Any, ...]:
-        """Angles of crank, coupler and rocker against x at the start, and their rates."""
+        """Return the start angles of coupler and rocker against x, and their rates."""
         theta = self.angle
         x, z = self.base - self.crank * cos(theta), -self.crank * sin(theta)
         square = x * x + z * z
@@ -310,7 +271,7 @@ class FourBar(MechanismScene):
         )
 
     def mechanism(self) -> Mechanism:
-        """Three bodies, three hinges, a pin that closes the loop."""
+        """Return three bodies, three hinges and a pin that closes the loop."""
         m = Mechanism("four_bar", gravity=(0.0, 0.0, -self.g))
         lengths = {"crank": self.crank, "coupler": self.coupler, "rocker": self.rocker}
         m.frame("ground.left", z=HINGE, x=(1.0, 0.0, 0.0))
@@ -332,6 +293,6 @@ class FourBar(MechanismScene):
         for name, parent, child, start, rate, law in hinges:
             friction = JointFriction(law, radius=self.R)
             m.joint(Revolute(name, parent, child, start, rate, friction))
-        closing = None if self.pin is None else JointFriction(self.pin, radius=self.R)
+        closing = self.pin and JointFriction(self.pin, radius=self.R)
         m.joint(PlanarRevolute("pin", "rocker_rod.far", "coupler_rod.far", friction=closing))
         return m

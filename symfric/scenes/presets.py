@@ -1,10 +1,14 @@
-"""Presets: the numbers of a source for a scene, with each law's own at each place that rubs."""
+"""Presets: numbers of papers for scenes and for the laws in their contacts, from presets.toml."""
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
+from pathlib import Path
 from re import fullmatch
 from typing import TypeVar, final
 
+from symfric import laws
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import Law
 
@@ -14,11 +18,11 @@ L = TypeVar("L", bound=Law)
 @final
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """Friction coefficients of one place from a source.
+    """Friction coefficients of one contact from a source.
 
     Attributes:
-        common: numbers that mean the same in every law, such as mu_s.
-        laws: further ones of a kind of law, which names them as it likes.
+        common: numbers with the same meaning in every law, such as mu_s.
+        laws: further numbers of single laws, by the names of their parameters.
     """
 
     common: Mapping[str, float]
@@ -27,29 +31,28 @@ class Numbers:
     )
 
     def given(self, law: L) -> L:
-        """Return `law` with these numbers, also inside a sum or a wrapper; its other ones and forms
-        stay.
+        """Return `law` with these numbers, also inside a sum or a wrapper.
 
-        A law that the source does not use gets the common ones that it has. Elements that a law
-        comes with and that carry a level together (mu_1, mu_2, ...) carry the new one in the shares
-        that they had; elements given by the user are not changed.
+        Other parameters and the form stay. A law that the source does not use gets the common
+        numbers that it has. Default elements that carry a level together (mu_1, mu_2, ...) carry
+        the new one in the same shares; elements given by the user are not changed.
 
         Raises:
             ValueError: numbers that contradict each other, such as given elements that do not carry
                 the level.
         """
-        held: dict[str, Law | tuple[Law, ...]] = {}
+        inner: dict[str, Law | tuple[Law, ...]] = {}
         for item in fields(law):
             value = getattr(law, item.name)
             if isinstance(value, Law):
-                held[item.name] = self.given(value)
+                inner[item.name] = self.given(value)
             elif item.name == "laws":  # the terms of a sum
-                held[item.name] = tuple(self.given(term) for term in value)
-        if held:
-            return replace(law, **held)
+                inner[item.name] = tuple(self.given(term) for term in value)
+        if inner:
+            return replace(law, **inner)
         known = parameters(law)
-        own = {name: value for name, value in self.common.items() if name in known}
-        own |= self.laws.get(type(law), {})
+        values = {name: value for name, value in self.common.items() if name in known}
+        values |= self.laws.get(type(law), {})
         elements = [name for name in known if fullmatch(r"mu_\d+", name)]
         level = "mu_s" if "mu_s" in known else "mu_d"
         if elements and level in self.common:
@@ -57,8 +60,8 @@ class Numbers:
             shares = {name: float(start[name].value) for name in start if name in elements}
             if shares == {name: known[name].value for name in elements}:
                 whole = float(start[level].value) if level in start else sum(shares.values())
-                own |= {name: x * self.common[level] / whole for name, x in shares.items()}
-        return with_values(law, own)
+                values |= {name: x * self.common[level] / whole for name, x in shares.items()}
+        return with_values(law, values)
 
 
 @final
@@ -67,13 +70,32 @@ class Preset:
     """Numbers of a source for a scene.
 
     Attributes:
-        doc: what it is, and what the source leaves open.
+        doc: description, and what the source does not give.
         source: authors, title, table.
-        values: parameters of the machine, and what its structure is.
-        friction: place that rubs -> its numbers; "law" is where the scene's law is.
+        values: parameters and structure of the machine.
+        friction: contact -> its numbers; "law" is the contact of the scene's law.
     """
 
     doc: str
     source: str
     values: Mapping[str, float]
     friction: Mapping[str, Numbers] = field(default_factory=dict[str, Numbers])
+
+
+def presets_of(kind: type) -> Mapping[str, Preset]:
+    """Return the presets of a class of scenes, or of the nearest base that has any."""
+    every = _published()
+    return next((every[c.__name__] for c in kind.__mro__ if c.__name__ in every), {})
+
+
+@cache
+def _published() -> dict[str, dict[str, Preset]]:
+    """Return scene -> name -> preset."""
+    read = tomllib.loads(Path(__file__).with_name("presets.toml").read_text("utf-8"))
+    numbers = {
+        name: Numbers(table.pop("common"), {laws.ALL_LAWS[law]: x for law, x in table.items()})
+        for name, table in read.pop("numbers").items()
+    }
+    for preset in (preset for scene in read.values() for preset in scene.values()):
+        preset["friction"] = {place: numbers[n] for place, n in preset["friction"].items()}
+    return {scene: {n: Preset(**p) for n, p in named.items()} for scene, named in read.items()}

@@ -1,41 +1,45 @@
 """Machines that turn: a clutch, a drill string, and the rollers of a laminator nip."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import ClassVar, final
+from typing import ClassVar
 
 import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals
-from symfric.foundation.parameters import Variable, param
+from symfric.foundation.parameters import Variable, param, parametric
 from symfric.foundation.variable import symbols_of
-from symfric.laws import Benson, LuGre, Stribeck, Tustin
 from symfric.laws.base import smooth
 from symfric.model import Model, Output, Variables
 from symfric.model.sketch import Sketch
 from symfric.scenes import fields
-from symfric.scenes.base import Block, GivenInput, Scene, contact, drawn, structure
-from symfric.scenes.presets import Numbers, Preset
+from symfric.scenes.base import (
+    Block,
+    GivenInput,
+    Scene,
+    contact,
+    drawn,
+    friction_outputs,
+    structure,
+)
 
 
 def closing(t: ca.SX) -> ca.SX:
-    """From 0 to 4 bar within 0.1 s, then held."""
+    """Return a pressure [Pa] that rises from 0 to 4 bar within 0.1 s."""
     return 4e5 * smooth.clip(t / 0.1, 0.0, 1.0)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Clutch(Scene):
     """Engine and load on both sides of plates that are pressed together.
 
         J_1 w_1' = T_1 - T,   J_2 w_2' = T - T_2,   T = n R F(v, N)
         v = R (w_1 - w_2),   N = N_0 + max(pressure A, 0),   heat' = T (w_1 - w_2)
 
-    R is the radius at which the plates act, n the number of faces that rub, each under N. The
-    input is the pressure of the piston [Pa]; below zero the plates are apart. The motion is
+    R is the friction radius of the plates, n the number of faces, each under N. The input is the
+    pressure of the piston [Pa]; below zero the plates are apart. The motion is
     computed in w_2 and the slip w_1 - w_2, whose rest is exact. Coulomb friction at full pressure
     from t = 0 locks after w / a, and takes T w^2 / (2 a), with w the slip at the start and
     a = T (1/J_1 + 1/J_2) - T_1/J_1 - T_2/J_2.
@@ -54,17 +58,15 @@ class Clutch(Scene):
     J_2: Scalar = fields.INERTIA(0.64, doc="inertia of the load")
     T_1: Scalar = param(100.0, unit="N m", role="offset", doc="torque of the engine")
     T_2: Scalar = param(20.0, unit="N m", role="offset", doc="torque that the load takes")
-    n: Scalar = param(2.0, unit="1", role="geometry", doc="faces that rub", lower=1e-12)
+    n: Scalar = fields.SIZE(2.0, unit="1", doc="number of faces")
     R: Scalar = fields.SIZE(0.1, doc="radius of the plates")
-    A: Scalar = param(
-        0.008 * pi, unit="m^2", role="geometry", doc="area of the piston", lower=1e-12
-    )
+    A: Scalar = fields.SIZE(0.008 * pi, unit="m^2", doc="area of the piston")
     N_0: Scalar = fields.LOAD(1.0, doc="load of the open clutch")
     omega_1: Scalar = fields.TURN(150.0, doc="w_1 at the start")
     omega_2: Scalar = fields.TURN(0.0, doc="w_2 at the start")
 
     def equations(self, p: Variables) -> Model:
-        """States w_rel, w_2, heat and those of the law; input pressure; torque, friction."""
+        """Return the model: states w_rel, w_2, heat and those of the law; input pressure."""
         w_rel = Variable(
             "w_rel", "rad/s", start=self.omega_1 - self.omega_2, nominal=10.0, doc="w_1 - w_2"
         )
@@ -102,16 +104,11 @@ class Clutch(Scene):
 
 
 def slow(t: ca.SX) -> ca.SX:
-    """0.3 rad/s: slower than is drilled, as default laws grip less than rock."""
+    """Return 0.3 rad/s, slower than in drilling since default laws have less friction than rock."""
     return ca.SX(0.3)
 
 
-FALL = {"v_s": 0.155575 / 0.9}
-"""Velocity [m/s] over which friction at the bit falls by 1/e in the paper's numbers."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class DrillString(Scene):
     """String of inertias under a top drive whose speed is given, friction at the bit.
 
@@ -122,12 +119,12 @@ class DrillString(Scene):
     w_top is the input [rad/s], k and c the stiffness and the damping of the whole string, n =
     lumps; the lumps of the string have J_string/n, the bit has J_bit and half a lump more. N is the
     weight on the bit, R the radius at which the law acts. The states are the twists of the n
-    pieces, not angles, so a thousand turns cost no digit; `phi` is the angle of the bit.
+    pieces, not angles, so many turns cost no accuracy; `phi` is the angle of the bit.
 
     Defaults: Navarro-Lopez and Cortes (J_bit, k, c, c_b, R, N); four lumps and J_string, that of
-    1.1 km of 5 inch pipe of this stiffness, are ours. Rock has coefficients of 0.5 to 0.8, see the
-    preset, with which the bit sticks up to 4 rad/s; with those of default laws it takes the slow
-    default input.
+    1.1 km of 5 inch pipe of this stiffness, are chosen here. Rock has coefficients of 0.5 to 0.8,
+    see the preset, with which the bit sticks up to 4 rad/s; with those of default laws it sticks
+    under the slow default input.
     Limits: torsion only: no axial motion, no cutting of the rock; the top drive is stiff.
     Source: Navarro-Lopez and Cortes, J. Sound Vib. 307, 2007, 152-171 (as quoted; there the top is
     an inertia driven by a torque).
@@ -135,26 +132,6 @@ class DrillString(Scene):
 
     t_end: ClassVar[float] = 60.0
     inputs: ClassVar[Mapping[str, GivenInput]] = {"w_top": GivenInput("0.3", slow)}
-    presets: ClassVar[Mapping[str, Preset]] = {
-        "navarro_lopez": Preset(
-            "one inertia below a stiff top; their law falls as exp(-0.9 |w| / (1 rad/s)), which is "
-            "Stribeck's with delta = 1 at v_s = R / 0.9",
-            "Navarro-Lopez and Cortes, J. Sound Vib. 307, 2007, as quoted",
-            {"J_bit": 471.9698, "J_string": 0.0, "k": 861.5336, "c": 172.3067, "c_b": 50.0}
-            | {"R": 0.155575, "N": 97347.0, "lumps": 1},
-            {
-                "law": Numbers(
-                    {"mu_s": 0.8, "mu_d": 0.5, "sigma_2": 0.0},
-                    {
-                        Stribeck: FALL | {"delta": 1.0},
-                        LuGre: FALL | {"delta": 1.0},
-                        Tustin: FALL,
-                        Benson: {"d_c": 0.9 / 0.155575},
-                    },
-                )
-            },
-        )
-    }
 
     lumps: int = structure(4, "inertias into which the string is divided")
     J_bit: Scalar = fields.INERTIA(471.9698, doc="inertia of bit and collars")
@@ -175,7 +152,7 @@ class DrillString(Scene):
             )
 
     def equations(self, p: Variables) -> Model:
-        """States twist_i, w_i, phi and those of the law; input w_top; torques and friction."""
+        """Return the model: states twist_i, w_i, phi and those of the law; input w_top."""
         n = self.lumps
         top = Variable("w_top", "rad/s", nominal=10.0, doc="speed of the top drive")
         twists = tuple(
@@ -207,30 +184,28 @@ class DrillString(Scene):
                 "torque_top": Output(torques[0], "N m", "torque of the top drive"),
                 "torque_bit": Output(self.R * rock.force, "N m", "torque of the rock on the bit"),
                 "v_rel": Output(v, "m/s", "sliding velocity at the radius of the bit"),
-                "friction": Output(rock.force, "N", "friction force opposing v_rel"),
-                "power": Output(rock.force * v, "W", "power taken by the rock"),
+                **friction_outputs(rock, "v_rel"),
             },
             sketch=partial(self._sketch, phi.symbol, symbols_of(twists)),
         )
 
     def _sketch(self, phi: ca.SX, twists: ca.SX) -> Sketch:
-        """Hands of bit and top drive, seen from above; the angle between them is the twist."""
+        """Return hands of bit and top drive, seen from above, with the twist between them."""
         hands = {"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)}
         return drawn({}, hands=hands, hub=Block(0.0, 0.0, "", "v_rel", self.law))
 
 
 def machine_start(t: ca.SX) -> ca.SX:
-    """Return the line accelerates to 0.5 m/s within 4 s."""
+    """Return a speed [m/s] that rises to 0.5 m/s within 4 s."""
     return 0.5 * smooth.clip(t / 4, 0.0, 1.0)
 
 
 def pressing(t: ca.SX) -> ca.SX:
-    """500 N, 5 % more and less with every turn of an eccentric roller at full speed."""
+    """Return 500 N +- 5 % with every turn of an eccentric roller at full speed."""
     return 500 + 25 * ca.sin(5 * t)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Nip(Scene):
     """Carton between a steel chill roll, which carries it, and a rubber roller that lags behind.
 
@@ -241,15 +216,15 @@ class Nip(Scene):
     The web has the speed v_line of the line, which follows the input v_set, and slips by v over the
     nip roller, whose drive turns by `lag` slower, 1 to 2 % in practice. Friction drags the roller
     forward against its shaft (stiffness k, damping d), as the belt does the block of `Rabinowicz`:
-    where the curve falls, the slip swings. The input `load` [N] presses the roller; below zero the
-    nip is open. The contact is taken as flat under even pressure, friction as the law makes it of
-    the load. -F is what the web feels, the step of its tension across the nip.
+    where the curve falls, the slip oscillates. The input `load` [N] presses the roller; below zero
+    the nip is open. The contact is flat under even pressure. -F is the force on the web, the step
+    of its tension across the nip.
 
     Defaults: slip and its range of at most 650 mm/min from the thesis; it has no numbers of the
     machine: roller, shaft and load are made up. Its measured laws are presets of `Prescribed`.
-    Limits: where friction falls, even slip and stick-slip are both motions of one nip, and start
-    and law decide between them: under the defaults dry friction that was at rest swings for ever,
-    the soft bristles of `LuGre` (1e5 N/m) find even slip. The web does not slip on the chill roll
+    Limits: with falling friction, even slip and stick-slip are both possible, and start and law
+    decide between them: under the defaults dry friction from rest oscillates for ever, the soft
+    bristles of `LuGre` (1e5 N/m) come to even slip. The web does not slip on the chill roll
     and does not stretch; no edge effects of the cylinder.
     Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 2.9.
     """
@@ -267,18 +242,13 @@ class Nip(Scene):
     tau: Scalar = param(
         0.1, unit="s", role="time", doc="time constant of the line's drive", lower=1e-9
     )
-    lag: Scalar = param(
-        0.015,
-        unit="1",
-        role="motion",
-        doc="share by which its drive lags",
-        lower=0.0,
-        upper=1.0,
+    lag: Scalar = fields.START(
+        0.015, unit="1", doc="share by which its drive lags", lower=0.0, upper=1.0
     )
     N_0: Scalar = fields.LOAD(1.0, doc="load of the open nip")
 
     def equations(self, p: Variables) -> Model:
-        """States v_line, v_rel, twist and those of the law; inputs v_set, load; friction."""
+        """Return the model: states v_line, v_rel, twist and those of the law; v_set, load."""
         twist = Variable("twist", "rad", nominal=0.01, doc="twist of the shaft")
         v_rel = Variable("v_rel", "m/s", nominal=0.01, doc="slip of the web over the nip roller")
         line = Variable("v_line", "m/s", nominal=0.1, doc="speed of the web")
@@ -302,7 +272,6 @@ class Nip(Scene):
                 "w_roller": Output((line.symbol - v) / self.R, "rad/s", "speed of the nip roller"),
                 "N": Output(N, "N", "normal force of the nip"),
                 "torque": Output(shaft, "N m", "torque of the shaft on the roller"),
-                "friction": Output(web.force, "N", "friction force on the roller, along v_rel"),
-                "power": Output(web.force * v, "W", "power taken by friction"),
+                **friction_outputs(web, "v_rel"),
             },
         )

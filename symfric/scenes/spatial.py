@@ -1,14 +1,12 @@
 """Spatial mechanisms: an arm of six joints, four sliders, and a robot from a URDF file."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, final
+from typing import ClassVar
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import param
-from symfric.laws import BrownMcPhee, Law
+from symfric.foundation.parameters import parametric
+from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.multibody import (
     Distance,
@@ -23,7 +21,6 @@ from symfric.multibody.urdf import read_urdf
 from symfric.scenes import fields
 from symfric.scenes.base import other_law
 from symfric.scenes.linkages import MechanismScene
-from symfric.scenes.presets import Numbers, Preset
 
 UP, SIDE, OUT = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 AXES = (UP, SIDE, SIDE, OUT, SIDE, OUT)
@@ -33,30 +30,30 @@ MASSES = (8.0, 6.0, 4.0, 1.5, 1.0, 0.4)
 STARTS = (0.3, -0.8, 1.2, 0.4, -0.6, 0.2)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Arm(MechanismScene):
     """Six revolute joints: base, shoulder, elbow and three of the wrist, with a torque in each.
 
     q1 ... q6 are the joint angles, tau1 ... tau6 the inputs [N m]. The bearing of every joint
     carries the reaction of all links beyond it at two stations, so the friction of the shoulder
-    depends on what the wrist does. Defaults: a made-up arm of 21 kg and 1 m that falls from rest.
+    depends on the motion of the wrist. Defaults: a made-up arm of 21 kg and 1 m that falls from
+    rest.
     """
 
     t_end: ClassVar[float] = 1.0
 
-    q2: Law | None = other_law("joint q2, shoulder; `law` without")
-    q3: Law | None = other_law("joint q3, elbow; `law` without")
-    q4: Law | None = other_law("joint q4, first of the wrist; `law` without")
-    q5: Law | None = other_law("joint q5, second of the wrist; `law` without")
-    q6: Law | None = other_law("joint q6, third of the wrist; `law` without")
+    q2: Law | None = other_law("joint q2, shoulder; `law` by default")
+    q3: Law | None = other_law("joint q3, elbow; `law` by default")
+    q4: Law | None = other_law("joint q4, first of the wrist; `law` by default")
+    q5: Law | None = other_law("joint q5, second of the wrist; `law` by default")
+    q6: Law | None = other_law("joint q6, third of the wrist; `law` by default")
     load: Scalar = fields.MASS(0.0, doc="mass at the end of the arm", lower=0.0)
     R: Scalar = fields.SIZE(0.03, doc="radius of the bearings")
     a: Scalar = fields.STATIONS(0.08)
     g: Scalar = fields.GRAVITY(9.81)
 
     def mechanism(self) -> Mechanism:
-        """Six bodies in a chain."""
+        """Return six bodies in a chain."""
         m = Mechanism("arm", gravity=(0.0, 0.0, -self.g))
         m.frame("ground.tip", at=(0.0, 0.0, 0.5), z=UP)
         before = "ground"
@@ -81,32 +78,22 @@ class Arm(MechanismScene):
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class FourMass(MechanismScene):
     """Four sliders: 1 and 4 on the axis x, 2 on y, 3 on z; two degrees of freedom.
 
-    Massless rods of lengths 5 and 7 m hold 1 to 2 and 2 to 3; springs of rate k hold 1, 2, 3 to
-    the ground (free at 3, 4, 3 m), and one of rate k_4 holds 4 to 1 (free at 1 m). The normal
+    Massless rods of lengths 5 and 7 m connect 1 to 2 and 2 to 3; springs of rate k connect 1, 2, 3
+    to the ground (free at 3, 4, 3 m), and one of rate k_4 connects 4 to 1 (free at 1 m). The normal
     force of every guide follows from the forces in the rods, so friction acts back on itself.
 
     Defaults: Haug's spatial example, with friction; t_end = 4 s.
     """
 
     t_end: ClassVar[float] = 4.0
-    presets: ClassVar[Mapping[str, Preset]] = {
-        "haug": Preset(
-            "sliders of the spatial example with friction in all guides; laws without a transition "
-            "velocity get the coefficients",
-            "Haug, spatial four-mass example, data as in public codes",
-            {"m_1": 2.0, "m_3": 6.0, "k": 2.0, "k_4": 10.0, "v_4": -1.0, "a": 0.1, "g": 9.8},
-            {"law": Numbers({"mu_s": 0.12, "mu_d": 0.1}, {BrownMcPhee: {"v_t": 0.01}})},
-        )
-    }
 
-    guide_2: Law | None = other_law("guide of slider 2 (y2); `law` without")
-    guide_3: Law | None = other_law("guide of slider 3 (z3); `law` without")
-    guide_4: Law | None = other_law("guide of slider 4 (x4); `law` without")
+    guide_2: Law | None = other_law("guide of slider 2 (y2); `law` by default")
+    guide_3: Law | None = other_law("guide of slider 3 (z3); `law` by default")
+    guide_4: Law | None = other_law("guide of slider 4 (x4); `law` by default")
     m_1: Scalar = fields.MASS(2.0, doc="mass of sliders 1 and 2")
     m_3: Scalar = fields.MASS(6.0, doc="mass of sliders 3 and 4")
     k: Scalar = fields.SPRING(2.0, doc="rate of the springs to the ground")
@@ -116,7 +103,7 @@ class FourMass(MechanismScene):
     g: Scalar = fields.GRAVITY(9.8)
 
     def mechanism(self) -> Mechanism:
-        """Four bodies, four guides, two rods, four springs."""
+        """Return four bodies, four guides, two rods, four springs."""
         m = Mechanism("four_mass", gravity=(0.0, 0.0, -self.g))
         masses = (self.m_1, self.m_1, self.m_3, self.m_3)
         starts = (("x1", 4.0, 0.0), ("y2", 3.0, 0.0), ("z3", 40.0**0.5, 0.0), ("x4", 5.0, self.v_4))
@@ -141,15 +128,14 @@ class FourMass(MechanismScene):
         return m
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Robot(MechanismScene):
     """Robot of a URDF file, with the law at the friction level of every joint.
 
     `source` is the path of the file or its text. The normal force of the law is the joint's
-    `<dynamics friction>`, or `level` where it has none; the law `relative(LuGre())` breaks away
-    there. `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits. `laws` are
-    those of the `joints` of these names; their parameters have endings where they share a name.
+    `<dynamics friction>`, by default `level`; the law `relative(LuGre())` breaks away at it.
+    `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits. `laws` are
+    the laws of the `joints`; parameters with the same name get endings.
     """
 
     t_end: ClassVar[float] = 2.0
@@ -157,12 +143,8 @@ class Robot(MechanismScene):
     source: str | Path
     joints: tuple[str, ...] = ()
     laws: tuple[Law, ...] = ()
-    level: Scalar = param(
-        0.0,
-        unit="N m",
-        role="load",
-        doc="friction of joints without a tag; [N] where they slide",
-        lower=0.0,
+    level: Scalar = fields.LOAD(
+        0.0, unit="N m", doc="friction of joints without a tag; [N] of those that slide"
     )
     g: Scalar = fields.GRAVITY(9.81)
 
@@ -177,7 +159,7 @@ class Robot(MechanismScene):
         super().__post_init__()
 
     def mechanism(self) -> Mechanism:
-        """Bodies, joints and motors."""
+        """Return bodies, joints and motors."""
         gravity = (0.0, 0.0, -self.g)
         laws = dict(zip(self.joints, self.laws, strict=True))
         return read_urdf(self.source, law=self.law, laws=laws, level=self.level, gravity=gravity)

@@ -6,17 +6,17 @@ from pathlib import Path
 import pytest
 
 from docs.machine import measure
-from symfric.bench.interop import InteropBenchmark, Move, Run
+from symfric.bench.interop import MOVES, RUNS
+from symfric.bench.report import Report
 
 
 def test_a_measurement_is_stored_with_machine_load_and_commit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    move = Move("opti", "flow", "lugre", "Solve_Succeeded", 8, 1.114, 1.5e-6, 0.3)
-    run = Run("cvodes", "lugre", 2e-5, 1.5)
+    move = {"tool": "opti", "route": "flow", "law": "lugre", "cost J [N^2 s]": 1.11449}
+    result = Report(tables={MOVES: [move], RUNS: [{"integrator": "cvodes", "law": "lugre"}]})
     monkeypatch.setattr(measure, "STORED", tmp_path)
-    result = InteropBenchmark((move,), (run,), ("rockit",))
-    monkeypatch.setattr("symfric.bench.bench_interop", lambda quick: result)
+    monkeypatch.setattr("symfric.bench.measure", lambda subject, quick: result)
     monkeypatch.setattr(measure, "commit", lambda: "abc")
     path = tmp_path / "interop.json"
     short = dict.fromkeys(measure.SHORT, "-") | {"tables": []}
@@ -27,8 +27,8 @@ def test_a_measurement_is_stored_with_machine_load_and_commit(
     assert (found["title"], found["about"], found["short"]) == ("T", "A.", short)
     assert found["command"] == "symfric bench interop --quick"
     assert all(float(load) >= 0 for load in found["load"].split(" to "))
-    assert found["tables"][0]["rows"][0][:3] == ["opti", "flow", "lugre"]
-    assert found["tables"][1]["rows"][0][:2] == ["cvodes", "lugre"]
+    assert found["tables"][0] == {"title": MOVES, "rows": [move | {"cost J [N^2 s]": "1.11"}]}
+    assert found["tables"][1]["rows"][0]["integrator"] == "cvodes"
     page = measure.section("interop", found)
     assert "load " in page and "Condensed by hand" in page
     capsys.readouterr()

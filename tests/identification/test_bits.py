@@ -8,7 +8,7 @@ import pytest
 
 SCRIPT = """
 from symfric.bench.identification_memory import case
-fit = case(1).fit().solve(throw=False)
+fit = case(1).solve(throw=False)
 print(" ".join(e.value.hex() for e in fit.parameters.values()))
 print(" ".join((e.standard_error or 0.0).hex() for e in fit.parameters.values()))
 print(" ".join(s.hex() for s in fit.noise.values()), fit.evaluations)
@@ -19,7 +19,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from symfric.bench.identification_memory import case
 if __name__ == "__main__":
-    fit = replace(case(1).fit(), starts=3)
+    fit = replace(case(1), starts=3)
     ends = []
     for executor in (None, ProcessPoolExecutor(2)):
         made = fit.solve(executor, throw=False)

@@ -78,7 +78,7 @@ def _text(law: Parametric) -> LawText:
         title=" ".join(paragraphs[0].split()),
         equations="\n".join(formulas + [chosen.capitalize()] * bool(chosen)).replace("`", ""),
         limits=tuple(_limits(about)),
-        source=" ".join(source.split()),
+        source=" ".join(source.partition("\nChecked: ")[0].split()),
     )
 
 
@@ -141,7 +141,7 @@ def _formula(method: Method) -> str:
         case Rosenbrock():
             return (
                 "    [I / (gamma h) - df/dx] k_i = f(x + sum a_ij k_j, u) + sum c_ij k_j / h\n"
-                f"    x+ = x + sum m_i k_i,   i = 1 ... {method.stages}, gamma = {method.gamma:.6g}"
+                f"    x+ = x + sum m_i k_i,   i = 1 ... {len(method.A)}, gamma = {method.gamma:.6g}"
             )
         case Exponential():
             return "    x_i+ = x_i + h phi1(h df_i/dx_i) f_i(x, u),   phi1(a) = (exp(a) - 1) / a"

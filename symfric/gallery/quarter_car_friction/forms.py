@@ -203,7 +203,8 @@ def worked(run: Trajectory) -> float:
     """Work of damping friction [J]."""
     v = run.model.expression("v_b")
     damping = rig.FRICTION["C_e"] * ca.exp(-ca.fabs(v) / rig.FRICTION["e_1"]) * ca.fabs(v)
-    return integral_between(run, damping + rig.FRICTION["sigma_v"] * v**2, *run.span)
+    power = damping + rig.FRICTION["sigma_v"] * v**2
+    return integral_between(run.step_times, run.of, power, *run.span)
 
 
 def below(v: np.ndarray) -> np.ndarray:

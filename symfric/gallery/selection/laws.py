@@ -17,7 +17,7 @@ from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
 from symfric.gallery.selection.tables import PRINTED
 from symfric.gallery.shared import REFERENCE, rms
-from symfric.scenes import jing_mi
+from symfric.scenes import PendulumBox, Rabinowicz
 
 Array = NDArray[float64]
 
@@ -124,15 +124,17 @@ PRINTED_S = {
     "8": "5.8842 6.4755 6.7982 7.0905 3.7149 7.1542 6.8376 6.2963 3.3126 1.4088 5.3765",
 }
 """S(x 10^2) [m] of tables 4 and 8."""
+_BELT = Rabinowicz.presets["jing_mi_table_3"].friction["law"]
+_BOX = PendulumBox.presets["jing_mi_table_7"].friction
 PRINTED_NUMBERS = {
-    "3": (jing_mi.BELT, "0.1 0.15 1e-3 1e-3 1e5 190 1e-7 1e-6 0.1 | 1e-3 1.5e-3 1e-3 1e-4"),
-    "7": (jing_mi.BOX, "0.02 0.03 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 5e-4 0.06 1e-5 1e-6"),
+    "3": (_BELT, "0.1 0.15 1e-3 1e-3 1e5 190 1e-7 1e-6 0.1 | 1e-3 1.5e-3 1e-3 1e-4"),
+    "7": (_BOX["law"], "0.02 0.03 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 5e-4 0.06 1e-5 1e-6"),
     "7, pendulum": (
-        jing_mi.HINGE, "0.002 0.003 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 1e-3 1e-2 1e-5 1e-6"
+        _BOX["hinge"], "0.002 0.003 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 1e-3 1e-2 1e-5 1e-6"
     ),
 }  # fmt: skip
 """Table -> the numbers of the scene, and its rows as printed, in the order of `ROWS`; behind the
-bar those of `OURS`, as `scenes.jing_mi` says that it reads them."""
+bar those of `OURS`, as presets.toml of the scenes interprets the table."""
 ROWS = (
     "Smooth.mu_d", "Stick-slip.mu_s", "Smooth.v_eps", "LuGre.v_s", "LuGre.sigma_0",
     "LuGre.sigma_1", "Elasto-plastic.z_ba", "Stick-slip.D_max", "Gonthier.tau_dw",

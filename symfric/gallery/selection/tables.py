@@ -29,8 +29,7 @@ from scipy.integrate import solve_ivp
 from symfric.choice.friction import Friction
 from symfric.choice.machine import OWN
 from symfric.choice.measured import Task, measured
-from symfric.choice.ranking import Row
-from symfric.choice.text import WIDTH
+from symfric.choice.ranking import WIDTH, Row
 from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError

@@ -7,6 +7,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from string import Template
 from time import perf_counter
 from typing import Any, cast, final
@@ -99,15 +100,20 @@ def rows_source(function: ca.Function) -> str:
     """Return the CasADi C of `function`, with the loop over rows."""
     generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
     generator.add(function)
-    return generator.dump() + Template(_LOOP).substitute(
-        name=function.name(),
-        arguments=function.n_in(),
-        results=function.n_out(),
-        arg=max(1, function.sz_arg()),
-        res=max(1, function.sz_res()),
-        iw=max(1, function.sz_iw()),
-        w=max(1, function.sz_w()),
+    return generator.dump() + filled(
+        _LOOP, function, name=function.name(), arguments=function.n_in(), results=function.n_out()
     )
+
+
+def filled(template: str | Path, *called: ca.Function, **values: object) -> str:
+    """Return the C of a template, or of a file of one, with `values` substituted.
+
+    `arg`, `res`, `iw` and `w` are the work sizes of the Functions that it calls.
+    """
+    text = template.read_text(encoding="utf-8") if isinstance(template, Path) else template
+    for name in ("arg", "res", "iw", "w") if called else ():
+        values[name] = max(1, *(getattr(function, f"sz_{name}")() for function in called))
+    return Template(text).substitute(values)
 
 
 _LOOP = """

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 from symfric.emitter.c99 import DOUBLE, Real
 from symfric.integrator.compiled.columns import densified
-from symfric.integrator.equations.following import DONE, ROUNDS
+from symfric.integrator.equations.blocks import DONE, ROUNDS
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State

@@ -15,7 +15,7 @@ from symfric.integrator.cuda.kernel import Kernel, kernel_of
 from symfric.integrator.many.chunk import Job
 from symfric.integrator.many.members import Advanced, Counts, Stretch
 from symfric.integrator.many.program import program
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import State
 from symfric.model import Model

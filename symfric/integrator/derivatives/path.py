@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,15 +34,7 @@ class Seeds:
 
     def of_data(self, n_d: int) -> Array:
         """Return the derivative of the run data d by each name, shape (n_d, names)."""
-        selector = np.zeros((n_d, len(self.names)))
-        for column, row in enumerate(self.parameters):
-            if row >= 0:
-                selector[row, column] = 1.0
-        return selector
-
-    def through(self, by_data: Array) -> Array:
-        """Return the derivative by each name from that by the run data, shape (names,)."""
-        return np.array([by_data[row] if row >= 0 else 0.0 for row in self.parameters])
+        return np.array(np.arange(n_d)[:, None] == self.parameters, dtype=float)
 
 
 def seeds(
@@ -72,9 +64,7 @@ def seeds(
     return Seeds(tuple(names), rows, np.column_stack(columns))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Jump:
+class Jump(NamedTuple):
     """Events that happened together.
 
     Attributes:
@@ -95,9 +85,7 @@ class Jump:
     which: tuple[int, ...]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Break:
+class Break(NamedTuple):
     """New input data, which algebraic unknowns follow.
 
     Attributes:
@@ -109,23 +97,8 @@ class Break:
     t: float
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """Steps between two jumps; empty after an event that ends a run.
-
-    Attributes:
-        opening: the jumps before, in their order; None is the start.
-        steps: slice of the steps.
-    """
-
-    opening: tuple[Jump | Break | None, ...]
-    steps: slice
-
-    @property
-    def count(self) -> int:
-        """Number of steps."""
-        return int(self.steps.stop - self.steps.start)
+Opening = tuple[int, tuple[Jump | Break | None, ...]]
+"""Number of a step, and the jumps right before it in their order; None is the start."""
 
 
 @final
@@ -152,11 +125,12 @@ class Path:
     tolerance: float = 0.0
     known: tuple[Array, Array] | None = None
 
-    def unknowns(self, times: Array) -> Array:
-        """Return unknowns y at times, shape (times, n)."""
+    def at(self, times: Array) -> list[Array]:
+        """Return times, unknowns y and run data d there, a row each."""
+        y = self.dense(times)
         if self.known is not None and times is self.known[0]:
-            return self.known[1].T
-        return self.dense(times).T
+            y = self.known[1]
+        return [times, y.T, self.data(self._intervals(times))]
 
     def data(self, interval: NDArray[np.intp]) -> Array:
         """Return run data d on input intervals, shape (intervals, n_d)."""
@@ -165,10 +139,6 @@ class Path:
             return np.ndarray((interval.size, d.size), float, d, 0, (0, d.itemsize))
         p = np.tile(self.p, (interval.size, 1))
         return np.hstack([p, self.inputs.values[:, interval].T])
-
-    def data_at(self, times: Array) -> Array:
-        """Return run data d at times, shape (times, n_d)."""
-        return self.data(self._intervals(times))
 
     def _intervals(self, times: Array) -> NDArray[np.intp]:
         if self.inputs.breaks.size == 2:
@@ -207,6 +177,11 @@ class Path:
         return size
 
     @cached_property
+    def theta(self) -> Array:
+        """Part of every step up to the event that cut it."""
+        return (self.dense.t1 - self.dense.t0) / self.size
+
+    @cached_property
     def steps(self) -> list[Array]:
         """Start y, size h and run data d of every step."""
         return [self.dense.y0, self.size, self.data(self.interval)]
@@ -240,23 +215,19 @@ class Path:
     @property
     def linked(self) -> bool:
         """True if there are jumps between its steps."""
-        return bool(self.happened) or len(self.pieces) > 1
+        return bool(self.happened) or len(self.openings) > 1
 
     @cached_property
-    def pieces(self) -> list[Piece]:
-        """Steps between two jumps."""
-        openings: dict[int, list[Jump | Break | None]] = {0: [None]}
+    def openings(self) -> list[Opening]:
+        """The start, and all jumps by the step that they precede."""
+        marks: list[Jump | Break] = []
         breaks = self.breaks
         for jump in self.jumps:
             # an event right on a break was before it, unless the break caused it
             before = [b for b in breaks if b.step <= jump.step and (b.t < jump.t or jump.at_once)]
             breaks = breaks[len(before) :]
-            for mark in (*before, jump):
-                openings.setdefault(mark.step, []).append(mark)
-        for mark in breaks:
-            openings.setdefault(mark.step, []).append(mark)
-        ends = [*list(openings)[1:], self.dense.t0.size]
-        return [
-            Piece(tuple(marks), slice(k, end))
-            for (k, marks), end in zip(openings.items(), ends, strict=True)
-        ]
+            marks += [*before, jump]
+        found: dict[int, list[Jump | Break | None]] = {0: [None]}
+        for mark in (*marks, *breaks):
+            found.setdefault(mark.step, []).append(mark)
+        return [(step, tuple(own)) for step, own in found.items()]

@@ -1,8 +1,7 @@
-"""Derivatives across jumps: saltation matrices.
+"""Derivatives across jumps: saltation matrices, and the links that they make between steps.
 
 The time of an event g(t, y, d) = 0 depends on the parameters. With S the derivatives of y at a
-fixed
-time before it, f the rate of y and a reset r,
+fixed time before it, f the rate of y and a reset r,
 
     t*' = -(g_y S + g_d d') / (g_y f + g_t)
     S   <- S + f t*'                                of y at the event, which moves
@@ -13,24 +12,35 @@ t*'. An event caused by another jump shares the time of that jump. Events at one
 differ in their derivatives are taken one after another, with f between them; if another order leads
 to another state, the motion has no derivative.
 
+A passage is the matrix [A B] of X -> A X + B d' across a jump, shape (n + 1, n + 1 + n_d): X holds
+the derivatives of y and, in its last row, of the time at which y is evaluated. After every step of
+a run with jumps, from the derivatives Z_i of its start, its end and each row of its dense output,
+and T of the time of its start,
+
+    F = sum_i share_i Z_i + fall T,      X = A F + B d'
+
+where X holds those of the start of the next step and of its time. Without a jump F is Z of the end,
+and X is the same; an event cuts the step, and F is the dense output there at a fixed time.
+
 Source: Aizerman and Gantmakher, Quart. J. Mech. Appl. Math., 1958; Leine and Nijmeijer, Dynamics
 and Bifurcations of Non-Smooth Mechanical Systems, 2004 (saltation matrix).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from itertools import permutations
-from typing import final
+from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
-from symfric.integrator.derivatives.functions import Derivatives, derivatives
+from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import Jump, Path
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consistent
 
 Array = NDArray[np.float64]
+Which = Sequence[int] | NDArray[np.intp]
 GRAZING = 1e-6
 """Rate of an event expression over its mean rate in the step before, below which it touches zero
 without crossing it; the square is the limit of the rate over its terms.
@@ -38,98 +48,170 @@ without crossing it; the square is the limit of the rate over its terms.
 SAME = 1e-6
 """Relative difference of two orders of events that counts as equal."""
 MOST = 4
-"""Number of simultaneous events up to which all orders are tried; for more, neighbours are
-exchanged."""
+"""Simultaneous events up to which all orders are tried; for more, neighbours are exchanged."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Passage:
-    """Derivatives after a jump in terms of those before it: X -> by_state X + by_data d'.
-
-    X holds the derivatives of y and, in its last row, of the time at which y is evaluated.
+class Links(NamedTuple):
+    """Links of a run; tables have one row per distinct jump, the first one for no jump.
 
     Attributes:
-        by_state: shape (n + 1, n + 1).
-        by_data: shape (n + 1, n_d).
+        start: passage of the start.
+        of: number of the row after each step, shape (steps,).
+        share: shape (rows, 2 + rows of the dense output).
+        fall: shape (rows, n).
+        by_state: A without its last column, shape (rows, n + 1, n).
+        by_data: B, shape (rows, n + 1, n_d).
+        alone: passages of each jump of the run.
     """
 
+    start: Array
+    of: NDArray[np.intp]
+    share: Array
+    fall: Array
     by_state: Array
     by_data: Array
-
-    def then(self, other: "Passage") -> "Passage":
-        """Return this passage followed by `other`."""
-        through = other.by_state @ self.by_data + other.by_data
-        return Passage(other.by_state @ self.by_state, through)
+    alone: Array
 
 
-def at_start(path: Path) -> Passage:
-    """Return the passage from given to consistent start values."""
-    d = path.data(np.zeros(1, dtype=np.intp))[0]
-    return _followed(path, path.guess, path.dense.y0[0], d)
-
-
-def passage(path: Path, jump: Jump) -> Passage:
-    """Return the passage of events.
-
-    Derivatives before it are of y at the time of the events; if these cut a step, at a fixed time.
+def links(path: Path) -> Links:
+    """Return the links of a run.
 
     Raises:
         ValueError: an event that only touches zero, events at one instant that do not commute, or
             one that coincides with a jump of the inputs.
     """
-    d = path.data(np.array([path.place(jump)]))[0]
-    here = _Instant(path, derivatives(path.integrator), jump.t, d)
-    if jump.at_once:
-        return here.reset(jump.before, jump.which, jump.after)
-    if jump.size:
-        _alone_in_time(path, here, jump)
-        return here.crossed(jump, here.before(jump))
-    rate = here.before(jump)
-    return here.to_fixed_time(rate).then(here.crossed(jump, rate))
+    every, dense, n = _passages(path), path.dense, path.integrator.system.n
+    own = dict(zip(map(id, path.jumps), every, strict=True))
+    if path.breaks:
+        k = np.array([mark.step for mark in path.breaks])
+        here = _Instants(path, dense.t0[k], path.steps[2][k])
+        still = here.to_fixed_time(np.zeros((k.size, n)))
+        own |= zip(map(id, path.breaks), here.followed(still, dense.y0[k]), strict=True)
+    start, *later = (
+        then(*(at_start(path) if mark is None else own[id(mark)] for mark in marks))
+        for _, marks in path.openings
+    )
+    tables = np.array([_Instants(path, dense.t0[:1], path.steps[2][:1]).nothing[0], *later])
+    behind = np.array([step - 1 for step, _ in path.openings[1:]], dtype=np.intp)
+    of, fall = np.zeros(dense.t0.size, dtype=np.intp), np.zeros((len(tables), n))
+    of[behind] = np.arange(1, behind.size + 1)
+    theta = path.theta[behind]
+    fall[1:] = -(1 - theta)[:, None] * dense.rates(behind, np.ones(behind.size))
+    share = path.shares(np.append(1.0, theta))
+    return Links(start, of, share, fall, tables[:, :, :n], tables[:, :, n + 1 :], every)
 
 
-def _followed(path: Path, y: Array, found: Array, d: Array) -> Passage:
-    """Return the passage of `consistent` from y to `found`."""
-    made = derivatives(path.integrator)
-    n, free = made.system.n, made.system.free
-    by_y, by_d = np.eye(n), np.zeros((n, d.size))
-    manifold = made.system.manifold
-    if manifold is not None and made.assembly is not None:
-        for _ in range(ITERATIONS):
-            slope, more = (m.full() for m in made.assembly.call([y, d]))
-            by_y, by_d = slope @ by_y, slope @ by_d + more
-            y = manifold.project(y, d).full().ravel()
-            size = max(1.0, float(np.abs(y[: made.system.nx]).max(initial=0.0)))
-            if np.abs(manifold.defect(y, d).full()).max(initial=0.0) < ASSEMBLED * size:
-                break
-    if free.size:
-        slope, more = (m.full() for m in made.algebraic.call([found, d]))
-        by_d -= free @ np.linalg.solve(slope @ free, slope @ by_d + more)
-        by_y -= free @ np.linalg.solve(slope @ free, slope @ by_y)
-    by_state = np.eye(n + 1)
-    by_state[:n, :n] = by_y
-    return Passage(by_state, np.vstack([by_d, np.zeros(d.size)]))
+def then(first: Array, *others: Array) -> Array:
+    """Return passages one after another as one."""
+    m = first.shape[-2]
+    for other in others:
+        first = other[..., :m] @ first
+        first[..., m:] += other[..., m:]
+    return first
 
 
-def _alone_in_time(path: Path, here: "_Instant", jump: Jump) -> None:
-    """Check that no event that moves coincides with a jump of the inputs, where rates change.
+def at_start(path: Path) -> Array:
+    """Return the passage from given to consistent start values."""
+    here = _Instants(path, path.dense.t0[:1], path.data(np.zeros(1, dtype=np.intp)))
+    return here.consistent(here.nothing, path.guess, path.dense.y0[:1])[0]
 
-    Raises:
-        ValueError: one does.
+
+def _passages(path: Path) -> Array:
+    """Return the passages of all events of a run."""
+    n, n_d = path.integrator.system.n, path.steps[2].shape[1]
+    found = np.empty((len(path.jumps), n + 1, n + 1 + n_d))
+    single = [i for i, jump in enumerate(path.jumps) if _is_single(path, jump)]
+    if single:
+        here = _Instants.of(path, [path.jumps[i] for i in single])
+        rate, which = here.rates_before(), np.array([jump.which[0] for jump in here.jumps])
+        to_event = here.to_event(here.delay(which, here.before, rate), rate)
+        found[single] = then(to_event, here.reset(here.before, which[:, None], here.after))
+    for i in set(range(len(path.jumps))).difference(single):
+        found[i] = _passage(_Instants.of(path, [path.jumps[i]]))[0]
+    return found
+
+
+def _is_single(path: Path, jump: Jump) -> bool:
+    """Return True if a single event cut a step, away from breaks and without constraints."""
+    if len(jump.which) > 1 or not jump.size or path.integrator.system.manifold is not None:
+        return False
+    breaks, k = path.inputs.breaks, path.place(jump)
+    return min(jump.t - breaks[k], breaks[k + 1] - jump.t) > path.tolerance or breaks.size == 2
+
+
+def _passage(here: "_Instants") -> Array:
+    """Return the passage of events at one instant, from derivatives of y at its time; from a fixed
+    time if they cut a step.
     """
+    (jump,), path = here.jumps, here.path
+    if jump.at_once:
+        return here.reset(here.before, jump.which, here.after)
+    rate = here.rates_before()
+    if not jump.size:
+        return then(here.to_fixed_time(rate), _crossed(here, rate))
     breaks, k = path.inputs.breaks, path.place(jump)
     for edge in (k, k + 1):
         if not 0 < edge < breaks.size - 1 or abs(breaks[edge] - jump.t) > path.tolerance:
             continue
-        other = _Instant(path, here.made, jump.t, path.data(np.array([2 * edge - 1 - k]))[0])
-        moved = not all(_near(here.rate(y), other.rate(y)) for y in (jump.before, jump.after))
-        if moved and any(here.delay(i, jump.before, here.before(jump)).any() for i in jump.which):
+        other = here._replace(d=path.data(np.array([2 * edge - 1 - k])))
+        moved = not all(_near(here.rate(y), other.rate(y)) for y in (here.before, here.after))
+        if moved and any(here.delay([i], here.before, rate).any() for i in jump.which):
             raise ValueError(
                 f"{here.where(jump.which)}: expected an event apart from the jumps of the inputs, "
                 f"got one at t = {breaks[edge]:.9g} s; the derivatives before and after it "
                 "differ"
             )
+    return _crossed(here, rate)
+
+
+def _crossed(here: "_Instants", rate: Array) -> Array:
+    """Return the passage of crossed events from derivatives at a fixed time before them."""
+    which, groups = here.jumps[0].which, list[tuple[Array, list[int]]]()
+    for i in which:
+        delay = here.delay([i], here.before, rate)
+        own = next((events for other, events in groups if _near(other, delay)), None)
+        if own is None:
+            groups.append((delay, [i]))
+        else:
+            own.append(i)
+    if len(groups) == 1:
+        to_event = here.to_event(groups[0][0], rate)
+        return then(to_event, here.reset(here.before, which, here.after))
+    every = [events for _, events in groups]
+    orders: Iterable[Sequence[list[int]]] = permutations(every)
+    if len(every) > MOST:
+        pairs = range(len(every) - 1)
+        swaps = ([*every[:i], every[i + 1], every[i], *every[i + 2 :]] for i in pairs)
+        orders = [every, every[::-1], *swaps]
+    first, *others = (_one_by_one(here, order, rate) for order in orders)
+    if first is None or not all(other is not None and _alike(first, other) for other in others):
+        raise ValueError(
+            f"{here.where(which)}: expected events at different times, or independent of "
+            "their order, got some whose order changes the result; the motion has no "
+            "derivative there"
+        )
+    return first
+
+
+def _one_by_one(here: "_Instants", order: Sequence[list[int]], rate: Array) -> Array | None:
+    """Return the passage of ordered simultaneous events; None if one prevents another."""
+    y, through, system = here.before, here.nothing, here.path.integrator.system
+
+    def speeds(events: Sequence[int]) -> Array:
+        slopes = (here.slopes([i], y) for i in events)
+        return np.array([float(by_y[0] @ rate[0] + by_t[0]) for by_t, by_y, _ in slopes])
+
+    before = dict(zip(here.jumps[0].which, speeds(here.jumps[0].which), strict=True))
+    for events in order:
+        if (speeds(events) * [before[i] for i in events] <= 0).any():
+            return None
+        to_event = here.to_event(here.delay(events[:1], y, rate), rate)
+        where, start = here.where(here.jumps[0].which), here.jumped(y, events)[0]
+        after = consistent(system, where, start, here.d[0])[None]
+        through = then(through, to_event, here.reset(y, events, after))
+        y, rate = after, here.rate(after)
+        through = then(through, here.to_fixed_time(rate))
+    return through
 
 
 def _near(one: Array, other: Array) -> bool:
@@ -137,172 +219,182 @@ def _near(one: Array, other: Array) -> bool:
     return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Instant:
-    """Instant at which events happen: the run, its Functions, time and run data."""
+def _alike(one: Array, other: Array) -> bool:
+    """Return True if two passages are equal, each row relative to its largest entry."""
+    return bool((np.abs(one - other) <= SAME * np.abs(one).max(axis=-1, keepdims=True)).all())
+
+
+NOTHING = np.zeros(0)
+
+
+class _Instants(NamedTuple):
+    """Instants of a run, m in number, with a row of each array for each.
+
+    Attributes:
+        path: the run.
+        t: times [s].
+        d: run data.
+        jumps: events at these times, if any.
+        before, after: unknowns on both sides of these.
+    """
 
     path: Path
-    made: Derivatives
-    t: float
+    t: Array
     d: Array
+    jumps: Sequence[Jump] = ()
+    before: Array = NOTHING
+    after: Array = NOTHING
 
-    def where(self, which: Sequence[int]) -> str:
-        """Return the location for messages."""
+    @classmethod
+    def of(cls, path: Path, jumps: Sequence[Jump]) -> "_Instants":
+        """Return the instants of events."""
+        d = path.data(np.array([path.place(jump) for jump in jumps]))
+        before = np.array([jump.before for jump in jumps])
+        after = np.array([jump.after for jump in jumps])
+        return cls(path, np.array([jump.t for jump in jumps]), d, jumps, before, after)
+
+    @property
+    def nothing(self) -> Array:
+        """Passages without a jump."""
+        n, (m, n_d) = self.path.integrator.system.n, self.d.shape
+        return np.tile(np.eye(n + 1, n + 1 + n_d), (m, 1, 1))
+
+    def where(self, which: Sequence[int], row: int = 0) -> str:
+        """Return the location of events for messages."""
         model = self.path.integrator.model
         names = listed(f"'{model.events[i].name}'" for i in which)
-        return f"sensitivities of '{model.name}': event {names} at t = {self.t:.9g} s"
+        return f"sensitivities of '{model.name}': event {names} at t = {self.t[row]:.9g} s"
+
+    def _values(self, function: ca.Function, *rows: Array) -> list[Array]:
+        """Return the results of a Function, matrices column by column."""
+        made = derivatives(self.path.integrator)
+        return made.many(function, [*rows, self.d], self.path.backend)
 
     def rate(self, y: Array) -> Array:
         """Return the rates y' of the equations."""
-        matrix, right = (m.full() for m in self.made.rates.call([y, self.d]))
-        return np.linalg.solve(matrix, right[:, 0]).astype(float)
+        system = self.path.integrator.system
+        matrix, right = self._values(derivatives(self.path.integrator).rates, y)
+        if system.is_ode:
+            return right
+        matrix = matrix.reshape(-1, system.n, system.n).transpose(0, 2, 1)
+        return np.linalg.solve(matrix, right[:, :, None])[:, :, 0].astype(float)
 
-    def before(self, jump: Jump) -> Array:
-        """Return the rates just before events, where modes and inputs are unchanged.
-
-        They come from the equations: in a step that a jump of the force ended, dense output has a
-        mean
-        rate.
+    def rates_before(self) -> Array:
+        """Return the rates just before the events, from the equations: in a step that a jump of the
+        force ended, dense output has a mean rate.
         """
-        if not jump.size:
-            return self.rate(jump.before)
-        dense, k = self.path.dense, np.array([jump.step - 1])
-        back = 2 * max(self.path.tolerance, float(np.spacing(abs(jump.t))))
+        y, dense = self.before.copy(), self.path.dense
+        cut = np.array([jump.size > 0 for jump in self.jumps])
+        k = np.array([jump.step - 1 for jump in self.jumps])[cut]
+        back = 2 * np.maximum(self.path.tolerance, np.spacing(np.abs(self.t[cut])))
         theta = 1.0 - back / (dense.t1[k] - dense.t0[k])
-        return self.rate(dense.piece(k, np.maximum(theta, 0.0))[0])
+        y[cut] = dense.piece(k, np.maximum(theta, 0.0))
+        return self.rate(y)
 
-    def delay(self, event: int, y: Array, slope: Array) -> Array:
-        """Return the derivative of the time of an event by y at a fixed time and by d, shape (n +
-        n_d,).
+    def slopes(self, which: Which, y: Array) -> tuple[Array, Array, Array]:
+        """Return the derivatives of the expression of one event each by t, y and d."""
+        found = self._values(derivatives(self.path.integrator).of_events, self.t, y)
+        m, every, own = self.t.size, len(self.path.integrator.model.events), np.asarray(which)
+        by_t, by_y, by_d = (a.reshape(m, -1, every)[np.arange(m), :, own] for a in found)
+        return by_t[:, 0], by_y, by_d
+
+    def delay(self, which: Which, y: Array, rate: Array) -> Array:
+        """Return the derivative of the time of one event each by y at a fixed time and by d, shape
+        (m, n + n_d).
 
         Raises:
-            ValueError: its expression only touches zero.
+            ValueError: an expression only touches zero.
         """
-        by_t, by_y, by_d = self.slopes_of(event, y)
-        rate = float(by_y @ slope + by_t[0])
-        terms = float(np.abs(by_y) @ np.abs(slope) + abs(by_t[0]))
-        if not abs(rate) > max(GRAZING**2 * terms, GRAZING * self.mean_rate(event)):
+        by_t, by_y, by_d = self.slopes(which, y)
+        speed = (by_y * rate).sum(axis=1) + by_t
+        terms = (np.abs(by_y) * np.abs(rate)).sum(axis=1) + np.abs(by_t)
+        dense, row = self.path.dense, np.arange(self.t.size)
+        k = np.minimum(np.searchsorted(dense.t1, self.t), dense.t1.size - 1)
+        (began,) = self._values(self.path.integrator.events, dense.t0[k], dense.y0[k])
+        ends = dense.t1[k] == self.t
+        mean = (
+            ends * np.abs(began[row, np.asarray(which)]) / np.where(ends, self.t - dense.t0[k], 1.0)
+        )
+        touches = ~(np.abs(speed) > np.maximum(GRAZING**2 * terms, GRAZING * mean))
+        if touches.any():
+            row = int(touches.argmax())
             raise ValueError(
-                f"{self.where([event])}: expected an expression that crosses zero, got one that "
-                f"touches it at a rate of {rate:.3g} per second; the time of such an event has no "
-                "derivative"
+                f"{self.where([np.ravel(which)[row]], row)}: expected an expression that crosses "
+                f"zero, got one that touches it at a rate of {speed[row]:.3g} per second; the time "
+                "of such an event has no derivative"
             )
-        return -np.concatenate([by_y, by_d]) / rate
+        return -np.hstack([by_y, by_d]) / speed[:, None]
 
-    def slopes_of(self, event: int, y: Array) -> tuple[Array, Array, Array]:
-        """Return derivatives of an event expression by t, y and d."""
-        found = self.made.of_events.call([self.t, y, self.d])
-        by_t, by_y, by_d = (m.full()[event] for m in found)
-        return by_t, by_y, by_d
+    def to_event(self, delay: Array, rate: Array) -> Array:
+        """Return the passages from derivatives of y at a fixed time to those at an event."""
+        n, found = rate.shape[1], self.nothing
+        found[:, n, n] = 0.0
+        times = np.hstack([rate, np.ones((rate.shape[0], 1))])[:, :, None] * delay[:, None]
+        found[:, :, :n] += times[:, :, :n]
+        found[:, :, n + 1 :] = times[:, :, n:]
+        return found
 
-    def speed(self, event: int, y: Array, slope: Array) -> float:
-        """Return the rate of an event expression."""
-        by_t, by_y, _ = self.slopes_of(event, y)
-        return float(by_y @ slope + by_t[0])
-
-    def mean_rate(self, event: int) -> float:
-        """Return the mean rate of an event expression in the step before."""
-        path = self.path
-        k = int(np.searchsorted(path.dense.t1, self.t, side="left"))
-        if k == path.dense.t0.size or path.dense.t1[k] != self.t:
-            return 0.0
-        t0, y0 = float(path.dense.t0[k]), path.dense.y0[k]
-        return abs(float(self.made.events(t0, y0, self.d)[event])) / (self.t - t0)
-
-    def reset(self, y: Array, which: Sequence[int], found: Array) -> Passage:
-        """Return the passage of the resets of events at y; `found` is y after them."""
-        n = y.size
-        by_state, by_data = np.eye(n + 1), np.zeros((n + 1, self.d.size))
-        by_t, by_y, by_d = (m.full() for m in self.made.of_resets.call([self.t, y, self.d]))
-        for k, (event, state) in enumerate(self.resets):
-            if event in which:
-                by_state[state] = np.append(by_y[k], by_t[k])
-                by_data[state] = by_d[k]
-        after = self.after(y, which)
-        return Passage(by_state, by_data).then(_followed(self.path, after, found, self.d))
+    def to_fixed_time(self, rate: Array) -> Array:
+        """Return the passages from derivatives of y at a moving time to those at a fixed time."""
+        n, found = rate.shape[1], self.nothing
+        found[:, :n, n], found[:, n, n] = -rate, 0.0
+        return found
 
     @property
-    def resets(self) -> tuple[tuple[int, int], ...]:
+    def _resets(self) -> tuple[tuple[int, int], ...]:
         """Numbers of event and state of each reset."""
         crossings = self.path.integrator.crossings
         return () if crossings is None else crossings.resets
 
-    def after(self, y: Array, which: Sequence[int]) -> Array:
+    def jumped(self, y: Array, which: Which) -> Array:
         """Return unknowns y after the resets of events, algebraic ones as before."""
-        fresh = self.made.resets(self.t, y, self.d).full().ravel()
-        after = y.copy()
-        for value, (event, state) in zip(fresh, self.resets, strict=True):
-            after[state] = value if event in which else after[state]
+        (fresh,), after = self._values(self.path.integrator.resets, self.t, y), y.copy()
+        for k, (event, state) in enumerate(self._resets):
+            here = (np.atleast_2d(which) == event).any(axis=1)
+            after[here, state] = fresh[here, k]
         return after
 
-    def to_fixed_time(self, rate: Array) -> Passage:
-        """Return the passage from derivatives of y at a moving time to those at a fixed time."""
-        by_state = np.eye(rate.size + 1)
-        by_state[:-1, -1] = -rate
-        by_state[-1, -1] = 0.0
-        return Passage(by_state, np.zeros((rate.size + 1, self.d.size)))
+    def reset(self, y: Array, which: Which, found: Array) -> Array:
+        """Return the passages of the resets of the events `which`, (m, events), at y; `found` is y
+        after them.
+        """
+        n, every, jumps = y.shape[1], self._resets, self.nothing
+        if not every:
+            return self.followed(jumps, found)
+        slopes = self._values(derivatives(self.path.integrator).of_resets, self.t, y)
+        by_t, by_y, by_d = (a.reshape(self.t.size, -1, len(every)) for a in slopes)
+        for k, (event, state) in enumerate(every):
+            here = (np.atleast_2d(which) == event).any(axis=1)
+            jumps[here, state, :n], jumps[here, state, n] = by_y[here, :, k], by_t[here, 0, k]
+            jumps[here, state, n + 1 :] = by_d[here, :, k]
+        return self.consistent(jumps, self.jumped(y, which), found)
 
-    def to_event(self, delay: Array, slope: Array) -> Passage:
-        """Return the passage from derivatives of y at a fixed time to those at an event."""
-        n = slope.size
-        times = np.vstack([slope[:, None], [[1.0]]]) @ delay[None]
-        by_state = np.zeros((n + 1, n + 1))
-        by_state[:n, :n] = np.eye(n)
-        by_state[:, :n] += times[:, :n]
-        return Passage(by_state, times[:, n:])
+    def consistent(self, jumps: Array, y: Array, found: Array) -> Array:
+        """Return passages to y followed by those of `consistent` from y to `found`; of mechanisms
+        at one instant only.
+        """
+        made, n = derivatives(self.path.integrator), y.shape[-1]
+        manifold = made.system.manifold
+        if manifold is not None and made.assembly is not None:
+            y, (d,) = y.ravel(), self.d
+            for _ in range(ITERATIONS):
+                slope, more = (m.full() for m in made.assembly.call([y, d]))
+                jumps[:, :n] = slope @ jumps[:, :n]
+                jumps[:, :n, n + 1 :] += more
+                y = manifold.project(y, d).full().ravel()
+                size = max(1.0, float(np.abs(y[: made.system.nx]).max(initial=0.0)))
+                if np.abs(manifold.defect(y, d).full()).max(initial=0.0) < ASSEMBLED * size:
+                    break
+        return self.followed(jumps, found)
 
-    def crossed(self, jump: Jump, slope: Array) -> Passage:
-        """Return the passage of crossed events from derivatives at a fixed time before them."""
-        groups: list[tuple[Array, list[int]]] = []
-        for i in jump.which:
-            delay = self.delay(i, jump.before, slope)
-            own = next((events for other, events in groups if _near(other, delay)), None)
-            if own is None:
-                groups.append((delay, [i]))
-            else:
-                own.append(i)
-        if len(groups) == 1:
-            to_event = self.to_event(groups[0][0], slope)
-            return to_event.then(self.reset(jump.before, jump.which, jump.after))
-        first, *others = (self.one_by_one(jump, order, slope) for order in _orders(groups))
-        if first is None or not all(other and _alike(first, other) for other in others):
-            raise ValueError(
-                f"{self.where(jump.which)}: expected events at different times, or independent of "
-                "their order, got some whose order changes the result; the motion has no "
-                "derivative there"
-            )
-        return first
-
-    def one_by_one(
-        self, jump: Jump, order: Sequence[tuple[int, ...]], rate: Array
-    ) -> Passage | None:
-        """Return the passage of ordered simultaneous events; None if one prevents another."""
-        y, n = jump.before, jump.before.size
-        system, where = self.path.integrator.system, self.where(jump.which)
-        through = Passage(np.eye(n + 1), np.zeros((n + 1, self.d.size)))
-        before = {i: self.speed(i, y, rate) for i in jump.which}
-        for events in order:
-            if any(self.speed(i, y, rate) * before[i] <= 0 for i in events):
-                return None
-            delay = self.delay(events[0], y, rate)
-            after = consistent(system, where, self.after(y, events), self.d)
-            through = through.then(self.to_event(delay, rate)).then(self.reset(y, events, after))
-            y, rate = after, self.rate(after)
-            through = through.then(self.to_fixed_time(rate))
-        return through
-
-
-def _orders(groups: Sequence[tuple[Array, list[int]]]) -> list[list[tuple[int, ...]]]:
-    """Return the orders in which groups of events are tried."""
-    every = [tuple(events) for _, events in groups]
-    if len(every) <= MOST:
-        return [list(order) for order in permutations(every)]
-    swapped = [[*every[:i], every[i + 1], every[i], *every[i + 2 :]] for i in range(len(every) - 1)]
-    return [every, every[::-1], *swapped]
-
-
-def _alike(one: Passage, other: Passage) -> bool:
-    """Return True if two passages are equal, each row relative to its largest entry."""
-    a, b = (np.hstack([x.by_state, x.by_data]) for x in (one, other))
-    return bool((np.abs(a - b) <= SAME * np.abs(a).max(axis=1, keepdims=True)).all())
+    def followed(self, jumps: Array, found: Array) -> Array:
+        """Return passages with algebraic unknowns updated at `found`."""
+        made = derivatives(self.path.integrator)
+        n, m, free = made.system.n, self.t.size, made.system.free
+        if free.size:
+            slope, more = self._values(made.algebraic, found)
+            slope = slope.reshape(m, n, -1).transpose(0, 2, 1)
+            left = slope @ jumps[:, :n]
+            left[:, :, n + 1 :] += more.reshape(m, -1, slope.shape[1]).transpose(0, 2, 1)
+            jumps[:, :n] -= free @ np.linalg.solve(slope @ free, left)
+        return jumps

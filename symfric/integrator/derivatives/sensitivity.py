@@ -11,23 +11,20 @@ its error, or more across a jump of the force.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import Jump, Path, Seeds
-from symfric.integrator.derivatives.saltation import at_start
-from symfric.integrator.derivatives.together import Links, links
+from symfric.integrator.derivatives.saltation import Links, at_start, links
 from symfric.integrator.running.record import Dense
 
 Array = NDArray[np.float64]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Slopes:
+class Slopes(NamedTuple):
     """Derivatives of a run.
 
     Attributes:
@@ -42,24 +39,28 @@ class Slopes:
 
 def forward(path: Path, which: Seeds) -> Slopes:
     """Return derivatives of the solution by all names, in one sweep over the steps."""
-    n, names, made = path.integrator.system.n, len(which.names), derivatives(path.integrator)
+    n, names, linked = path.integrator.system.n, len(which.names), path.linked
     state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
     state[: which.start.shape[0]] = which.start
-    if not path.linked:
-        first = at_start(path)
-        state = first.by_state @ state + first.by_data @ of_d
-        rows = [*path.steps]
-        found = made.forward(which, False)(rows, state[:n].T, path.backend)
-        return Slopes(_dense(path, state[:n], *found), np.zeros((0, names)))
+    sweep, rows = derivatives(path.integrator).forward(which, linked), [*path.steps]
+    if not linked:
+        state = _after(at_start(path), state, of_d)[:n]
+        behind, inner = sweep(rows, state.T, path.backend)
+        return Slopes(_dense(path, state, behind, inner), np.zeros((0, names)))
     every = links(path)
-    state = every.start.by_state @ state + every.start.by_data @ of_d
+    state = _after(every.start, state, of_d)
     by_data = (every.by_data @ of_d).transpose(0, 2, 1)
     tables = (every.share, every.fall, every.by_state, by_data)
-    rows = [*path.steps, *((table.reshape(table.shape[0], -1), every.of) for table in tables)]
-    behind, inner = made.forward(which, True)(rows, state.T, path.backend)
+    rows += [(table.reshape(table.shape[0], -1), every.of) for table in tables]
+    behind, inner = sweep(rows, state.T, path.backend)
     states = np.concatenate([state.T[None], behind.reshape(-1, names, n + 1)])
     dense = _at_fixed_times(path, _dense(path, state[:n], states[1:, :, :n], inner), states)
     return Slopes(dense, _times(path, every, dense, states, of_d))
+
+
+def _after(passage: Array, state: Array, of_d: Array) -> Array:
+    """Return the derivatives behind a passage."""
+    return passage @ np.vstack([state, of_d])
 
 
 def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
@@ -79,13 +80,12 @@ def _at_fixed_times(path: Path, found: Dense, states: Array) -> Dense:
     those of their times in the last column.
     """
     cut = np.array([jump.step - 1 for jump in path.jumps if jump.size], dtype=np.intp)
-    theta = (path.dense.t1 - path.dense.t0) / path.size
     begin, end, bend = found.y0, found.y1.copy(), found.D.copy()
-    end[cut], bend[cut] = _cut(found, cut, theta[cut])
+    end[cut], bend[cut] = _cut(found, cut, path.theta[cut])
     late = np.flatnonzero(states[:-1, :, -1].any(axis=1))
-    of_t = states[late, :, -1]
-    for part, rest in zip((begin, end, bend), _ahead(path.dense, late, theta[late]), strict=True):
-        moved = np.einsum("ks,k...n->k...sn", of_t, rest)
+    ahead = _ahead(path.dense, late, path.theta[late])
+    for part, rest in zip((begin, end, bend), ahead, strict=True):
+        moved = np.einsum("ks,k...n->k...sn", states[late, :, -1], rest)
         part[late] -= moved.reshape(part[late].shape)
     return Dense(found.t0, found.t1, begin, end, bend)
 
@@ -116,29 +116,20 @@ def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Arra
     p = np.arange(1, rows + 2)[:, None, None] * c[1:] / h
     q = np.concatenate([p, np.zeros_like(p[:1])])
     q[1:] -= theta[:, None] * p
-    bend = np.empty_like(D)
-    for row in reversed(range(rows)):
-        bend[:, row] = (bend[:, row + 1] if row < rows - 1 else 0.0) - q[row + 2]
+    bend = -np.cumsum(q[:1:-1], axis=0)[::-1].transpose(1, 0, 2)
     return q[0], q.sum(axis=0), bend
 
 
 def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
     """Return derivatives of the times of all jumps, shape (jumps, names)."""
-    found, own = list[Array](), iter(every.alone)
-    names = of_d.shape[1]
-    for piece in path.pieces:
-        marks = [mark for mark in piece.opening if isinstance(mark, Jump)]
-        if len(marks) == 1:
-            next(own)
-            found.append(states[piece.steps.start, :, -1])
-            continue
-        k = piece.steps.start - 1
-        before = dense.y1[k].reshape(names, -1).T if k >= 0 else states[0, :, :-1].T
+    found, own, names = list[Array](), iter(every.alone), of_d.shape[1]
+    for step, marks in path.openings:
+        jumps = [mark for mark in marks if isinstance(mark, Jump)]
+        before = dense.y1[step - 1].reshape(names, -1).T if step else states[0, :, :-1].T
         state = np.vstack([before, np.zeros(names)])
-        for _ in marks:
-            move = next(own)
-            state = move.by_state @ state + move.by_data @ of_d
-            found.append(state[-1])
+        for _ in jumps:
+            state = _after(next(own), state, of_d)
+            found.append(states[step, :, -1] if len(jumps) == 1 else state[-1])
     return np.array(found).reshape(-1, names)
 
 
@@ -151,7 +142,7 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
         solution: derivatives of the solution, from `forward`.
         times: of the result [s].
     """
-    rows = [times, path.unknowns(times), path.data_at(times), solution(times).T]
+    rows = [*path.at(times), solution(times).T]
     (found,) = derivatives(path.integrator).of_signals(which)(rows, backend=path.backend)
     # CasADi stores column by column
     return np.ascontiguousarray(found.T).reshape(len(which.names), -1, times.size)
@@ -173,12 +164,11 @@ def gradient(
     s, used = path.integrator.system, tuple(weights)
     if not used:
         return dict.fromkeys(which.names, 0.0)
-    every = np.array([*weights.values()]).T
-    rows = [times, path.unknowns(times), path.data_at(times), every]
+    rows = [*path.at(times), np.array([*weights.values()]).T]
     by_y, of_d = derivatives(path.integrator).weighted(used)(rows, backend=path.backend)
-    looks, by_data = _Looks(path, times, by_y), of_d.sum(axis=0)
-    start, more = _swept_back(path, looks)
-    found = start[: s.nx] @ which.start + which.through(by_data + more)
+    start, more = _swept_back(path, _Looks(path, times, by_y))
+    by_data = of_d.sum(axis=0) + more
+    found = start[: s.nx] @ which.start + by_data @ which.of_data(by_data.size)
     return dict(zip(which.names, found.tolist(), strict=True))
 
 
@@ -196,7 +186,7 @@ def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
         first = at_start(path)
     before, of_data = made.reverse(path.linked)(steps, np.zeros(n + path.linked), path.backend)
     adjoint = before[-1] if path.linked else np.append(before[-1], 0.0)
-    return first.by_state.T @ adjoint, of_data.sum(axis=0) + first.by_data.T @ adjoint
+    return first[:, : n + 1].T @ adjoint, of_data.sum(axis=0) + first[:, n + 1 :].T @ adjoint
 
 
 @final
@@ -232,7 +222,7 @@ class _Looks:
         It is nonzero for steps after jumps only; others start at fixed times.
         """
         path, found = self.path, np.zeros(self.path.dense.t0.size)
-        moves = np.append(path.pieces[0].opening != (None,), every.of[:-1] > 0)
+        moves = np.append(path.openings[0][1] != (None,), every.of[:-1] > 0)
         inside = np.flatnonzero(moves[self.step])
         k = self.step[inside]
         since = self.times[inside] - path.dense.t0[k]

@@ -1,23 +1,48 @@
-"""Functions that make up an implicit step: inlined with SX, calls with MX."""
+"""Functions that make up an implicit step, and the update of algebraic unknowns after a jump.
+
+With SX they are inlined, with MX they stay calls.
+
+When input data jump, states and time stay, and algebraic unknowns move to the solution near the
+previous one. With W = -dg/dz of the algebraic equations 0 = g(y, d), factorised once a round,
+
+    W s_1 = g(y),        W s_2 = g(y + s_1),        y <- y + s_1 + s_2
+
+is of order 3; equations that are linear in their unknowns, such as those of a machine without
+friction, need one round. The iteration has converged if
+
+    |W| |s_2| <= DONE |W| |z|
+
+in every equation. Without a mechanism there may be many solutions, and the iteration has to stay
+near the previous one: it continues only while s_2 is at most half of s_1 (Deuflhard's monotonicity
+test with frozen derivatives, which is invariant to units of equations and of unknowns). Normal
+forces N = |R(N)| of a mechanism are convex and Newton's method converges from far away; the guard
+rejects invalid solutions. The two loops, in Python and in C (`follow.c`), make the same comparisons
+of the same numbers, so that engines agree bit for bit. On failure the unknowns stay unchanged, and
+the damped search of `symfric.integrator.equations.initial` begins at the same guess.
+
+Source: Deuflhard, Newton Methods for Nonlinear Problems, 2004, sections 2.1 and 3.3.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, final
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from symfric.foundation.numeric import reciprocal
+from symfric.foundation.numeric import bound, reciprocal
+from symfric.integrator.compiled.columns import filled
+from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.matrices import Factors, SymbolicLU, factorise
 from symfric.integrator.equations.system import System
-from symfric.model.holonomic import Inner
 
+Array = NDArray[np.float64]
 NONE = ca.SX(0, 1)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Slopes:
+class Slopes(NamedTuple):
     """Jacobian of a system, bordered by that of its inner unknowns l if there are any.
 
         [ f_y  f_l     ]
@@ -46,42 +71,35 @@ class Slopes:
 def slopes(system: System) -> Slopes:
     """Return the Jacobian of `system`."""
     y, d, inner = system.y, system.d, system.inner
-    slope, pivots, hidden, put = system.J, system.pivots, NONE, NONE
+    slope, pivots, hidden = system.J, system.pivots, NONE
     if inner is not None:
-        hidden, pivots = inner.l, _places(y, inner)
+        hidden = inner.l
         to_l = ca.vertcat(
             ca.jacobian(inner.f, hidden),
             ca.jacobian(inner.values, hidden) - ca.SX.eye(hidden.numel()),
         )
         slope = ca.horzcat(ca.jacobian(ca.vertcat(inner.f, inner.values), y), to_l)
-        (put,), _ = ca.substitute_inplace([hidden], [inner.values], [NONE])
-    named, entries, values = _named(ca.sparsify(slope))
-    of_l = ca.Function("slopes", [hidden, y, d], [values])
-    at = ca.Function("slopes", [y, d], [of_l(put, y, d)], {"cse": True})
-    return Slopes(named, entries, system.in_steps(at), pivots)
-
-
-def _named(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return `matrix` with symbols for its non-constant entries, these symbols, and the entries."""
-    named = ca.SX(matrix)
-    places = [k for k in range(matrix.nnz()) if not ca.SX(matrix.nz[k]).is_constant()]
+        place = {s.__hash__(): i for i, s in enumerate(ca.vertsplit(ca.vertcat(y, hidden)))}
+        pivots = tuple(tuple(place[s.__hash__()] for s in ca.vertsplit(g)) for g in inner.groups)
+    named = ca.SX(slope := ca.sparsify(slope))
+    places = [k for k in range(slope.nnz()) if not ca.SX(slope.nz[k]).is_constant()]
     entries = ca.SX.sym("J", len(places))
     for i, k in enumerate(places):
         named.nz[k] = entries[i]
-    return named, entries, ca.vec(ca.SX(matrix.nz[places]))
+    of_l = ca.Function("slopes", [hidden, y, d], [ca.vec(ca.SX(slope.nz[places]))])
+    at = ca.Function("slopes", [y, d], [of_l(_inner(system), y, d)], {"cse": True})
+    return Slopes(named, entries, system.in_steps(at), pivots)
 
 
-def _places(y: ca.SX, inner: Inner) -> tuple[tuple[int, ...], ...]:
-    """Return groups of unknowns as row numbers."""
-    unknowns = ca.vertsplit(ca.vertcat(y, inner.l))
-    place = {ca.SX(s).__hash__(): i for i, s in enumerate(unknowns)}
-    groups = (ca.vertsplit(group) for group in inner.groups)
-    return tuple(tuple(place[ca.SX(s).__hash__()] for s in group) for group in groups)
+def _inner(system: System) -> ca.SX:
+    """Return inner unknowns in terms of y and d."""
+    if system.inner is None:
+        return NONE
+    (values,), _ = ca.substitute_inplace([system.inner.l], [system.inner.values], [NONE])
+    return values
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Blocks:
+class Blocks(NamedTuple):
     """Right-hand side, iteration matrix W = M/(gamma h) - J and solutions with it.
 
     Attributes:
@@ -118,17 +136,21 @@ def blocks(system: System, gamma: float) -> Blocks:
     W = own.matrix(system.mass * reciprocal(gamma * h))
     lu = factorise(W, own.pivots, system.orders.get("step", ()))
     f = ca.Function("f", [system.y, system.d], [system.f], {"cse": True})
+    solved = _solved(lu, right + system.mass @ memory)
     return Blocks(
         system.in_steps(f),
         own.values,
         ca.Function("pack", [own.entries, h], [lu.packed], {"cse": True}),
-        ca.Function(
-            "solve", [lu.packed_symbol, right, memory],
-            [_solved(lu, right + system.mass @ memory)],
-        ),
+        ca.Function("solve", [lu.symbols, right, memory], [solved]),
         lu,
         Factors("step", own.values, (own.entries, h), W, lu.order),
-    )  # fmt: skip
+    )
+
+
+def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
+    """Return the unknowns of a system whose inner equations have zero right-hand sides."""
+    n = right.numel()
+    return lu.solve(ca.vertcat(right, ca.SX(len(lu.eliminations) - n, 1)))[:n]
 
 
 @lru_cache(maxsize=2)
@@ -143,31 +165,29 @@ def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
     return lu, Factors("tiny", own.values, (own.entries, ca.SX.sym("h")), matrix, lu.order)
 
 
-def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
-    """Return the unknowns of a system whose inner equations have zero right-hand sides."""
-    n = right.numel()
-    return lu.solve(ca.vertcat(right, ca.SX(len(lu.order) - n, 1)))[:n]
-
-
 @lru_cache(maxsize=2)
 def refinement(system: System) -> ca.Function:
     """Return the Function (y, d) -> y of a mechanism on its constraints, algebraic unknowns exact.
 
     It makes two steps of Newton's method for accelerations, multipliers and normal forces.
     """
-    (rows, _), right = system.algebraic, ca.SX.sym("right", system.n)
+    right, g = ca.SX.sym("right", system.n), _residual(system)
     lu, factors = at_rest(system)  # use its symbols: the cache of `slopes` may be newer
     pack = ca.Function("pack", [factors.symbols[0]], [lu.packed])
-    solve = ca.Function("solve", [lu.packed_symbol, right], [_solved(lu, right)])
-    residual = ca.SX(system.n, 1)
-    residual[rows] = system.f[rows]
-    f = ca.Function("f", [system.y, system.d], [residual])
+    solve = ca.Function("solve", [lu.symbols, right], [_solved(lu, right)])
     y, d = ca.SX(system.y), system.d
     if system.manifold is not None:
         y = ca.SX(system.manifold.project(y, d))
     for _ in range(2):
-        y = y + solve(pack(factors.entries(y, d)), f(y, d))
+        y = y + solve(pack(factors.entries(y, d)), g(y, d))
     return ca.Function("refine", [system.y, d], [y], {"cse": True})
+
+
+def _residual(system: System) -> ca.Function:
+    """Return (y, d) -> algebraic equations in their rows of y, 0 elsewhere."""
+    residual, rows = ca.SX(system.n, 1), system.algebraic[0]
+    residual[rows] = system.f[rows]
+    return ca.Function("g", [system.y, system.d], [residual], {"cse": True})
 
 
 Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
@@ -182,17 +202,14 @@ def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
     far the latter is from zero.
     """
     block, (rows, _) = blocks(system, gamma), system.algebraic
-    entries = block.factors.symbols[0]
-    lu, first = block.lu, block.lu.order[: len(rows)]
+    lu, entries = block.lu, block.factors.symbols[0]
+    first = lu.order[: len(rows)]
     if system.is_semi_explicit and all({*places} == {*rows} for places in zip(*first, strict=True)):
         tiny = [lu.sign(len(rows)), lu.pivots(watched)]
     else:
-        own_lu, factors = at_rest(system)
-        entries = factors.symbols[0]
-        in_symbols = [own_lu.sign(), own_lu.pivots(watched)]
-        tiny = ca.substitute(in_symbols, [own_lu.packed_symbol], [own_lu.packed])
-    symbols = [lu.packed_symbol, entries]
-    every = ca.Function("signs", symbols, [lu.sign(), *tiny], {"cse": True})
+        own, factors = at_rest(system)
+        entries, tiny = factors.symbols[0], own.inserted(own.sign(), own.pivots(watched))
+    every = ca.Function("signs", [lu.symbols, entries], [lu.sign(), *tiny], {"cse": True})
 
     def at(y: Any, h: Any, d: Any) -> tuple[Any, Any, Any]:
         values = block.slopes(y, d)
@@ -200,3 +217,177 @@ def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
         return of_step, of_tiny_step, pivots
 
     return at
+
+
+DONE = 1e-10
+"""Largest last correction, relative to the terms of the equations; beyond it is rounding."""
+ROUNDS = 6
+"""Most rounds; a solution that takes more is not near."""
+FAINT = 1e-3
+"""Equations of a mechanism with terms this small compared with the largest are solved to the
+rounding of the largest: out of its plane, or where loads cancel, all terms are rounding.
+"""
+NEARER, ANY = 0.5, 1e10
+"""Largest s_2 over s_1 to continue with: for general systems, and for mechanisms."""
+INLINE = 7000
+"""Rounds with more instructions are calls of blocks, which compile much faster."""
+
+
+class Following(NamedTuple):
+    """Update of the unknowns after a jump.
+
+    Attributes:
+        round: (y, d) -> y after one round, and (sizes of s_1 and s_2, guard). A negative guard
+            rejects the solution: friction has jammed, or a bearing pulls.
+        contraction: largest s_2 over s_1 to continue with.
+    """
+
+    round: ca.Function
+    contraction: float
+
+    def __call__(self, y: Array, d: Array) -> Array | None:
+        """Return `y` with its algebraic unknowns at run data `d`; None if a full search is
+        needed.
+        """
+        now, after, look = y.copy(), np.empty(y.size), np.empty(3)
+        data = np.ascontiguousarray(d, dtype=float)
+        call = bound(self.round, (now, data), (after, look))
+        for _ in range(ROUNDS):
+            call()
+            first, second, guard = look.tolist()
+            if not (second <= DONE or second <= self.contraction * first):
+                return None
+            now[:] = after
+            if second <= DONE:
+                return now if guard >= 0 else None
+        return None
+
+    @property
+    def c_source(self) -> str:
+        """C of the update, `int symfric_follow(double *y, const double *d)`.
+
+        It returns 0, or 1 and leaves y unchanged. The C of `round` must precede it.
+        """
+        return filled(
+            Path(__file__).with_name("follow.c"), self.round, n=self.round.numel_in(0),
+            rounds=ROUNDS, done=DONE, contraction=self.contraction, name=self.round.name(),
+        )  # fmt: skip
+
+
+def following(system: System) -> Following | None:
+    """Return the update of the algebraic unknowns of `system` after a jump; None if it has none."""
+    if not system.free.any():
+        return None
+    parts = _parts(system)
+    inlined = _round(system, parts, ca.SX)
+    large = inlined.n_instructions() > INLINE
+    contraction = NEARER if system.manifold is None else ANY
+    return Following(_round(system, parts, ca.MX) if large else inlined, contraction)
+
+
+def corrected(system: System) -> ca.Function:
+    """Return (y, d) -> y with its algebraic unknowns after the first correction of a round, in
+    SX.
+    """
+    y, d, parts = system.y, system.d, _parts(system)
+    _, change = parts.solve(parts.pack(parts.entries(y, d)), parts.residual(y, d))
+    return ca.Function("corrected", [y, d], [y + change], {"cse": True})
+
+
+class _Parts(NamedTuple):
+    """Functions of a round.
+
+    Attributes:
+        residual: (y, d) -> g in its rows of y, 0 elsewhere.
+        entries: (y, d) -> entries of W.
+        pack: entries -> factors.
+        solve: (factors, residual) -> s, and its part in y.
+        sizes: (entries, s_1, s_2, y after, inner unknowns) -> their sizes.
+        guard: (factors, y after, d) -> least value that must not be negative.
+    """
+
+    residual: ca.Function
+    entries: ca.Function
+    pack: ca.Function
+    solve: ca.Function
+    sizes: ca.Function
+    guard: ca.Function
+
+
+def _round(system: System, parts: _Parts, kind: Any) -> ca.Function:
+    """Return one round; SX inlines everything, MX keeps the parts as calls."""
+    y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
+    inner = ca.Function("inner", [system.y, system.d], [_inner(system)], {"cse": True})
+    entries = parts.entries(y, d)
+    lu = parts.pack(entries)
+    first, change = parts.solve(lu, parts.residual(y, d))
+    middle = y + change
+    second, change = parts.solve(lu, parts.residual(middle, d))
+    after = middle + change
+    sizes = parts.sizes(entries, first, second, after, inner(y, d))
+    results: Any = [ca.densify(after), ca.densify(ca.vertcat(sizes, parts.guard(lu, after, d)))]
+    if kind is ca.SX:
+        results = ca.cse(results)
+    return ca.Function("symfric_round", [y, d], results, ["y", "d"], ["y_next", "look"])
+
+
+def _parts(system: System) -> _Parts:
+    """Return the Functions of a round."""
+    own, n, rows = slopes(system), system.n, system.algebraic[0]
+    full = own.matrix(system.mass, [i for i in range(n) if i not in rows])
+    order = system.orders.get("tiny", ())
+    kept = list(range(full.size1()))
+    if system.is_semi_explicit and not order:  # the algebraic equations form a block
+        kept = [i for i in kept if i in rows or i >= n]
+    place = {row: k for k, row in enumerate(kept)}
+    W = ca.sparsify(full[kept, kept])
+    lu = factorise(W, [[place[i] for i in group if i in place] for group in own.pivots], order)
+    right, change = ca.SX.sym("right", n), ca.SX(n, 1)
+    s = lu.solve(ca.densify(ca.vertcat(right, ca.SX(full.size1() - n, 1))[kept]))
+    moved = [i for i in kept if i < n]
+    change[moved] = s[: len(moved)]
+    used = np.flatnonzero(ca.which_depends(ca.vec(ca.SX(W.nz[:])), own.entries, 1, False)).tolist()
+    symbols, values = own.entries[used], own.values(system.y, system.d)[used]
+    return _Parts(
+        _residual(system),
+        ca.Function("slopes_g", [system.y, system.d], [values], {"cse": True}),
+        ca.Function("pack_g", [symbols], [lu.packed], {"cse": True}),
+        ca.Function("solve_g", [lu.symbols, right], [s, change]),
+        _sizes(system, W, symbols, moved, [place[i] for i in rows]),
+        _guard(system, lu, place),
+    )
+
+
+def _sizes(
+    system: System, W: ca.SX, symbols: ca.SX, moved: Sequence[int], rows: Sequence[int]
+) -> ca.Function:
+    """Return (entries, s_1, s_2, y, inner unknowns) -> largest |W| |s| / |W| |z|, for s_1 and
+    s_2.
+    """
+    count, inner = W.size1(), W.size1() - len(moved)
+    first, second = ca.SX.sym("s_1", count), ca.SX.sym("s_2", count)
+    y, hidden = ca.SX.sym("y", system.n), ca.SX.sym("l", inner)
+    size = ca.fabs(W[list(rows), :])
+    unknowns = ca.vertcat(y[list(moved)], hidden + (first + second)[len(moved) :, 0])
+    scale = size @ ca.fabs(unknowns)
+    # in a mechanism, values that are zero (out of its plane) are rounding of the others
+    scale += 1e-300 if system.manifold is None else FAINT * ca.mmax(scale) + 1e-300
+    found = [ca.mmax((size @ ca.fabs(s)) / scale) for s in (first, second)]
+    arguments = [symbols, first, second, y, hidden]
+    return ca.Function("sizes_g", arguments, [ca.vertcat(*found)], {"cse": True})
+
+
+def _guard(system: System, lu: SymbolicLU, place: dict[int, int]) -> ca.Function:
+    """Return (factors, y, d) -> a value, negative if friction has jammed or a bearing pulls.
+
+    The loop from normal forces over friction and reactions back to them is I - dN/dN: its
+    determinant has the sign of all others together, and no pivot of it may fall below `SHOCK`.
+    """
+    manifold, conditions = system.manifold, [NONE]
+    if manifold is not None:
+        conditions.append(manifold.pressing(system.y, system.d) + PULLING)
+        if loop := [place[i] for i in system.algebraic[0][manifold.loop :]]:
+            conditions += [(-1) ** manifold.n * lu.sign(), lu.pivots(loop) - SHOCK]
+    together = ca.vertcat(*conditions)
+    least = ca.mmin(together) if together.numel() else ca.SX(1)
+    return ca.Function("guard_g", [lu.symbols, system.y, system.d], [least], {"cse": True})

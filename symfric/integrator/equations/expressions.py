@@ -13,8 +13,7 @@ slope at 0. Limits: numbers that CasADi simplifies away are not lifted: sin(t) f
 0 sin(t).
 
 Step limit: at equilibrium steps grow until they are longer than a future pulse, and no stage falls
-on
-it. A function of time is known in advance and cheap, so it is sampled on a grid, and the span is
+on it. A function of time is known in advance and cheap, so it is sampled on a grid, and the span is
 halved until each piece is straight. Where the length of pieces changes much from one to the next, a
 step has to end. A sine has pieces of one length and no such times.
 """
@@ -23,7 +22,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from math import isfinite
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -55,13 +54,15 @@ def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list
         else:
             operands = [work[i] for i in at]
             value = rule(k, operands)
-            if value is None:
-                new = ca.SX.unary if len(at) == 1 else ca.SX.binary
-                value = new(operation, *operands)
-            work[to[0]] = value
+            work[to[0]] = applied(operation, operands) if value is None else value
     return [
         ca.SX(function.sparsity_out(i), ca.vertcat(ca.SX(0, 1), *v)) for i, v in enumerate(found)
     ]
+
+
+def applied(operation: int, operands: list[ca.SX]) -> ca.SX:
+    """Apply one CasADi operation."""
+    return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
 
 
 MIDDLE = 0.7
@@ -122,41 +123,28 @@ def divided_once(expression: ca.SX) -> ca.SX:
     """Return `expression` with constant or repeated divisors inverted once."""
     arguments = ca.symvar(expression)
     function = ca.Function("f", arguments, [expression])
-    count = function.n_instructions()
-    operations = [function.instruction_id(k) for k in range(count)]
-    if ca.OP_DIV not in operations:
+    made, divisors = dict[int, int](), dict[int, int]()
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        if operation == ca.OP_DIV:
+            divisors[k] = made[function.instruction_input(k)[1]]
+        if operation != ca.OP_OUTPUT:
+            made[function.instruction_output(k)[0]] = k
+    if not divisors:
         return expression
-    operands = [function.instruction_input(k) for k in range(count)]
-    places = [function.instruction_output(k) for k in range(count)]
-    divisors = _divisors(operations, operands, places)
-    often = Counter(divisors.values())
-    inverse: dict[int, ca.SX] = {}
+    often, inverse = Counter(divisors.values()), dict[int, ca.SX]()
 
     def rule(k: int, operands: list[ca.SX]) -> ca.SX | None:
-        if k not in divisors:
+        divisor = divisors.get(k)
+        if divisor is None:
             return None
-        divisor = divisors[k]
-        if often[divisor] == 1 and operations[divisor] != ca.OP_CONST:
+        if often[divisor] == 1 and function.instruction_id(divisor) != ca.OP_CONST:
             return None
         if divisor not in inverse:
             inverse[divisor] = reciprocal(operands[1])
         return operands[0] * inverse[divisor]
 
     return rewritten(function, arguments, rule)[0]
-
-
-def _divisors(
-    operations: list[int], operands: list[list[int]], places: list[list[int]]
-) -> dict[int, int]:
-    """Return number of each division -> number of the instruction that made its divisor."""
-    made: dict[int, int] = {}
-    found: dict[int, int] = {}
-    for k, operation in enumerate(operations):
-        if operation == ca.OP_DIV:
-            found[k] = made[operands[k][1]]
-        if operation != ca.OP_OUTPUT:
-            made[places[k][0]] = k
-    return found
 
 
 Array = NDArray[np.float64]
@@ -174,48 +162,29 @@ def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Ar
         known: column of symbols.
         name: prefix of the new symbols.
     """
-    as_it_is = expression, ca.SX(0, 1), np.zeros(0)
     function = ca.Function("lift", [known], [expression])
     numbers, symbols = list[float](), list[ca.SX]()
-    work: dict[int, ca.SX | float] = {}
 
     def number(value: float) -> ca.SX:
         numbers.append(value)
         symbols.append(ca.SX.sym(f"{name}_c{len(symbols)}"))
         return symbols[-1]
 
-    def read(place: int) -> ca.SX:
-        value = work[place]
-        return number(value) if isinstance(value, float) and isfinite(value) else ca.SX(value)
+    def read(value: ca.SX) -> ca.SX:
+        return number(float(value)) if value.is_constant() and isfinite(float(value)) else value
 
-    made = ca.SX(expression)
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        places, to = function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_OUTPUT:
-            made = read(places[0])
-        elif op == ca.OP_INPUT:
-            work[to[0]] = ca.SX(known[places[1]])
-        elif op == ca.OP_CONST:
-            work[to[0]] = float(function.instruction_constant(k))
-        elif op == ca.OP_CONSTPOW:
-            work[to[0]] = _applied(op, read(places[0]), ca.SX(work[places[1]]))
-        elif op == ca.OP_TWICE:  # CasADi's form of 2 x
-            two, other = number(2.0), read(places[0])
-            work[to[0]] = two * other
-        elif len(places) in (1, 2) and len(to) == 1:
-            work[to[0]] = _applied(op, *(read(place) for place in places))
-        else:
-            return as_it_is
+    def rule(k: int, operands: list[ca.SX]) -> ca.SX:
+        operation = function.instruction_id(k)
+        if operation == ca.OP_CONSTPOW:
+            return applied(operation, [read(operands[0]), operands[1]])
+        if operation == ca.OP_TWICE:  # CasADi's form of 2 x
+            return number(2.0) * read(operands[0])
+        return applied(operation, [read(operand) for operand in operands])
+
+    made = read(rewritten(function, [known], rule)[0])
     if len(numbers) > MOST_NUMBERS:
-        return as_it_is
+        return expression, ca.SX(0, 1), np.zeros(0)
     return made, ca.vertcat(ca.SX(0, 1), *symbols), np.array(numbers)
-
-
-def _applied(op: int, *arguments: ca.SX) -> ca.SX:
-    """Apply one CasADi operation."""
-    SX = cast(Any, ca.SX)
-    return ca.SX(SX.unary(op, *arguments) if len(arguments) == 1 else SX.binary(op, *arguments))
 
 
 DEPTH = 13
@@ -246,45 +215,30 @@ QUICKEST = 1.0
 count."""
 
 
-def onsets(function: str, t_start: float, t_end: float) -> tuple[float, ...]:
-    """Return times [s] inside the span at which a step has to end for a function of time.
+class Pieces(NamedTuple):
+    """Straight pieces of a function of time.
 
-    The function is a serialised SX. A jump between two grid points may hide a pulse, such as the
-    derivative of a ramp of a picosecond: the middle of such a pulse is one of the times.
+    Attributes:
+        onsets: increasing times [s] inside the span at which a step has to end.
+        pace: length [s] of the shortest pieces, a fiftieth to a hundredth of the period of a sine;
+            inf for a straight line.
     """
-    look = _looked(function, t_start, t_end)
-    if look is None:
-        return ()
-    grid = np.linspace(t_start, t_end, 2**DEPTH + 1)
-    return tuple(sorted((*grid[changes(look.level)].tolist(), *look.pulses)))
 
-
-def pace(function: str, t_start: float, t_end: float) -> float:
-    """Return the length [s] of the shortest straight pieces of a function of time.
-
-    It is a fiftieth to a hundredth of the period of a sine; inf for a straight line.
-    """
-    look = _looked(function, t_start, t_end)
-    halvings = 0.0
-    if look is not None:
-        halvings = float(np.percentile(look.level, 100 - QUICKEST, method="lower"))
-    return (t_end - t_start) / 2.0**halvings if halvings else np.inf
-
-
-class _Look(NamedTuple):
-    """Function of time on the grid: `level` of each interval, and times [s] of short pulses."""
-
-    level: NDArray[np.intp]
-    pulses: tuple[float, ...]
+    onsets: tuple[float, ...] = ()
+    pace: float = np.inf
 
 
 @lru_cache(64)
-def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
-    """Return levels and pulses of a function of time; None for a constant."""
+def pieces(function: str, t_start: float, t_end: float) -> Pieces:
+    """Return the pieces of a function of time, a serialised SX.
+
+    A jump between two grid points may hide a pulse, such as the derivative of a ramp of a
+    picosecond: the middle of such a pulse is one of the onsets.
+    """
     expression = ca.SX.deserialize(function)
     time = ca.symvar(expression)
     if not time:
-        return None
+        return Pieces()
     grid = np.linspace(t_start, t_end, 2**DEPTH + 1)
     columns = Columns(ca.Function("input", time, [ca.densify(expression)]))
 
@@ -294,8 +248,12 @@ def _looked(function: str, t_start: float, t_end: float) -> _Look | None:
 
     values = values_at(grid)
     level = levels(values)
-    peaks = (*grid[_peaks(level, values)].tolist(), *pulses(values_at, grid, values))
-    return _Look(level, peaks)
+    places = [*grid[changes(level)].tolist(), *grid[_peaks(level, values)].tolist()]
+    halvings = float(np.percentile(level, 100 - QUICKEST, method="lower"))
+    return Pieces(
+        tuple(sorted((*places, *pulses(values_at, grid, values)))),
+        (t_end - t_start) / 2.0**halvings if halvings else np.inf,
+    )
 
 
 def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> tuple[float, ...]:
@@ -310,8 +268,10 @@ def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> t
     before, after = values[jumps], values[jumps + 1]
     near = STRAIGHT * np.abs(after - before)
     edges: list[Array] = []
-    for side, (known, unlike) in enumerate(((before, jumps), (after, jumps + 1))):
-        same, other = grid[unlike].copy(), grid[jumps + 1 - side].copy()
+    for known, same, other in (
+        (before, grid[jumps], grid[jumps + 1]),
+        (after, grid[jumps + 1], grid[jumps]),
+    ):
         for _ in range(HALVINGS):
             middle = (same + other) / 2
             alike = np.abs(values_at(middle) - known) <= near
@@ -356,10 +316,8 @@ def levels(values: Array) -> NDArray[np.intp]:
 
 def changes(level: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return grid points at which the level has changed by `LEVELS` since the last such point."""
-    found: list[int] = []
-    last = level[0]
+    found = [0]
     for i in np.flatnonzero(np.diff(level)) + 1:
-        if abs(level[i] - last) >= LEVELS:
+        if abs(level[i] - level[found[-1]]) >= LEVELS:
             found.append(int(i))
-            last = level[i]
-    return np.array(found, dtype=np.intp)
+    return np.array(found[1:], dtype=np.intp)

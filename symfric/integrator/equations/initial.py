@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -22,8 +22,8 @@ ASSEMBLED = 1e-12
 NEAR, CONVERGED = 1e-4, 1e-10
 """Relative Newton steps below which no damping is needed, and below which it has converged."""
 
-MARQUARDT = 200
-"""Iterations of a descent across corners."""
+HALVINGS, MARQUARDT = 12, 200
+"""Lengths that damped Newton tries, and iterations of a descent across corners."""
 LAST_DIGITS = 1e-15
 """Relative change of numbers that are equal to rounding."""
 FLOOR = 10 * float(np.finfo(float).eps)
@@ -90,7 +90,7 @@ def consistent(
         system: whose algebraic equations.
         where: for messages.
         y, d: guess and run data.
-        follow: fast update for mechanisms, tried first (`symfric.integrator.equations.following`).
+        follow: fast update for mechanisms, tried first (`symfric.integrator.equations.blocks`).
 
     Raises:
         ValueError: no solution near the guess.
@@ -115,10 +115,9 @@ def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Arr
     except ValueError:
         if manifold is None or not manifold.applied:
             raise
-        y = _descended(system, y, d)
-        return (
-            _solved(system, where, y, d) if _residual(system, y, d) > _rounding(system, y, d) else y
-        )
+    y = _descended(system, y, d)
+    settled = _residual(system, y, d) <= _rounding(system, y, d)
+    return y if settled else _solved(system, where, y, d)
 
 
 def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
@@ -128,8 +127,8 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
         return y
     y, last = y.copy(), np.inf
     for _ in range(ITERATIONS):
-        step, residual = _newton_step(system, y, d)
-        step = along @ step
+        g, J = evaluate_all(system.constraints, y, d)
+        residual, step = float(np.linalg.norm(g)), along @ _newton_steps(g.T, J[None])[0]
         size = float(np.max(np.abs(step) / (np.abs(y[rows]) + 1e-14)))
         if not np.isfinite(size):
             break
@@ -139,14 +138,28 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
                 return y
         elif np.isfinite(last) and residual <= _rounding(system, y, d):
             return y  # the unknown is zero up to rounding
-        elif not _descend(system, y, d, rows, step, residual):
-            break
+        else:
+            start = y[rows].copy()
+            for part in 0.5 ** np.arange(HALVINGS):
+                y[rows] = start - part * step
+                if _residual(system, y, d) < residual:
+                    break
+            else:
+                break
         last = size
     names = listed(system.names[i] for i in rows)
     raise ValueError(
         f"{where}: expected consistent start values, found no solution of the algebraic "
         f"equations for {names} near their start values; give better ones"
     )
+
+
+def _newton_steps(g: Array, J: Array) -> Array:
+    """Return full steps, (members, n); NaN for all if the derivatives of one are singular."""
+    try:
+        return np.linalg.solve(J, g[:, :, None])[:, :, 0].astype(float)
+    except np.linalg.LinAlgError:
+        return np.full(g.shape, np.nan)
 
 
 def _descended(system: System | Equations, y: Array, d: Array) -> Array:
@@ -156,14 +169,13 @@ def _descended(system: System | Equations, y: Array, d: Array) -> Array:
     Where contacts start to stick, their loads change suddenly and by much, with corners in between
     at which damped Newton stalls.
     """
-    (rows, along), y, damping = _moved(system), y.copy(), 1e-3
+    (rows, along), damping = _moved(system), 1e-3
     g, slope = evaluate_all(system.constraints, y, d)
     for _ in range(MARQUARDT):
         scale = np.linalg.norm(slope, axis=0)
         bent = np.vstack([slope, np.sqrt(damping) * np.diag(scale + np.spacing(scale.max()))])
-        step = np.linalg.lstsq(bent, np.vstack([g, np.zeros_like(g)]))[0][:, 0]
         new = y.copy()
-        new[rows] -= along @ step
+        new[rows] -= along @ np.linalg.lstsq(bent, np.vstack([g, np.zeros_like(g)]))[0][:, 0]
         g_new, slope_new = evaluate_all(system.constraints, new, d)
         if np.linalg.norm(g_new) < np.linalg.norm(g):
             y, g, slope, damping = new, g_new, slope_new, damping / 10
@@ -178,6 +190,20 @@ def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:
     """Return the unknowns that algebraic equations may change, and their rows of `free`."""
     rows = np.flatnonzero(system.free.any(axis=1))
     return rows, system.free[rows]
+
+
+def _residual(system: System | Equations, y: Array, d: Array) -> float:
+    return float(np.linalg.norm(evaluate(system.constraints, y, d)))
+
+
+def _rounding(system: System | Equations, y: Array, d: Array) -> float:
+    """Return the change of the residual when the last digits of its arguments change."""
+    here, rng = evaluate(system.constraints, y, d), np.random.default_rng(0)
+    found: list[float] = []
+    for _ in range(4):
+        moved = [a * (1.0 + LAST_DIGITS * rng.choice([-1.0, 1.0], a.shape)) for a in (y, d)]
+        found.append(float(np.linalg.norm(evaluate(system.constraints, *moved) - here)))
+    return max(found)
 
 
 def consistent_many(
@@ -205,8 +231,9 @@ def consistent_many(
     before, last = np.full((2, y.shape[0]), np.inf)
     while todo.size:
         g, J = together([y[todo], d[todo]])
-        norm = np.linalg.norm(g, axis=1)
-        step = _newton_steps(g, J) @ along.T
+        norm, n = np.linalg.norm(g, axis=1), g.shape[1]
+        # CasADi stores column by column
+        step = _newton_steps(g, J.reshape(-1, n, n).transpose(0, 2, 1)) @ along.T
         size = np.max(np.abs(step) / (np.abs(y[np.ix_(todo, rows)]) + 1e-14), axis=1)
         near = size < NEAR
         good = np.isfinite(size) & (near | (norm < before[todo]))
@@ -221,16 +248,6 @@ def consistent_many(
         except ValueError as error:
             failed[m] = str(error)
     return y, failed
-
-
-def _newton_steps(g: Array, J: Array) -> Array:
-    """Return full steps of members; NaN for all if the derivatives of one are singular."""
-    members, n = g.shape
-    matrices = J.reshape(members, n, n).transpose(0, 2, 1)  # CasADi stores column by column
-    try:
-        return np.linalg.solve(matrices, g[:, :, None])[:, :, 0].astype(float)
-    except np.linalg.LinAlgError:
-        return np.full((members, n), np.nan)
 
 
 def _charted(manifold: Manifold, y: Array, d: Array) -> Array:
@@ -262,71 +279,19 @@ def _assembled(
     )
 
 
-def _newton_step(system: System | Equations, y: Array, d: Array) -> tuple[Array, float]:
-    """Return a full Newton step, NaN if the derivatives are singular, and the residual."""
-    g, J = evaluate_all(system.constraints, y, d)
-    residual = float(np.linalg.norm(g))
-    try:
-        return np.linalg.solve(J, g[:, 0]).astype(float), residual
-    except np.linalg.LinAlgError:
-        return np.full(g.shape[0], np.nan), residual
-
-
-def _descend(
-    system: System | Equations,
-    y: Array,
-    d: Array,
-    rows: NDArray[np.intp],
-    step: Array,
-    before: float,
-) -> bool:
-    """Move `rows` along `step`, in place, until the residual shrinks; return False if it never
-    does.
-    """
-    start = y[rows].copy()
-    for part in 0.5 ** np.arange(12):
-        y[rows] = start - part * step
-        if _residual(system, y, d) < before:
-            return True
-    return False
-
-
-def _residual(system: System | Equations, y: Array, d: Array) -> float:
-    return float(np.linalg.norm(evaluate(system.constraints, y, d)))
-
-
-def _rounding(system: System | Equations, y: Array, d: Array) -> float:
-    """Return the change of the residual when the last digits of its arguments change."""
-    here, rng = evaluate(system.constraints, y, d), np.random.default_rng(0)
-
-    def touched(a: Array) -> Array:
-        return a * (1.0 + LAST_DIGITS * rng.choice([-1.0, 1.0], a.shape))
-
-    moved = (evaluate(system.constraints, touched(y), touched(d)) - here for _ in range(4))
-    return max(float(np.linalg.norm(change)) for change in moved)
-
-
 LONGEST_FIRST = 1e-5
 """Limit of the first step [s], however long the run; no machine moves much within it."""
 
 
-def first_step(span: float, t_start: float = 0.0) -> float:
-    """Return a first step [s] so small that the controller decides: it grows eightfold per step."""
-    return max(min(1e-8 * span, LONGEST_FIRST), SURE * abs(t_start))
+def first_step(span: float | Array, t_start: float = 0.0) -> Any:
+    """Return a first step [s], or one for each span, so small that the controller decides: it grows
+    eightfold per step.
+    """
+    return np.maximum(np.minimum(1e-8 * span, LONGEST_FIRST), SURE * abs(t_start))
 
 
-def first_steps(spans: Array, t_start: float = 0.0) -> Array:
-    """Return `first_step` of many spans, with the same bits."""
-    return np.maximum(np.minimum(1e-8 * spans, LONGEST_FIRST), SURE * abs(t_start))
-
-
-def smallest_step(span: float) -> float:
-    """Return the step [s] below which a run stops if t is near 0; elsewhere rounding of t
-    limits it.
+def smallest_step(span: float | Array) -> Any:
+    """Return the step [s], or one for each span, below which a run stops if t is near 0; elsewhere
+    rounding of t limits it.
     """
     return 1e-15 * first_step(span)
-
-
-def smallest_steps(spans: Array) -> Array:
-    """Return `smallest_step` of many spans, with the same bits."""
-    return 1e-15 * first_steps(spans)

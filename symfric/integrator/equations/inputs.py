@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import brief
 from symfric.foundation.variable import stacked, strays
-from symfric.integrator.equations.expressions import lifted, onsets, pace
+from symfric.integrator.equations.expressions import Pieces, lifted, pieces
 from symfric.model import Model
 
 Array = NDArray[np.float64]
-REMEMBERED = 16
-"""Input structures cached per model; the oldest is dropped first."""
+RAMP = "linear"
+"""Structure of an input that is linear in time on each interval."""
 NO_ROWS = ca.SX(0, 1)
 """Empty column, made once."""
 
@@ -165,20 +164,21 @@ def input_data(
     if times := [np.asarray(s.t) for s in signals.values() if isinstance(s, Sampled)]:
         inner = np.concatenate(times)
         breaks = np.unique(np.append(breaks, inner[(inner > t_start) & (inner < t_end)]))
-    parts = [_part(model, v, signals.get(v.name, v.start), breaks) for v in model.u]
-    expression, data = _written(model, parts)
+    begin = ca.SX.sym("t_k")
+    parts = [_part(model, v, signals.get(v.name, v.start), breaks, begin) for v in model.u]
     values = [row for part in parts for row in part.values]
-    if any(part.ramps for part in parts):
-        values = [*values, breaks[:-1]]
+    data = [symbols for part in parts for symbols in part.data]
+    if any(part.key == RAMP for part in parts):
+        values, data = [*values, breaks[:-1]], [*data, begin]
     found = InputData(
-        expression,
-        data,
+        stacked(part.expression for part in parts),
+        stacked(data),
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(part.key for part in parts),
-        min((part.pace for part in parts), default=np.inf),
+        min((part.pieces.pace for part in parts), default=np.inf),
     )
-    onsets = [t for part in parts for t in part.onsets]
+    onsets = [t for part in parts for t in part.pieces.onsets]
     return found.stopping_at(onsets) if onsets else found
 
 
@@ -195,24 +195,8 @@ def paced(inputs: InputData, model: Model) -> InputData:
         frozen = ca.substitute(model.residual[of_time], others, ca.SX(still))
         rows = tuple(ca.SX.serialize(row) for row in ca.vertsplit(frozen)) if of_time else ()
         model.memory["rows of time"] = rows
-    times = [t for row in rows for t in onsets(row, *inputs.span)]
+    times = [t for row in rows for t in pieces(row, *inputs.span).onsets]
     return inputs.stopping_at(times) if times else inputs
-
-
-def _written(model: Model, parts: list[_Part]) -> tuple[ca.SX, ca.SX]:
-    """Return expression and data of inputs of this structure, cached with the model."""
-    known: dict[Hashable, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
-    key = tuple(part.key for part in parts)
-    found = known.get(key)
-    if found is None:
-        begin = ca.SX.sym("t_k")
-        rows = [part.write(begin) for part in parts]
-        data = [symbol for _, own in rows for symbol in own]
-        if any(part.ramps for part in parts):
-            data.append(begin)
-        found = stacked(row for row, _ in rows), stacked(data)
-        found = remember(known, key, found, REMEMBERED)
-    return found
 
 
 @lru_cache
@@ -221,39 +205,28 @@ def _undriven(t_start: float, t_end: float) -> InputData:
     return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
-Written = tuple[ca.SX, tuple[ca.SX, ...]]
-"""Input in terms of time and data, and these data."""
+class _Part(NamedTuple):
+    """One input.
 
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """One input: its expression, the values of its data on the intervals, its structure.
-
-    `write` takes the symbol for the start of an interval, from which `ramps` measure time. `onsets`
-    are times at which a step has to end, so as not to miss a pulse; `pace` is the length [s] of its
-    shortest straight pieces.
+    Attributes:
+        key: its structure.
+        expression: in terms of time and data; a `RAMP` counts time from the start of an interval.
+        data: symbols, scalars or columns.
+        values: of the data on the intervals.
+        pieces: of a function of time.
     """
 
-    write: Callable[[ca.SX], Written]
     key: str
+    expression: ca.SX
+    data: tuple[ca.SX, ...]
     values: tuple[Array, ...]
-    ramps: bool = False
-    onsets: tuple[float, ...] = ()
-    pace: float = np.inf
+    pieces: Pieces = Pieces()
 
 
-def _part(model: Model, variable: Variable, signal: Any, breaks: Array) -> _Part:
-    """Build the input `variable`."""
+def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
+    """Return the input `variable`; `begin` is the start of an interval."""
     where, name = f"input '{variable.name}'", variable.name
-
-    def held(_: ca.SX) -> Written:
-        c = ca.SX.sym(f"{name}_k")
-        return c, (c,)
-
-    def ramp(begin: ca.SX) -> Written:
-        c, slope = ca.SX.sym(f"{name}_k"), ca.SX.sym(f"{name}_dot")
-        return c + slope * (model.t - begin), (c, slope)
-
+    held = ca.SX.sym(f"{name}_k")
     if isinstance(signal, Sampled):
         if signal.rows is not None:
             raise ValueError(
@@ -261,34 +234,30 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array) -> _Part
                 "use these with simulate_many"
             )
         value, rise = signal.coefficients(breaks)
-        if rise.any():
-            return _Part(ramp, "linear", (value, rise), ramps=True)
-        return _Part(held, "hold", (value,))
+        if not rise.any():
+            return _Part("hold", held, (held,), (value,))
+        slope = ca.SX.sym(f"{name}_dot")
+        return _Part(RAMP, held + slope * (model.t - begin), (held, slope), (value, rise))
     if not callable(signal):
         # a number is data too: a new value must not need a new integrator
         number = checks.number(where, signal, hint=KINDS)
-        return _Part(held, "hold", (np.full(breaks.size - 1, number),))
-    expression = _evaluated(where, signal, model)
-    look = _of_time(expression, model), float(breaks[0]), float(breaks[-1])
-    own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
-    made, data, numbers = lifted(expression, own, name)
+        return _Part("hold", held, (held,), (np.full(breaks.size - 1, number),))
+    others = stacked(model.vector(letter) for letter in "xzp")
+    expression = _evaluated(where, signal, model, ca.vertcat(model.t, others))
+    of_time = ca.substitute(expression, others, ca.SX.zeros(others.numel()))
+    made, data, numbers = lifted(expression, ca.vertcat(model.t, others), name)
     # key by the structure of the expression, not by the function that wrote it: variables that it
     # refers to may have changed since, and its numbers are data
     key = sha256(ca.SX.serialize(made).encode()).hexdigest()
     values = tuple(np.full(breaks.size - 1, number) for number in numbers)
-    return _Part(lambda _: (made, (data,)), key, values, onsets=onsets(*look), pace=pace(*look))
+    found = pieces(ca.SX.serialize(of_time), float(breaks[0]), float(breaks[-1]))
+    return _Part(key, made, (data,), values, found)
 
 
-def _of_time(expression: ca.SX, model: Model) -> str:
-    """Return `expression` with states and parameters at zero, serialised: its dependence on
+def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model, known: ca.SX) -> ca.SX:
+    """Return the expression in `known` symbols that the function `signal` returns for the symbolic
     time.
     """
-    others = stacked(model.vector(letter) for letter in "xzp")
-    return ca.SX.serialize(ca.substitute(expression, others, ca.SX.zeros(others.numel())))
-
-
-def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.SX:
-    """Return the expression that the function `signal` returns for the symbolic time."""
     what = "a function of the symbolic time that returns one expression"
     hint = (
         "write casadi.sin(t) for math.sin(t), casadi.if_else(t > 1, a, b) for a Python if, "
@@ -300,18 +269,16 @@ def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.S
         made = signal(model.t)
     except (TypeError, ArithmeticError, LookupError, AttributeError, RuntimeError) as error:
         reason = (str(error).strip().splitlines() or [""])[0].rpartition(".cpp:")[2]
-        said = f"{type(error).__name__} ({reason.lstrip('0123456789: ')})"
-        raise ValueError(f"{where}: expected {what}, got {said}; {hint}") from error
+        failed = f"{type(error).__name__} ({reason.lstrip('0123456789: ')})"
+        raise ValueError(f"{where}: expected {what}, got {failed}; {hint}") from error
     number = checks.as_number(made)
     if number is not None and not np.isfinite(number):
         raise ValueError(f"{where}: expected {what}, got {number}; {hint}")
     if number is None and not (isinstance(made, ca.SX) and made.is_scalar()):
         raise checks.refused(where, what, made, hint)
-    expression = ca.SX(made)
-    own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
-    if other := strays(expression, own):
+    if other := strays(made, known):
         raise ValueError(f"{where}: expected an expression in time alone, got {', '.join(other)}")
-    return expression
+    return ca.SX(made)
 
 
 def rate_of(signal: Input) -> Input:

@@ -12,11 +12,9 @@ Every accepted step ends on the constraints:
 
 Limits: impacts are excluded, and so are tangential shocks, in which friction makes the reactions
 grow a thousandfold (`SHOCK`, Painleve): both end a run. A step across a position in which phi_q
-loses
-rank is rejected, because the motion beyond is not determined; there det(phi_q(q1) phi_q(q0)')
-changes
-its sign. Two such positions within one step, and a step that ends on another branch, are not
-detected.
+loses rank is rejected, because the motion beyond is not determined; there det(phi_q(q1) phi_q(q0)')
+changes its sign. Two such positions within one step, and a step that ends on another branch, are
+not detected.
 """
 
 from dataclasses import dataclass
@@ -41,10 +39,9 @@ PULLING = 1e-3
 SHOCK = 1e-3
 """Smallest pivot of I - dN/dN that is accepted; without friction it is 1. Its inverse is the factor
 by which friction multiplies a load on a bearing. As it approaches 0 that load stops the sliding
-within
-microseconds, while the pivot falls exponentially with the sliding velocity: without this limit the
-tolerance would decide which runs pass. Moving machines stay above 0.4, near jamming above 0.02
-(`tests/symfric/stress/test_jamming.py`).
+within microseconds, while the pivot falls exponentially with the sliding velocity: without this
+limit the tolerance would decide which runs pass. Moving machines stay above 0.4, near jamming above
+0.02 (`tests/symfric/stress/test_jamming.py`).
 """
 ITERATIONS, NEARBY = (4, 3), (2, 2)
 """Newton iterations with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
@@ -98,27 +95,19 @@ class Manifold:
         return len(self.basis) > 0
 
 
-def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+def holonomic_columns(model: Model, mechanics: Holonomic) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
     """Return unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
 
     V is a basis of the tangent space of the constraints, column by column, at the start of the
     previous step; it has no rates. Without constraints it has no rows.
     """
-    mechanics, x = model.holonomic, model.vector("x")
-    if mechanics is None:
-        raise ValueError(f"model '{model.name}': expected a holonomic model")
-    n = mechanics.n
+    n, x, V = mechanics.n, model.vector("x"), ca.SX.sym("V", _of_basis(mechanics))
     f = ca.vertcat(x[n : 2 * n], mechanics.a, mechanics.rates, mechanics.implicit)
-    names = [v.name for v in model.x]
-    names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
-    V = ca.SX.sym("V", _of_basis(mechanics))
+    names = [v.name for v in model.x] + [f"{v.name}_dot" for v in model.x[n : 2 * n]]
+    names += [v.name for v in model.z] + [f"V_{i}" for i in range(V.numel())]
     mass = ca.diagcat(ca.SX.eye(x.numel()), ca.SX(*2 * [n + len(model.z)]), ca.SX.eye(V.numel()))
-    return (
-        ca.vertcat(x, mechanics.a, model.vector("z"), V),
-        ca.vertcat(f, ca.SX.zeros(V.numel())),
-        mass,
-        [*names, *(f"V_{i}" for i in range(V.numel()))],
-    )
+    y = ca.vertcat(x, mechanics.a, model.vector("z"), V)
+    return y, ca.vertcat(f, ca.SX.zeros(V.numel())), mass, names
 
 
 def _of_basis(mechanics: Holonomic) -> int:
@@ -127,38 +116,37 @@ def _of_basis(mechanics: Holonomic) -> int:
     return n * (n - m) if m and mechanics.index == 0 else 0
 
 
-def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
+def manifold(
+    model: Model, mechanics: Holonomic, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX
+) -> Manifold:
     """Return the constraints of a holonomic model as Functions of the unknowns of its system.
 
     Args:
-        model: its equations.
+        model, mechanics: its equations.
         y, d: unknowns and constants of a run.
         f: right-hand sides.
         u: inputs in terms of y and d.
     """
-    mechanics = model.holonomic
-    if mechanics is None:
-        raise ValueError(f"model '{model.name}': expected a holonomic model")
-    n, nx = mechanics.n, len(model.x)
-    q, qd, phi = y[:n], y[n : 2 * n], mechanics.phi
-    rate = ca.jtimes(phi, q, qd) + ca.jacobian(phi, model.t)
-    fixed = ca.vertcat(model.t, d)
-    at = ca.Function("at", [q, qd, fixed], [phi, ca.jacobian(phi, q), rate])
-    m = phi.numel()
+    n, nx, phi = mechanics.n, len(model.x), mechanics.phi
+    q, qd, fixed, m = y[:n], y[n : 2 * n], ca.vertcat(model.t, d), phi.numel()
+    J, rate = ca.jacobian(phi, q), ca.jtimes(phi, q, qd) + ca.jacobian(phi, model.t)
+    at = ca.Function("at", [q, qd, fixed], [phi, rate])
+    lu = factorise(ca.sparsify(J @ J.T), [range(m)])
+
+    def across(defect: ca.SX) -> ca.SX:
+        return J.T @ lu.inserted(lu.solve(defect))[0]
 
     def projection(name: str, iterations: tuple[int, int]) -> ca.Function:
-        on = ca.vertcat(*_projected(at, q, qd, fixed, iterations), y[2 * n :]) if m else y
-        return ca.Function(name, [y, d], [on], {"cse": True})
+        on = [q, qd]
+        for i, count in enumerate(iterations if m else ()):
+            for _ in range(count):
+                on[i] = on[i] - across(at.call([*on, fixed])[i])
+        return ca.Function(name, [y, d], [ca.vertcat(*on, y[2 * n :])], {"cse": True})
 
     algebraic = list(range(nx, nx + n + len(model.z)))
-    J = ca.jacobian(f[algebraic], y[algebraic])
-    slope = ca.Function("slope", [y, d], [J])
-    here, before = (
-        ca.Function("here", [y, d], [at.call([q, qd, fixed])[1]]),
-        ca.SX.sym("y0", y.numel()),
-    )
+    before, here = ca.SX.sym("y0", y.numel()), ca.Function("here", [y, d], [J])
     turned = factorise(ca.sparsify(here(y, d) @ here(before, d).T), [range(m)])
-    branch = ca.substitute(turned.sign(), turned.packed_symbol, turned.packed)
+    branch = turned.inserted(turned.sign())
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
     return Manifold(
         projection("project", ITERATIONS),
@@ -169,28 +157,11 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
         nx,
         mechanics.applied,
         range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
-        slope,
-        ca.Function("branch", [before, y, d], [branch], {"cse": True}),
+        ca.Function("slope", [y, d], [ca.jacobian(f[algebraic], y[algebraic])]),
+        ca.Function("branch", [before, y, d], branch, {"cse": True}),
         ca.Function("pressing", [y, d], [ca.densify(pressing)]),
         mechanics.pressed,
     )
-
-
-def _projected(
-    at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX, iterations: tuple[int, int]
-) -> tuple[ca.SX, ca.SX]:
-    """Return positions and velocities on the constraints near q and qd."""
-    _, J, _ = at(q, qd, d)
-    lu = factorise(ca.sparsify(J @ J.T), [range(J.size1())])
-
-    def across(defect: ca.SX) -> ca.SX:
-        return J.T @ ca.substitute(lu.solve(defect), lu.packed_symbol, lu.packed)
-
-    for _ in range(iterations[0]):
-        q = q - across(at(q, qd, d)[0])
-    for _ in range(iterations[1]):
-        qd = qd - across(at(q, qd, d)[2])
-    return q, qd
 
 
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
@@ -206,17 +177,11 @@ def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
     if not manifold.pressed:
         return ""
     limit = PULLING if margin > 0.0 else -PULLING
-    values = evaluate(manifold.pressing, y, d)
-    for share, what in zip(values, manifold.pressed, strict=True):
+    for share, what in zip(evaluate(manifold.pressing, y, d), manifold.pressed, strict=True):
         if share < limit:
-            if abs(share) <= PULLING:
-                return (
-                    f"the {what} falls to zero; below, it would pull, and its friction would drive"
-                )
-            return (
-                f"the {what} falls below zero ({share:.3g} times its typical size): it would "
-                "pull, and its friction would drive"
-            )
+            how = f"below zero ({share:.3g} times its typical size): it"
+            how = "to zero; below, it" if abs(share) <= PULLING else how
+            return f"the {what} falls {how} would pull, and its friction would drive"
     return ""
 
 

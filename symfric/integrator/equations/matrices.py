@@ -16,7 +16,7 @@ matrix at once, from any row and column, with least fill (Markowitz).
 from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -24,105 +24,118 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import reciprocal
 
+Array = NDArray[np.float64]
 Order = tuple[tuple[int, int], ...]
 """(row, column) of each pivot."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class SymbolicLU:
+class Pivot(NamedTuple):
+    """One elimination.
+
+    Attributes:
+        row, column: of the pivot.
+        others: columns of the remaining entries of its row.
+        below: rows that are eliminated with it.
+        at: index in the packed factors of its inverse, which its row and then the multipliers of
+            its column follow.
+    """
+
+    row: int
+    column: int
+    others: tuple[int, ...]
+    below: tuple[int, ...]
+    at: int
+
+
+class SymbolicLU(NamedTuple):
     """Factors of a sparse matrix in elimination order.
 
     Attributes:
-        packed: all factor entries as a column: for each pivot its inverse, then its row, then the
-            multipliers of its column.
-        order: (row, column) of each pivot.
-        rows: per pivot, the columns of the remaining entries of its row.
-        columns: per pivot, the rows that are eliminated with it.
+        packed: all factor entries as a column.
+        symbols: for these; results of the methods are in terms of them.
+        eliminations: one for each pivot.
     """
 
     packed: ca.SX
-    order: Order
-    rows: tuple[tuple[int, ...], ...]
-    columns: tuple[tuple[int, ...], ...]
-    packed_symbol: ca.SX
+    symbols: ca.SX
+    eliminations: tuple[Pivot, ...]
+
+    @property
+    def order(self) -> Order:
+        """(row, column) of each pivot."""
+        return tuple((pivot.row, pivot.column) for pivot in self.eliminations)
 
     def sign(self, leading: int | None = None) -> ca.SX:
-        """Return the sign of the determinant, in terms of `packed_symbol`.
+        """Return the sign of the determinant.
 
         Args:
             leading: only of the block that this many first pivots eliminate, whose rows and columns
-            are
-                the same; all by default.
+                are the same; all by default.
         """
-        order = self.order[:leading]
-        sign, at = ca.SX(_parity(dict(order))), 0
-        for others, below in zip(self.rows[:leading], self.columns[:leading], strict=True):
-            sign = sign * ca.sign(self.packed_symbol[at])
-            at += 1 + len(others) + len(below)
+        pivots = self.eliminations[:leading]
+        rows, columns = (np.argsort(np.argsort([p[i] for p in pivots])) for i in (0, 1))
+        sign = ca.SX(round(np.linalg.det(np.eye(len(pivots))[rows][:, columns])))
+        for pivot in pivots:
+            sign = sign * ca.sign(self.symbols[pivot.at])
         return sign
 
     def pivots(self, rows: Container[int]) -> ca.SX:
-        """Return the pivots of `rows` in elimination order, in terms of `packed_symbol`."""
-        found, at = [ca.SX(0, 1)], 0
-        for (row, _), others, below in zip(self.order, self.rows, self.columns, strict=True):
-            if row in rows:
-                found.append(1 / self.packed_symbol[at])
-            at += 1 + len(others) + len(below)
-        return ca.vertcat(*found)
+        """Return the pivots of `rows` in elimination order."""
+        found = (1 / self.symbols[p.at] for p in self.eliminations if p.row in rows)
+        return ca.vertcat(ca.SX(0, 1), *found)
 
     def solve(self, right: ca.SX) -> ca.SX:
-        """Return x with A x = right, in terms of `packed_symbol` in place of the factors."""
-        packed = self.packed_symbol
-        b = [right[i] for i in range(len(self.order))]
-        rows: list[tuple[ca.SX, list[tuple[int, ca.SX]]]] = []
-        at = 0
-        for (row, _), others, below in zip(self.order, self.rows, self.columns, strict=True):
-            rows.append((packed[at], [(c, packed[at + 1 + i]) for i, c in enumerate(others)]))
-            at += 1 + len(others)
-            for r in below:
-                b[r] = b[r] - packed[at] * b[row]
-                at += 1
+        """Return x with A x = right."""
+        packed, b = self.symbols, ca.vertsplit(right)
+        for row, _, others, below, at in self.eliminations:
+            for k, r in enumerate(below, start=at + 1 + len(others)):
+                b[r] = b[r] - packed[k] * b[row]
         x = [ca.SX(0)] * len(b)
-        for k in range(len(b) - 1, -1, -1):
-            (row, column), (inverse, entries) = self.order[k], rows[k]
+        for row, column, others, _, at in reversed(self.eliminations):
             value = b[row]
-            for c, entry in entries:
-                value = value - entry * x[c]
-            x[column] = value * inverse
+            for k, c in enumerate(others, start=at + 1):
+                value = value - packed[k] * x[c]
+            x[column] = value * packed[at]
         return ca.vertcat(ca.SX(0, 1), *x)
+
+    def solver(self, name: str) -> ca.Function:
+        """Return (factors, right) -> x as a Function."""
+        right = ca.SX.sym("right", len(self.eliminations))
+        return ca.Function(name, [self.symbols, right], [self.solve(right)])
+
+    def inserted(self, *expressions: ca.SX) -> list[ca.SX]:
+        """Return expressions of the factors with `packed` in place of the symbols."""
+        return ca.substitute(list(expressions), [self.symbols], [self.packed])
 
 
 def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order = ()) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
     Pivots are chosen once, at build time: those of `order`, if given. Otherwise the rows of each
-    group
-    pivot on the diagonal, group by group, within a group by least fill (Markowitz): differential
-    equations, whose pivot 1/(gamma h) dominates for small steps; a mass matrix; constraints, whose
-    pivot is the definite Schur complement of the mass matrix before. Rows in no group come last and
-    pivot anywhere; `symfric.integrator.methods.method` checks numerically if that is stable.
+    group pivot on the diagonal, group by group, within a group by least fill (Markowitz):
+    differential equations, whose pivot 1/(gamma h) dominates for small steps; a mass matrix;
+    constraints, whose pivot is the definite Schur complement of the mass matrix before. Rows in no
+    group come last and pivot anywhere; `symfric.integrator.methods.method` checks numerically if
+    that is stable.
 
     Raises:
         ValueError: structurally singular.
     """
     n = matrix.size1()
     rows: list[dict[int, ca.SX]] = [{} for _ in range(n)]
+    holders: list[set[int]] = [set() for _ in range(n)]
     for k, (i, j) in enumerate(zip(*matrix.sparsity().get_triplet(), strict=True)):
         rows[i][j] = matrix.nz[k]
-    holders: list[set[int]] = [set() for _ in range(n)]
-    for i, row in enumerate(rows):
-        for j in row:
-            holders[j].add(i)
+        holders[j].add(i)
     grouped = [set(group) for group in groups]
     grouped.append(set(range(n)).difference(*grouped))
-    steps: list[tuple[int, int, tuple[int, ...], tuple[int, ...]]] = []
-    packed: list[ca.SX] = []
+    eliminations, packed = list[Pivot](), list[ca.SX]()
     for k in range(n):
         row, column = order[k] if order else _pivot(rows, holders, grouped)
         holders[column].discard(row)
         inverse = reciprocal(rows[row].pop(column))
         others, below = tuple(rows[row]), tuple(sorted(holders[column]))
+        eliminations.append(Pivot(row, column, others, below, len(packed)))
         for c in others:
             holders[c].discard(row)
         packed += [inverse, *rows[row].values()]
@@ -133,14 +146,8 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order 
                 update = factor * value
                 rows[r][c] = rows[r][c] - update if c in rows[r] else -update
                 holders[c].add(r)
-        steps.append((row, column, others, below))
-    return SymbolicLU(
-        ca.vertcat(ca.SX(0, 1), *packed),
-        tuple((row, column) for row, column, _, _ in steps),
-        tuple(others for _, _, others, _ in steps),
-        tuple(below for _, _, _, below in steps),
-        ca.SX.sym("lu", len(packed)),
-    )
+    column = ca.vertcat(ca.SX(0, 1), *packed)
+    return SymbolicLU(column, ca.SX.sym("lu", len(packed)), tuple(eliminations))
 
 
 def _pivot(
@@ -170,17 +177,6 @@ def _pivot(
     )
 
 
-def _parity(columns: dict[int, int]) -> int:
-    """Return the sign of the permutation row -> column."""
-    sign, left = 1, dict(columns)
-    while left:
-        start, row = left.popitem()
-        while row != start:
-            row, sign = left.pop(row), -sign
-    return sign
-
-
-Array = NDArray[np.float64]
 VANISHES = 1e-11
 """Remaining size of an entry, with rows and columns scaled near 1, that counts as zero."""
 ROUNDS = 4
@@ -193,13 +189,12 @@ def echelon(A: Array) -> tuple[list[int], Array]:
     Uses elimination with complete pivoting of scaled rows and columns.
     """
     left, unit = equilibrated(A)
-    pivots: list[int] = []
-    done: list[int] = []
+    pivots, done = list[int](), list[int]()
     for _ in range(min(A.shape)):
-        open_rows = [i for i in range(A.shape[0]) if i not in done]
-        row, column = np.unravel_index(np.argmax(np.abs(left[open_rows])), left[open_rows].shape)
-        row, column = open_rows[int(row)], int(column)
-        if abs(left[row, column]) <= VANISHES:
+        size = np.abs(left)
+        size[done] = -1.0
+        row, column = (int(i) for i in np.unravel_index(np.argmax(size), size.shape))
+        if size[row, column] <= VANISHES:
             break
         left[row] /= left[row, column]
         others = np.arange(A.shape[0]) != row
@@ -221,9 +216,8 @@ def null_space(A: Array) -> Array:
     if (entries.sum(axis=0) <= 1).all() and (entries.sum(axis=1) <= 1).all():
         return np.eye(n)[:, ~entries.any(axis=0)]
     pivots, B = echelon(A)
-    free = [i for i in range(n) if i not in pivots]
-    basis = np.zeros((n, len(free)))
-    basis[free, range(len(free))] = 1.0
+    free = np.delete(np.arange(n), pivots)
+    basis = np.eye(n)[:, free]
     basis[pivots] = -B[:, free]
     return basis
 
@@ -239,8 +233,7 @@ def equilibrated(A: Array) -> tuple[Array, Array]:
             size = np.abs(scaled).max(axis=axis, keepdims=True, initial=0.0)
             size[size == 0.0] = 1.0
             scaled /= size
-            if axis == -2:
-                unit = unit / size[..., 0, :]
+        unit = unit / size[..., 0, :]
     return scaled, unit
 
 
@@ -304,12 +297,24 @@ def backward_error(A: Array, order: Order) -> float:
     return float(omega) if np.isfinite(omega) else np.inf
 
 
+def _eliminated(A: Array, right: Array) -> Array:
+    """Return x with A x = right, by elimination down the diagonal."""
+    n, left = A.shape[-1], np.concatenate([A, right], axis=-1)
+    for k in range(n):
+        left[..., k, k + 1 :] /= left[..., k, k, None]
+        below = left[..., k + 1 :, k, None] * left[..., k, None, k + 1 :]
+        left[..., k + 1 :, k + 1 :] -= below
+    x = left[..., n:]
+    for k in range(n - 1, 0, -1):
+        x[..., :k, :] -= left[..., :k, k, None] * x[..., k, None, :]
+    return x
+
+
 def regular(A: Array) -> bool:
     """Return True if A, with scaled rows and columns, is numerically nonsingular."""
     if not A.size:
         return True
-    scaled, _ = equilibrated(A)
-    values = np.linalg.svd(scaled, compute_uv=False)
+    values = np.linalg.svd(equilibrated(A)[0], compute_uv=False)
     return bool(values[-1] > REGULAR * values[0])
 
 
@@ -326,39 +331,24 @@ def best_order(pattern: NDArray[np.bool_], samples: Array) -> Order:
     rows, columns = np.ones(n, dtype=bool), np.ones(n, dtype=bool)
     order: list[tuple[int, int]] = []
     for _ in range(n):
-        size = np.abs(A) * (rows[:, None] & columns[None, :])
-        largest = size.max(axis=1, keepdims=True)
-        share = np.min(size / np.where(largest > 0.0, largest, 1.0), axis=0)
-        here = left & rows[:, None] & columns[None, :]
+        here = left & rows[:, None] & columns
         if not here.any():
             raise ValueError(
                 "best_order: expected a structurally nonsingular matrix, found no pivot for "
                 f"equations {np.flatnonzero(rows).tolist()}"
             )
+        size = np.abs(A) * (rows[:, None] & columns)
+        largest = size.max(axis=1, keepdims=True)
+        share = np.min(size / np.where(largest > 0.0, largest, 1.0), axis=0)
         fill = np.outer(here.sum(axis=1) - 1, here.sum(axis=0) - 1)
         good = here & (share >= min(THRESHOLD, float(share[here].max())))
         row, column = divmod(int(np.argmin(np.where(good, fill, n * n))), n)
         order.append((row, column))
         rows[row] = columns[column] = False
-        below = np.flatnonzero(rows & left[:, column])
-        across = np.flatnonzero(columns & left[row])
-        place = np.ix_(below, across)
-        left[place] = True
-        pivot = A[:, row, column]
-        inverse = np.where(pivot == 0.0, 0.0, 1 / np.where(pivot == 0.0, 1.0, pivot))
-        factors = A[:, below, column] * inverse[:, None]
-        A[:, place[0], place[1]] -= factors[:, :, None] * A[:, row, across][:, None, :]
+        below, across = np.flatnonzero(rows & left[:, column]), np.flatnonzero(columns & left[row])
+        left[np.ix_(below, across)] = True
+        pivot = A[:, row, column, None]
+        inverse = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot != 0.0)
+        factors = A[:, below, column] * inverse
+        A[:, below[:, None], across] -= factors[:, :, None] * A[:, row, across][:, None, :]
     return tuple(order)
-
-
-def _eliminated(A: Array, right: Array) -> Array:
-    """Return x with A x = right, by elimination down the diagonal."""
-    n, left = A.shape[-1], np.concatenate([A, right], axis=-1)
-    for k in range(n):
-        left[..., k, k + 1 :] /= left[..., k, k, None]
-        below = left[..., k + 1 :, k, None] * left[..., k, None, k + 1 :]
-        left[..., k + 1 :, k + 1 :] -= below
-    x = left[..., n:]
-    for k in range(n - 1, 0, -1):
-        x[..., :k, :] -= left[..., :k, k, None] * x[..., k, None, :]
-    return x

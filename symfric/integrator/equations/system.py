@@ -17,8 +17,7 @@ If dF/dx' is not constant, the rates v = B x' that the equations depend on are u
 with the same combination of equations that never depend on rates.
 
 Limits: the null space of the matrix must not turn with states or parameters. Write such a charge
-q(x)
-as a state of its own, q' = i, 0 = q - q(x).
+q(x) as a state of its own, q' = i, 0 = q - q(x).
 """
 
 from collections.abc import Mapping
@@ -39,6 +38,12 @@ from symfric.integrator.equations.matrices import Order, echelon, null_space
 from symfric.model import Model
 from symfric.model.holonomic import Inner
 
+Array = NDArray[np.float64]
+Columns = tuple[ca.SX, ca.SX, ca.SX, list[str]]
+"""Unknowns without time, right-hand side, mass matrix and names."""
+SAMPLES = 4
+"""Random points at which a non-constant matrix is evaluated."""
+
 
 def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -> None:
     """Check that in M y' = f(y) the equations without rates determine their unknowns.
@@ -49,8 +54,8 @@ def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -
     Raises:
         ValueError: structurally undetermined, whatever the numbers.
     """
-    pattern = ca.DM(mass.sparsity(), 1)
-    still = [i for i in range(f.numel()) if not pattern[i, :].nnz()]
+    pattern, every = ca.DM(mass.sparsity(), 1), range(f.numel())
+    still = [i for i in every if not pattern[i, :].nnz()]
     if not still:
         return
     pattern[still, :] = ca.DM(ca.jacobian_sparsity(f[still], y), 1)
@@ -58,7 +63,6 @@ def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -
     rank = ca.sprank(pattern)
     if rank == f.numel():
         return
-    every = range(f.numel())
     loose = [names[i] for i in every if ca.sprank(pattern[:, [k for k in every if k != i]]) == rank]
     raise ValueError(
         f"{where}: expected algebraic equations that determine {listed(loose)} at given states "
@@ -67,14 +71,7 @@ def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -
     )
 
 
-Array = NDArray[np.float64]
-Equations = tuple[ca.SX, ca.SX, ca.SX, list[str]]
-"""Unknowns without time, right-hand side, mass matrix and names."""
-SAMPLES = 4
-"""Random points at which a non-constant matrix is evaluated."""
-
-
-def implicit_columns(model: Model) -> Equations:
+def implicit_columns(model: Model) -> Columns:
     """Return unknowns, right-hand side, mass matrix and names of a model with a residual."""
     x, z, F = model.vector("x"), model.vector("z"), model.residual
     nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
@@ -102,41 +99,38 @@ def _padded(M: Array, columns: int) -> ca.SX:
     return ca.sparsify(ca.horzcat(ca.SX(ca.DM(M)), ca.SX(M.shape[0], columns - M.shape[1])))
 
 
-def _dependent(M: Array) -> dict[int, dict[int, float]]:
-    """Return dependent rows of M: row -> coefficients of the others; empty for rows of zeros."""
+def _dependent(M: Array) -> dict[int, ca.DM]:
+    """Return dependent rows of M, row -> coefficients of all rows; 0 for itself."""
     rows, B = echelon(M.T)
-    return {
-        i: {rows[k]: float(B[k, i]) for k in np.flatnonzero(B[:, i])}
-        for i in range(M.shape[0])
-        if i not in rows
-    }
+    coefficients = np.zeros((M.shape[0], M.shape[0]))
+    coefficients[:, rows] = B.T
+    return {i: ca.sparsify(ca.DM(coefficients[i])) for i in set(range(M.shape[0])).difference(rows)}
 
 
-def _combined(F: ca.SX, at_rest: ca.SX, dependent: dict[int, dict[int, float]]) -> ca.SX:
+def _combined(F: ca.SX, at_rest: ca.SX, dependent: Mapping[int, ca.DM]) -> ca.SX:
     """Return F, with dependent equations freed of rates; `at_rest` is F without rates."""
     found = ca.SX(F)
     for i, coefficients in dependent.items():
-        found[i] = at_rest[i] - sum(c * at_rest[k] for k, c in coefficients.items())
+        found[i] = at_rest[i] - ca.dot(coefficients, at_rest)
     return found
 
 
 def _samples(model: Model, matrix: ca.SX) -> list[Array]:
     """Return the matrix at random points near the start; random entries if it is not finite."""
     rng = np.random.default_rng(0)
-    columns = {"x": model.vector("x"), "z": model.vector("z")}
-    columns |= {"u": model.vector("u"), "p": model.vector("p")}
-    at = ca.Function("matrix", [model.t, model.xdot, *columns.values()], [ca.densify(matrix)])
-    starts = {"x": model.initial_state(), "u": model.values("u"), "p": model.values("p")}
-    starts["z"] = np.array([float(v.start) for v in model.z])
+    starts = {"x": model.initial_state(), "z": np.array([float(v.start) for v in model.z])}
+    starts |= {"u": model.values("u"), "p": model.values("p")}
+    columns = [model.vector(letter) for letter in starts]
+    at = ca.Function("matrix", [model.t, model.xdot, *columns], [ca.densify(matrix)])
     found: list[Array] = []
     for _ in range(SAMPLES):
-        beside = [
-            starts[name] * rng.uniform(0.9, 1.1, starts[name].size)
-            + 0.1 * model.nominal(name) * rng.uniform(-1, 1, starts[name].size)
-            for name in columns
+        near = [
+            start * rng.uniform(0.9, 1.1, start.size)
+            + 0.1 * model.nominal(letter) * rng.uniform(-1, 1, start.size)
+            for letter, start in starts.items()
         ]
         rates = model.nominal("x") * rng.normal(size=len(model.x))
-        found.append(ca.DM(at(rng.uniform(), rates, *beside)).full())
+        found.append(ca.DM(at(rng.uniform(), rates, *near)).full())
     finite = [M for M in found if np.isfinite(M).all()]
     pattern = ca.DM(matrix.sparsity(), 1).full()
     return finite or [pattern * rng.normal(size=pattern.shape)]
@@ -217,22 +211,32 @@ class System:
         return branchless(function) if self.branchless else function
 
     @cached_property
+    def M(self) -> Array:
+        """Mass matrix as numbers."""
+        return ca.DM(self.mass).full()
+
+    @cached_property
     def is_ode(self) -> bool:
         """True if the mass matrix is the identity."""
-        return bool((ca.DM(self.mass).full() == np.eye(self.n)).all())
+        return np.array_equal(self.M, np.eye(self.n))
+
+    @property
+    def has_pivots(self) -> bool:
+        """True if pivots have to be chosen by numbers. Those of differential equations alone
+        (1/(gamma h) dominates for small steps) and of mechanisms (definite matrices) are stable.
+        """
+        return self.manifold is None and not self.is_ode
 
     @cached_property
     def is_semi_explicit(self) -> bool:
         """True if the mass matrix is the identity except for zeros on its diagonal."""
-        M = ca.DM(self.mass).full()
-        return bool((np.diag(np.diag(M)) == M).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
+        diagonal = np.diag(self.M)
+        return bool((np.diag(diagonal) == self.M).all() and np.isin(diagonal, (0.0, 1.0)).all())
 
     @cached_property
     def algebraic(self) -> tuple[list[int], list[int]]:
         """Rows without rates (equations) and columns without rates (unknowns) of M y' = f."""
-        pattern = ca.DM(self.mass.sparsity(), 1).full() != 0
-        rows = [int(i) for i in np.flatnonzero(~pattern.any(axis=1))]
-        columns = [int(i) for i in np.flatnonzero(~pattern.any(axis=0))]
+        rows, columns = (np.flatnonzero(~self.M.any(axis=axis)).tolist() for axis in (1, 0))
         return rows, columns
 
     @cached_property
@@ -242,7 +246,7 @@ class System:
         They are unit vectors of unknowns without rates if the mass matrix is no wider than its
         rank.
         """
-        return null_space(ca.DM(self.mass).full())
+        return null_space(self.M)
 
     @cached_property
     def constraints(self) -> ca.Function:
@@ -265,15 +269,22 @@ def system(model: Model, inputs: InputData) -> System:
     Raises:
         ValueError: a model without unknowns, or of an index above 1.
     """
-    unknowns, f, mass, names = _columns(model)
-    nx = len(model.x)
+    mechanics, nx, u = model.holonomic, len(model.x), model.vector("u")
+    if mechanics is not None:
+        unknowns, f, mass, names = holonomic_columns(model, mechanics)
+    elif model.ode is None:
+        unknowns, f, mass, names = implicit_columns(model)
+    else:
+        unknowns, f = ca.vertcat(model.vector("x"), model.vector("z")), model.ode
+        f = ca.vertcat(f, model.alg)
+        mass = ca.diagcat(ca.SX.eye(nx), ca.SX(len(model.z), len(model.z)))
+        names = [v.name for v in (*model.x, *model.z)]
     if not names:
         raise ValueError(
             f"model '{model.name}': expected states x or unknowns z to solve for, got none; "
             "evaluate its outputs by model.function"
         )
-    f = ca.substitute(f, model.vector("u"), inputs.expression)
-    mechanics = model.holonomic
+    f = ca.substitute(f, u, inputs.expression)
     if mechanics is None:
         check_index(f"model '{model.name}'", unknowns, f, mass, names)
     phi = mechanics.phi if mechanics else ca.SX(0, 1)
@@ -282,15 +293,20 @@ def system(model: Model, inputs: InputData) -> System:
         unknowns, f = ca.vertcat(unknowns, model.t), ca.vertcat(f, 1)
         mass = ca.diagcat(mass, 1)
         names.append("t")
+    n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     # error control also for algebraic unknowns without influence on the states, or they would drift
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
-    n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     idle = range(m - mechanics.norms, m) if mechanics else ()
     watched += [(v.symbol, v.nominal) for i, v in enumerate(model.z) if i not in idle]
     monitors = stacked(ca.SX(expression) for expression, _ in watched)
     d = ca.vertcat(model.vector("p"), inputs.data)
     own = (i for i in range(nx) if mass.sparsity().has_nz(i, i))
     loop = tuple(range(nx + n + m, nx + n + len(model.z))) if mechanics else ()
+    inner = None if mechanics is None else mechanics.inner
+    if inner is not None:
+        rows, values = ca.substitute([inner.f, inner.values], [u], [inputs.expression])
+        whole = ca.vertcat(f[:nx], rows, f[nx + rows.numel() :, 0])
+        inner = replace(inner, values=values, f=whole)
     return System(
         unknowns,
         d,
@@ -300,33 +316,10 @@ def system(model: Model, inputs: InputData) -> System:
         timed,
         tuple(names),
         model.nominal("x"),
-        ca.substitute(monitors, model.vector("u"), inputs.expression),
+        ca.substitute(monitors, u, inputs.expression),
         stacked(ca.SX(nominal) for _, nominal in watched),
-        manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
+        manifold(model, mechanics, unknowns, d, f, inputs.expression) if mechanics else None,
         ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m)), loop),
         slips=len(model.monitors),
-        inner=_with_inputs(model, inputs, f) if mechanics and mechanics.inner else None,
+        inner=inner,
     )
-
-
-def _with_inputs(model: Model, inputs: InputData, f: ca.SX) -> Inner | None:
-    """Return right-hand sides of a holonomic model with inner unknowns, in the order of `f`."""
-    mechanics = model.holonomic
-    if mechanics is None or mechanics.inner is None:
-        return None
-    inner, nx = mechanics.inner, len(model.x)
-    own, values = ca.substitute([inner.f, inner.values], [model.vector("u")], [inputs.expression])
-    after = nx + own.numel()
-    return replace(inner, values=values, f=ca.vertcat(f[:nx], own, f[after:, 0]))
-
-
-def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
-    """Return unknowns without time, right-hand side, mass matrix and names."""
-    x, z = model.vector("x"), model.vector("z")
-    nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
-    if model.holonomic is not None:
-        return holonomic_columns(model)
-    if model.ode is not None:
-        f = ca.vertcat(model.ode, model.alg)
-        return ca.vertcat(x, z), f, ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel())), names
-    return implicit_columns(model)

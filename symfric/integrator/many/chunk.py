@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from symfric.foundation import packed
 from symfric.foundation.programs import find_compiler
 from symfric.foundation.status import Status
-from symfric.integrator.equations.initial import consistent_many, smallest_steps
+from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.given import input_of
 from symfric.integrator.many.members import Members, Stretch
 from symfric.integrator.many.program import Program, program
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale
 from symfric.integrator.step.layout import Given, State
@@ -123,7 +123,7 @@ class Job:
 
     def stretch(self, chunk: Chunk, first: int, follow: bool) -> tuple[Stretch, Indices]:
         """Return all input intervals from `first` on, and the result times in them."""
-        breaks, h_min = self.breaks[first:], smallest_steps(chunk.ends - self.breaks[0])
+        breaks, h_min = self.breaks[first:], smallest_step(chunk.ends - self.breaks[0])
         times = self.times[None] if self.times.size else chunk.ends[:, None]
         inside = np.flatnonzero((times >= breaks[0]).any(axis=0))
         data, times = chunk.data[:, :, first:], times[:, inside]

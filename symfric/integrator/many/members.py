@@ -13,14 +13,22 @@ from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.following import Following
+from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.running.engine import Stop, VmEngine
+from symfric.integrator.running.engine import VmEngine, Work
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import Work, filled
-from symfric.integrator.running.plants import AGAIN, REFUSED, SEARCH, Advance, Plants, loaded
-from symfric.integrator.running.record import Outputs, pieces_of
+from symfric.integrator.running.plants import (
+    AGAIN,
+    MEMBERS,
+    REFUSED,
+    SEARCH,
+    Advance,
+    Plants,
+    loaded,
+)
+from symfric.integrator.running.record import Dense, Outputs
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -98,7 +106,7 @@ class VmMembers:
         """Build from the serialised Functions of the step, the signals and the update after
         jumps.
         """
-        engine = VmEngine.of(ca.Function.deserialize(step), follows=bool(follow))
+        engine = VmEngine(ca.Function.deserialize(step), follows=bool(follow))
         how = None
         if follow and follow[0]:
             how = Following(ca.Function.deserialize(follow[0]), follow[1])
@@ -148,7 +156,7 @@ class VmMembers:
                 break
             allowed = min(ATTEMPTS, stretch.max_steps - made)
             records, count, stop = self.engine.march(work, allowed)
-            ends, made = pieces_of(records, work.n).y1, made + count
+            ends, made = Dense.of(records, work.n).y1, made + count
             reach[0] = np.minimum(reach[0], ends.min(axis=0, initial=np.inf))
             reach[1] = np.maximum(reach[1], ends.max(axis=0, initial=-np.inf))
         if stop is not Stop.SEARCH:
@@ -300,4 +308,4 @@ def plants_source(integrator: Integrator) -> str:
         "AGAIN": AGAIN,
     }  # fmt: skip
     defined = "".join(f"#define {name} ({value})\n" for name, value in numbers.items())
-    return every + filled("members.h") + defined + c_text("plants.c")
+    return every + MEMBERS + defined + c_text("plants.c")

@@ -14,48 +14,10 @@ from typing import Any, ClassVar, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.checks import listed
 from symfric.integrator.equations.matrices import factorise
 from symfric.integrator.equations.system import System
-from symfric.integrator.methods.method import Array, Method, Trial, Trials, combination, need_ode
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Eliminated:
-    """System with its algebraic unknowns solved for.
-
-    Attributes:
-        settle: (y, d) -> y with the algebraic unknowns of its states.
-        rates: (y, d) -> f, zero in the algebraic rows.
-    """
-
-    settle: ca.Function
-    rates: ca.Function
-
-
-@lru_cache(maxsize=2)
-def eliminated(system: System) -> Eliminated | None:
-    """Return `system` without algebraic unknowns; None if they are not linear or lack known pivots.
-
-    A singular G gives numbers that are not finite, and the step is rejected.
-    """
-    rows, columns = system.algebraic
-    groups = [[rows.index(i) for i in group if i in rows] for group in system.pivots]
-    if not system.is_semi_explicit or rows != columns or sum(map(len, groups)) < len(rows):
-        return None
-    y, d, z = system.y, system.d, system.y[columns]
-    G = ca.sparsify(ca.jacobian(system.f[rows], z))
-    if ca.depends_on(G, z):
-        return None
-    lu, right = factorise(G, groups), ca.SX.sym("right", len(rows))
-    solve = ca.Function("eliminate", [lu.packed_symbol, right], [lu.solve(right)])
-    settled, rates = ca.SX(y), ca.SX(system.f)
-    settled[columns] = solve(lu.packed, -ca.substitute(system.f[rows], z, ca.SX.zeros(len(rows))))
-    rates[rows] = 0
-    return Eliminated(
-        system.in_steps(ca.Function("settle", [y, d], [settled], {"cse": True})),
-        system.in_steps(ca.Function("rates", [y, d], [rates], {"cse": True})),
-    )
+from symfric.integrator.methods.method import Array, Method, Trial, Trials, combination
 
 
 @final
@@ -78,18 +40,9 @@ class Explicit(Method):
     E: Array
     dae: ClassVar[bool] = False
 
-    @property
-    def stages(self) -> int:
-        """Number of stages s."""
-        return self.A.shape[0]
-
-    @property
-    def diagonal(self) -> None:
-        """Always None: an explicit method has no iteration matrix."""
-
     def work(self, system: System) -> tuple[int, int, int]:
         """Return the number of right-hand sides, Jacobians and factorisations of a step."""
-        return self.stages, 0, 0 if system.is_ode else self.stages
+        return len(self.A), 0, 0 if system.is_ode else len(self.A)
 
     def trials(self, system: System) -> Trials:
         """Return its steps on a system.
@@ -98,36 +51,69 @@ class Explicit(Method):
             ValueError: algebraic unknowns other than those of a mechanism in which they are
                 linear, or a mass matrix.
         """
-        linear = None if system.is_ode else eliminated(system)
-        if linear is not None:
-            return self._eliminating(linear)
-        need_ode(system, self.name)
-        f = system.in_steps(ca.Function("f", [system.y, system.d], [system.f], {"cse": True}))
+        settle, rates = eliminated(system) or (None, None)
+        if rates is None:
+            need_ode(system, self.name)
+            rates = ca.Function("f", [system.y, system.d], [system.f], {"cse": True})
+            rates = system.in_steps(rates)
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
             k: list[Any] = []
             argument = y
-            for i in range(self.stages):
-                argument = y + combination(self.A[i, :i], k, type(y))
-                k.append(h * f(argument, d))
-            dense = tuple(combination(row, k, type(y)) for row in self.H)
-            return Trial(argument, combination(self.E, k, type(y)), dense)
+            for row in self.A:
+                argument = y + combination(row[: len(k)], k, type(y))
+                argument = argument if settle is None else settle(argument, d)
+                k.append(h * rates(argument, d))
+            return Trial(argument, combination(self.E, k, type(y)), self.bends(k))
 
         return trial
 
-    def _eliminating(self, linear: Eliminated) -> Trials:
-        """Return its steps on states, with algebraic unknowns solved for at each stage."""
 
-        def trial(y: Any, h: Any, d: Any) -> Trial:
-            k: list[Any] = []
-            argument = y
-            for i in range(self.stages):
-                argument = linear.settle(y + combination(self.A[i, :i], k, type(y)), d)
-                k.append(h * linear.rates(argument, d))
-            dense = tuple(combination(row, k, type(y)) for row in self.H)
-            return Trial(argument, combination(self.E, k, type(y)), dense)
+@lru_cache(maxsize=2)
+def eliminated(system: System) -> tuple[ca.Function, ca.Function] | None:
+    """Return `system` with its algebraic unknowns solved for.
 
-        return trial
+    A singular G gives numbers that are not finite, and the step is rejected.
+
+    Returns:
+        (y, d) -> y with the algebraic unknowns of its states, and (y, d) -> f, zero in the
+        algebraic rows; None if it has no such unknowns, or if they are not linear or lack known
+        pivots.
+    """
+    rows, columns = system.algebraic
+    groups = [[rows.index(i) for i in group if i in rows] for group in system.pivots]
+    known = system.is_semi_explicit and rows == columns and sum(map(len, groups)) == len(rows)
+    if system.is_ode or not known:
+        return None
+    y, d, z = system.y, system.d, system.y[columns]
+    G = ca.sparsify(ca.jacobian(system.f[rows], z))
+    if ca.depends_on(G, z):
+        return None
+    lu, right = factorise(G, groups), ca.SX.sym("right", len(rows))
+    solve = ca.Function("eliminate", [lu.symbols, right], [lu.solve(right)])
+    settled, rates = ca.SX(y), ca.SX(system.f)
+    settled[columns] = solve(lu.packed, -ca.substitute(system.f[rows], z, ca.SX.zeros(len(rows))))
+    rates[rows] = 0
+    settle = ca.Function("settle", [y, d], [settled], {"cse": True})
+    return system.in_steps(settle), system.in_steps(
+        ca.Function("rates", [y, d], [rates], {"cse": True})
+    )
+
+
+def need_ode(system: System, method: str) -> None:
+    """Check that a method without iteration matrix can integrate `system`.
+
+    Raises:
+        ValueError: algebraic unknowns, or a mass matrix other than the identity.
+    """
+    if system.is_ode:
+        return
+    unknown = listed(system.names[i] for i in system.algebraic[1])
+    found = f"the algebraic unknowns {unknown}" if unknown else "a mass matrix"
+    raise ValueError(
+        f"method {method}: expected an ODE x' = f(x), got {found}; use an implicit method such as "
+        "rodas5p, also for mechanisms with friction from reactions"
+    )
 
 
 def shampine(b: Array, D: Array) -> Array:
@@ -145,23 +131,14 @@ SMALL = 1e-2
 """Below this |x| the series replaces the quotient; its next term is 4e-14 of the sum."""
 
 
-def phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
-
-    Value and derivatives are correct at zero, too.
+def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return exp x, phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
 
     They are the weights of the rate in the end value and in the mean of a solution of
     dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
-    One series serves both: phi1 = 1 + x phi2.
-    """
-    _, phi1, phi2 = exp_phi1_phi2(x)
-    return phi1, phi2
-
-
-def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return exp and the functions of `phi1_phi2` with one call of expm1; exp is 0 far below zero.
-
-    The error of exp is one unit in the last place of 1, not of exp itself.
+    One series serves both: phi1 = 1 + x phi2. Values and derivatives are correct at zero, too; exp,
+    from the one call of expm1, is 0 far below zero, and its error is one unit in the last place of
+    1, not of exp itself.
     """
     near = ca.fabs(x) < SMALL
     divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
@@ -185,10 +162,6 @@ class Exponential(Method):
 
     dae: ClassVar[bool] = False
 
-    @property
-    def diagonal(self) -> None:
-        """Always None: the exponential of h J takes the place of W."""
-
     def work(self, system: System) -> tuple[int, int, int]:
         """Return the number of right-hand sides, Jacobians (their diagonals) and factorisations
         of a step.
@@ -205,13 +178,9 @@ class Exponential(Method):
         h = ca.SX.sym("h")
         slope = ca.diag(ca.jacobian(system.f, system.y))
         weights = [
-            phi1_phi2(h * slope[i])[0] if slope.sparsity().has_nz(i, 0) else ca.SX(1)
+            exp_phi1_phi2(h * slope[i])[1] if slope.sparsity().has_nz(i, 0) else ca.SX(1)
             for i in range(system.n)
         ]
         end = system.y + h * ca.vertcat(*weights) * system.f
         advance = ca.Function("advance", [system.y, h, system.d], [end], {"cse": True})
-
-        def trial(y: Any, h: Any, d: Any) -> Trial:
-            return Trial(advance(y, h, d))
-
-        return trial
+        return lambda y, h, d: Trial(advance(y, h, d))

@@ -7,7 +7,7 @@ Euler, by Newton's method, is for plants in fixed steps.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -31,7 +31,7 @@ class Rosenbrock(Method):
     y_1 is the last stage's argument plus k_s, and k_s is the error estimate.
 
     Attributes:
-        gamma: diagonal coefficient.
+        gamma: diagonal coefficient of all stages.
         A, C: strictly lower triangular, shape (s, s).
     """
 
@@ -41,17 +41,12 @@ class Rosenbrock(Method):
 
     @property
     def diagonal(self) -> float:
-        """Coefficient gamma, the same for all stages, so that one factorisation serves them."""
+        """Coefficient gamma."""
         return self.gamma
-
-    @property
-    def stages(self) -> int:
-        """Number of stages s."""
-        return self.A.shape[0]
 
     def work(self, system: System) -> tuple[int, int, int]:
         """Return the number of right-hand sides, Jacobians and factorisations of a step."""
-        return self.stages, 1, 1
+        return len(self.A), 1, 1
 
     def factors(self, system: System) -> tuple[Factors, ...]:
         """Return the factors of the iteration matrix, and for a tiny step."""
@@ -65,7 +60,7 @@ class Rosenbrock(Method):
             lu, per_h = block.factor(y, h, d), reciprocal(h)
             k: list[Any] = []
             argument = y
-            for i in range(self.stages):
+            for i in range(len(A)):
                 argument, memory = y, type(y).zeros(y.numel())
                 for j in range(i):
                     if A[i, j] != 0:
@@ -73,8 +68,7 @@ class Rosenbrock(Method):
                     if C[i, j] != 0:
                         memory = memory + C[i, j] * k[j]
                 k.append(block.solve(lu, block.f(argument, d), memory * per_h))
-            dense = tuple(combination(row, k, type(y)) for row in self.H)
-            return Trial(argument + k[-1], k[-1], dense)
+            return Trial(argument + k[-1], k[-1], self.bends(k))
 
         return trial
 
@@ -132,8 +126,7 @@ class Radau(Method):
         """Return its steps on a system.
 
         The increments z = T w are iterated from 0 with the Jacobian at y_0; for a linear system the
-        first
-        iteration is the solution.
+        first iteration is the solution.
         """
         basis = eigenbasis(self.A)
         block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
@@ -161,15 +154,12 @@ class Radau(Method):
                 z = [combination(row, w, kind) for row in T]
                 corrections.append(combination(T[-1], change, kind))
             error = block.solve(lu, rates * first, per_h * combination(self.E, z, kind))
-            dense = tuple(combination(row, z, kind) for row in self.H)
-            return Trial(y + z[-1], error, dense, tuple(corrections[-2:]))
+            return Trial(y + z[-1], error, self.bends(z), tuple(corrections[-2:]))
 
         return trial
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Eigenbasis:
+class Eigenbasis(NamedTuple):
     """Real block form T^-1 A^-1 T = [[gamma, 0, 0], [0, alpha, beta], [0, -beta, alpha]]."""
 
     gamma: float
@@ -181,20 +171,17 @@ class Eigenbasis:
 def eigenbasis(A: Array) -> Eigenbasis:
     """Return the real eigenbasis of the inverse of A, which has one real eigenvalue."""
     values, vectors = np.linalg.eig(np.linalg.inv(A))
-    heights = np.imag(values)
-    real, upper = int(np.argmin(np.abs(heights))), int(np.argmax(heights))
-    own, turning = vectors[:, real], vectors[:, upper]
+    real, upper = int(np.argmin(np.abs(np.imag(values)))), int(np.argmax(np.imag(values)))
+    turning = vectors[:, upper]
     return Eigenbasis(
         float(np.real(values[real])),
         float(np.real(values[upper])),
-        float(heights[upper]),
-        np.column_stack([np.real(own), np.real(turning), np.imag(turning)]),
+        float(np.imag(values[upper])),
+        np.column_stack([np.real(vectors[:, real]), np.real(turning), np.imag(turning)]),
     )
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Pair:
+class Pair(NamedTuple):
     """Complex iteration matrix (alpha - i beta) M/h - J as a real one of twice the size.
 
     Attributes:
@@ -223,14 +210,12 @@ def pair(system: System, alpha: float, beta: float) -> Pair:
     right, memory = ca.SX.sym("right", 2 * n), ca.SX.sym("memory", 2 * n)
     solution = lu.solve(right + ca.diagcat(M, M) @ memory)
     factor = ca.Function("factor_pair", [system.y, h, system.d], [lu.packed], {"cse": True})
+    values = ca.Function("J", [system.y, system.d], [J])
     return Pair(
         system.in_steps(factor),
-        ca.Function("solve_pair", [lu.packed_symbol, right, memory], [solution]),
-        Factors(
-            "pair", ca.Function("J", [system.y, system.d], [J]), (entries, h), matrix(entries),
-            lu.order,
-        ),
-    )  # fmt: skip
+        ca.Function("solve_pair", [lu.symbols, right, memory], [solution]),
+        Factors("pair", values, (entries, h), matrix(entries), lu.order),
+    )
 
 
 def through(c: Array) -> Array:
@@ -254,16 +239,12 @@ class BackwardEuler(Method):
 
     iterations: int
 
-    @property
-    def diagonal(self) -> None:
-        """Always None: W of the fixed step is M / h - J."""
-
     def work(self, system: System) -> tuple[int, int, int]:
         """Return the number of right-hand sides, Jacobians and factorisations of a step."""
         return self.iterations, self.iterations, self.iterations
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the iteration matrix."""
+        """Return the factors of the iteration matrix M / h - J."""
         return (blocks(system, 1.0).factors,)
 
     def trials(self, system: System) -> Trials:

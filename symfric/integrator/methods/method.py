@@ -4,12 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.checks import listed
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.matrices import (
     SOUND,
@@ -25,9 +24,7 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Trial:
+class Trial(NamedTuple):
     """One step from y over h, as SX or MX columns (n, 1).
 
     Attributes:
@@ -76,16 +73,15 @@ class Method(ABC):
     finer: float = 1.0
     source: str
 
-    @property
-    @abstractmethod
-    def diagonal(self) -> float | None:
-        """Coefficient gamma of its iteration matrix W = M / (gamma h) - J.
-
-        None for a method without one, and for methods of fixed steps.
-        """
-
     dae: ClassVar[bool] = True
     """True if algebraic unknowns and mass matrices are allowed."""
+
+    @property
+    def diagonal(self) -> float | None:
+        """Coefficient gamma of the iteration matrix W = M / (gamma h) - J of an implicit method
+        with error control.
+        """
+        return None
 
     @property
     def adaptive(self) -> bool:
@@ -102,6 +98,10 @@ class Method(ABC):
         """
         return ()
 
+    def bends(self, k: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the coefficients of the dense output from the stages k."""
+        return tuple(combination(row, k, type(k[0])) for row in self.H)
+
     @abstractmethod
     def trials(self, system: System) -> Trials:
         """Return its steps on a system.
@@ -117,22 +117,6 @@ def combination(weights: Iterable[float], columns: Iterable[Any], kind: Any) -> 
     return sum(terms, start=kind(0))
 
 
-def need_ode(system: System, method: str) -> None:
-    """Check that a method without iteration matrix can integrate `system`.
-
-    Raises:
-        ValueError: algebraic unknowns, or a mass matrix other than the identity.
-    """
-    if system.is_ode:
-        return
-    unknown = listed(system.names[i] for i in system.algebraic[1])
-    found = f"the algebraic unknowns {unknown}" if unknown else "a mass matrix"
-    raise ValueError(
-        f"method {method}: expected an ODE x' = f(x), got {found}; use an implicit method such as "
-        "rodas5p, also for mechanisms with friction from reactions"
-    )
-
-
 Point = tuple[Array, Array]
 """Unknowns y and run data d."""
 
@@ -146,8 +130,7 @@ ignored."""
 def suited(system: System, method: Method, points: Sequence[Point], span: float) -> System:
     """Return `system` with other pivots if its own are unstable at the last of `points`.
 
-    Stable orders stay: they have least fill. Those of differential equations alone (1/(gamma h)
-    dominates for small steps) and of mechanisms (definite matrices) need no check.
+    Stable orders stay: they have least fill.
 
     Args:
         system: the system to integrate.
@@ -155,7 +138,7 @@ def suited(system: System, method: Method, points: Sequence[Point], span: float)
         points: that a run has to pass, the newest last.
         span: duration of the run [s].
     """
-    if system.manifold is not None or system.is_ode:
+    if not system.has_pivots:
         return system
     found: dict[str, Order] = {}
     for factors in method.factors(system):
@@ -178,7 +161,7 @@ def suited_to_start(system: System, method: Method, model: Model) -> System:
         method: as in `suited`.
         model: its equations and start values; if these are not consistent nothing changes.
     """
-    if system.manifold is not None or system.is_ode:
+    if not system.has_pivots:
         return system
     y = first_guess(system, model, model.initial_state())
     d = np.concatenate([model.values("p"), model.values("u")])

@@ -11,8 +11,8 @@ quarters, down to the event tolerance.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import pairwise
 from math import inf
 from typing import Any, final
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.equations.expressions import divided_once
 from symfric.integrator.step.layout import Record
-from symfric.model.parts import Event
+from symfric.model import Model
 
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -62,10 +62,8 @@ class Memory:
     """Event data kept between steps, a column of numbers that both engines share.
 
     Layout: phase, tolerance [s], number of jumps, how many of the last ones were of one kind, the
-    step
-    [s] to resume after a jump, times of the last jumps, then for each event its value before the
-    next
-    step, and its part in the last jump (0 or 1).
+    step [s] to resume after a jump, times of the last jumps, then for each event its value before
+    the next step, and its part in the last jump (0 or 1).
     """
 
     PHASE, TOLERANCE, COUNT, ALIKE, RESUME = range(5)
@@ -100,8 +98,7 @@ class Crossings:
 
     Attributes:
         looks: (low, row, d) -> event values at all `LOOKS` but the first, between low and 1, place
-        by
-            place.
+            by place.
         noise: (row, d) -> rounding level of each event in the step.
         doubts: (values at five places, place by place, noise) -> for each piece, nonzero if it may
             have further roots.
@@ -170,43 +167,34 @@ class Crossings:
 
 
 def crossings(
-    events: Sequence[Event],
-    states: Sequence[str],
-    expressions: ca.Function,
-    sizes: ca.Function,
-    resets: ca.Function,
-    rows: int,
-    follows: bool,
-    closes: bool,
-) -> Crossings:
+    model: Model, values: ca.Function, sizes: ca.Function, resets: ca.Function, rows: int,
+    follows: bool, closes: bool,
+) -> Crossings:  # fmt: skip
     """Build the Functions of `Crossings`.
 
     Args:
-        events: of the model.
-        states: names, in the order of y.
-        expressions: (t, y, d) -> value of each event.
+        model: gives the events.
+        values: (t, y, d) -> value of each event.
         sizes: (t, y, d) -> for each event, the sum of the magnitudes of the contributions of t and
-        y.
+            y.
         resets: (t, y, d) -> value of each reset, event after event.
         rows: of the dense output.
         follows, closes: as in `Crossings`.
     """
-    at = Record(expressions.numel_in(1), rows)
-    row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", expressions.numel_in(2))
-    theta = ca.SX.sym("theta")
-    end = row[at.T1], row[at.y1]
-    low = ca.SX.sym("low")
+    events, states = model.events, [v.name for v in model.x]
+    at = Record(values.numel_in(1), rows)
+    row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", values.numel_in(2))
+    theta, low, end = ca.SX.sym("theta"), ca.SX.sym("low"), (row[at.T1], row[at.y1])
     looks = [_place(at, row, low + s * (1 - low)) if s < 1 else end for s in LOOKS[1:]]
     level = ROUNDING * sizes(*end, d)
-    states = list(states)
     return Crossings(
-        _function("looks", [low, row, d], [ca.vertcat(*(expressions(*look, d) for look in looks))]),
+        _function("looks", [low, row, d], [ca.vertcat(*(values(*look, d) for look in looks))]),
         _function("noise", [row, d], [ca.if_else(level < inf, level, 0)]),
         _doubtful("doubts", len(events)),
         _doubtful("doubt", 1),
-        _function("values", [theta, row, d], [expressions(*_inside(at, row, theta), d)]),
+        _function("values", [theta, row, d], [values(*_inside(at, row, theta), d)]),
         cutting(at),
-        _function("jump", [row, d], [expressions(*end, d), resets(*end, d)]),
+        _function("jump", [row, d], [values(*end, d), resets(*end, d)]),
         at,
         tuple(e.direction for e in events),
         tuple(e.terminal for e in events),
@@ -284,29 +272,31 @@ LEAST_PART = 1e-15
 
 
 @final
-@dataclass(eq=False)
 class Isolation:
     """Search for the first roots in one step.
 
-    Attributes:
+    Args:
         values: theta -> value of each event.
         doubts: (values at five places) -> for each piece and event, nonzero if it may have more
             roots than the signs show.
         directions: of the events.
         tolerance: of event times, as a fraction of the step.
+
+    Attributes:
         roots: first root found of each event, inf if there is none.
         left: subdivisions still allowed.
     """
 
-    values: Callable[[float], Array]
-    doubts: Callable[[Array], Array]
-    directions: NDArray[np.intp]
-    tolerance: float
-    roots: Array = field(init=False)
-    left: int = FINER
-
-    def __post_init__(self) -> None:
-        self.roots = np.full(self.directions.size, np.inf)
+    def __init__(
+        self,
+        values: Callable[[float], Array],
+        doubts: Callable[[Array], Array],
+        directions: NDArray[np.intp],
+        tolerance: float,
+    ) -> None:
+        self.values, self.doubts, self.directions = values, doubts, directions
+        self.tolerance, self.share = tolerance, max(SHARPER * tolerance, LEAST_PART)
+        self.roots, self.left = np.full(directions.size, np.inf), FINER
 
     def first(self, at: Sequence[float], g: Array, doubts: Array) -> float:
         """Return the first root between the places `at` with values g, or a value beyond them.
@@ -323,14 +313,18 @@ class Isolation:
             suspects &= long & (self.left > 0)
         for k in np.flatnonzero((hits & ~suspects).any(axis=1)).tolist() if hits.any() else ():
             if at[k] < sure:
-                sure = self._sure((at[k], at[k + 1]), g[k : k + 2], hits[k] & ~suspects[k])
+                for i in np.flatnonzero(hits[k] & ~suspects[k]).tolist():
+                    value = partial(self._value, i)
+                    ends = float(g[k, i]), float(g[k + 1, i])
+                    self.roots[i] = locate(value, at[k], at[k + 1], ends, self.share)
+                sure = float(self.roots.min())
         if not doubtful:
             return sure
         if sure <= at[-1]:
             others = suspects & (self.roots > 1) & (np.array(at[:-1]) < sure)[:, None]
             if others.any():
                 suspects &= ~others
-                sure = self._again(at[0], sure - self._share, g[0], np.any(others, axis=0))
+                sure = self._again(at[0], sure - self.share, g[0], np.any(others, axis=0))
         for k in np.flatnonzero(suspects.any(axis=1)).tolist():
             if at[k] >= sure:
                 break
@@ -339,21 +333,8 @@ class Isolation:
                 return found
         return float(self.roots.min())
 
-    @property
-    def _share(self) -> float:
-        """Tolerance of roots."""
-        return max(SHARPER * self.tolerance, LEAST_PART)
-
-    def _sure(self, ends: tuple[float, float], g: Array, hits: NDArray[np.bool_]) -> float:
-        """Locate the roots of the events `hits` in a piece; return the first root known."""
-        for i in np.flatnonzero(hits).tolist():
-
-            def value(theta: float, i: int = i) -> float:
-                return float(self.values(theta)[i])
-
-            values = float(g[0, i]), float(g[1, i])
-            self.roots[i] = locate(value, *ends, values, self._share)
-        return float(self.roots.min())
+    def _value(self, event: int, theta: float) -> float:
+        return float(self.values(theta)[event])
 
     def _again(self, a: float, b: float, before: Array, suspects: NDArray[np.bool_]) -> float:
         """Repeat `first` from a, with the values there, to b, for the doubtful events only."""

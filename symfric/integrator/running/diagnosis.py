@@ -1,5 +1,7 @@
 """Diagnosis of a failed integration, in one sentence."""
 
+from collections.abc import Iterator
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -17,37 +19,50 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 NEARLY = 0.1
 """If a step shrinks to nothing with det(I - dN/dN) below this, the mechanism has jammed."""
-
-
 COARSE = 1e-10
 """Time resolution [s] above which rounding of t may be the cause of a failed step."""
 
 
 def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
     """Return status and message for a step that shrank to nothing at time `t`."""
-    system, name = integrator.system, integrator.model.name
-    where = f"simulate '{name}': stopped at t = {t:.9g} s"
+    system, model = integrator.system, integrator.model
+    where = f"simulate '{model.name}': stopped at t = {t:.9g} s"
     f = integrator.f(y, d).full().ravel()
-    for status, cause in (
-        (Status.SINGULAR, _dead_centre(system, y, d)),
-        (Status.JAMMED, _jammed(integrator, y, d)),
-        (Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)),
-        (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
-        (Status.NOT_FINITE, _steep(system, y, d)),
-        (Status.JAMMED, _pulled(system, y, d)),
-        (Status.SINGULAR, _singular(integrator, y, d, h)),
-    ):
+    advice = "" if model.holonomic is None else model.holonomic.advice
+    for status, cause in _causes(integrator, y, d, h, f, advice):
         if cause:
-            if status is Status.JAMMED and _advice(integrator):
-                cause = f"{cause}; {_advice(integrator)}"
-            return status, f"{where}: {cause}"
+            jammed = status is Status.JAMMED and advice
+            return status, f"{where}: {cause}; {advice}" if jammed else f"{where}: {cause}"
     fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
     guess = "a discontinuity is near, give the law a smooth form or the model an event there"
+    coarse = (
+        f"; at this t, steps below {FLOOR * abs(t):.1e} s are lost to rounding; "
+        "shift the time origin"
+    )
     return (
         Status.STEP_TOO_SMALL,
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; "
-        f"{_advice(integrator) or guess}{_coarse(t)}",
+        f"{advice or guess}{coarse if FLOOR * abs(t) >= COARSE else ''}",
     )
+
+
+def _causes(
+    integrator: Integrator, y: Array, d: Array, h: float, f: Array, advice: str
+) -> Iterator[tuple[Status, str]]:
+    """Yield status and message of each possible cause; the message is empty if it is none."""
+    system, manifold = integrator.system, integrator.system.manifold
+    if manifold is not None:
+        yield Status.SINGULAR, singular(manifold, system.names, y, d)
+        cause = grows(manifold, system.names, y, d, NEARLY)
+        for variable in integrator.model.z:  # name joint and law
+            cause = cause.replace(f"through {variable.name}:", f"through the {variable.doc}:")
+        yield Status.JAMMED, cause
+    yield Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)
+    yield Status.NOT_FINITE, _not_finite(integrator, y, d, h, f)
+    yield Status.NOT_FINITE, _steep(system, y, d)
+    if manifold is not None:
+        yield Status.JAMMED, pulls(manifold, y, d, NEARLY)
+    yield Status.SINGULAR, _singular(system, y, d, h, advice)
 
 
 def chattering(model: Model) -> str:
@@ -58,49 +73,10 @@ def chattering(model: Model) -> str:
     """
     if model.contacts or model.holonomic is not None:
         return ""
-    symbols = ca.symvar(model.residual)
-    written = ca.Function("equations", symbols, [model.residual])
-    if ca.OP_SIGN not in {written.instruction_id(k) for k in range(written.n_instructions())}:
+    written = ca.Function("equations", ca.symvar(model.residual), [model.residual])
+    if ca.OP_SIGN not in map(written.instruction_id, range(written.n_instructions())):
         return ""
     return " The equations contain sign(...): use contact(...) and a law, which can stick."
-
-
-def _coarse(t: float) -> str:
-    """Return a message if t has too few digits for short steps."""
-    if FLOOR * abs(t) < COARSE:
-        return ""
-    return (
-        f"; at this t, steps below {FLOOR * abs(t):.1e} s are lost to rounding; "
-        "shift the time origin"
-    )
-
-
-def _advice(integrator: Integrator) -> str:
-    """Return the advice of a mechanism about friction without a solution."""
-    mechanics = integrator.model.holonomic
-    return "" if mechanics is None else mechanics.advice
-
-
-def _dead_centre(system: System, y: Array, d: Array) -> str:
-    """Return a message if constraints of a mechanism are dependent here."""
-    manifold = system.manifold
-    return "" if manifold is None else singular(manifold, system.names, y, d)
-
-
-def _jammed(integrator: Integrator, y: Array, d: Array) -> str:
-    """Return a message if normal forces grow with their own friction; names joint and law."""
-    manifold = integrator.system.manifold
-    if manifold is None:
-        return ""
-    cause = grows(manifold, integrator.system.names, y, d, NEARLY)
-    for variable in integrator.model.z:
-        cause = cause.replace(f"through {variable.name}:", f"through the {variable.doc}:")
-    return cause
-
-
-def _pulled(system: System, y: Array, d: Array) -> str:
-    """Return a message if normal forces are about to become negative."""
-    return "" if system.manifold is None else pulls(system.manifold, y, d, NEARLY)
 
 
 def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
@@ -114,11 +90,10 @@ def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
     return f"{grown} grows without bound; check signs and parameters" if grown else ""
 
 
-def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
+def _not_finite(integrator: Integrator, y: Array, d: Array, h: float, f: Array) -> str:
     """Return a message if equations are not finite here, or a few steps ahead along the slope."""
     system = integrator.system
-    f = integrator.f(y, d).full().ravel()
-    rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f, posinf=0.0, neginf=0.0)
+    rates = np.linalg.pinv(system.M) @ np.nan_to_num(f, posinf=0.0, neginf=0.0)
     watched = ca.Function("watched", [system.y, system.d], [system.monitors])
     for ahead in (0.0, *(10.0**k * h for k in range(5))):
         f = integrator.f(y + ahead * rates, d).full().ravel()
@@ -148,11 +123,10 @@ def _steep(system: System, y: Array, d: Array) -> str:
     )
 
 
-def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
+def _singular(system: System, y: Array, d: Array, h: float, advice: str) -> str:
     """Return a message if algebraic equations have no solution or do not determine their
     unknowns.
     """
-    system = integrator.system
     names = _named(system, np.array(system.algebraic[1], dtype=int))
     matrix = blocks(system, 1.0).factors.at(y, max(h, 1e-12), d)
     if np.isfinite(matrix).all() and not regular(matrix):
@@ -166,7 +140,7 @@ def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
         guess = "the configuration is singular or jams there"
         return (
             f"the algebraic equations for {names} have no solution near their last one; "
-            f"{_advice(integrator) or guess}"
+            f"{advice or guess}"
         )
     return ""
 

@@ -7,11 +7,9 @@ Energy: a law whose force has the wrong sign adds energy to the motion.
 The steady force is first checked over decades of speed and load, once for each set of its
 parameters. Most laws pass, and their runs need no further check. Bristles return stored energy, and
 laws with an offset push within their smoothing velocity, so both conditions are required. The
-integral is the
-trapezoidal rule over steps: only its sign matters.
+integral is the trapezoidal rule over steps: only its sign matters.
 Limits: a wrong sign in equations written by hand, outside the law, is not detected; ensembles are
-not
-checked.
+not checked.
 
 Overload: the states of a law carry more than they can in any motion, usually its static level.
 
@@ -22,13 +20,11 @@ difference is the slip, does not relax but stretches on. With a constant load th
 the extreme values of the states over all accepted steps. With a varying load a state may exceed the
 level because the load fell, and only a state that still grows is an overload.
 Limits: laws that take the applied force, and laws without a static level, are not checked. Long
-runs
-whose steps are not kept are checked at the times of the result if the load varies, ensembles only
-if
-it is constant.
+runs whose steps are not kept are checked at the times of the result if the load varies, ensembles
+only if it is constant.
 """
 
-from collections.abc import Collection, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
@@ -58,6 +54,42 @@ SHARE = 1e-3
 """Energy gain allowed, as a fraction of the energy turnover: rounding, and quadrature."""
 REMEMBERED = 16
 """Parameter sets whose first check is cached."""
+MARGIN = 0.05
+"""Fraction by which integration errors may raise friction above its level."""
+WIDE = 0.25
+"""The same for a varying load: laws that follow it with a delay exceed their level for a while."""
+LOOKS = 200
+"""Maximum number of peaks checked in a run with a varying load."""
+
+
+def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
+    """Return warnings about a run that ended well; empty if there are none."""
+    if not run.status.ok:
+        return []
+    overloads = [OverloadWarning(text) for text in _overloads(integrator, inputs, run, p)]
+    return [*overloads, *(EnergyWarning(text) for text in gains(integrator, inputs, run, p))]
+
+
+def _over_time(
+    integrator: Integrator, inputs: InputData, name: str, rows: ca.SX, t: Array, y: Array, p: Array
+) -> Array:
+    """Return `rows` of this name at the times `t` with the unknowns `y` (times, n), row by row."""
+    if name not in integrator.memory:
+        integrator.memory[name] = Columns(integrator.of_time("doubts", rows))
+    d = np.hstack([np.tile(p, (t.size, 1)), inputs.values[:, inputs.interval(t)].T])
+    return integrator.memory[name]([t, y, d], backend="vm")[0].T
+
+
+def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
+    """Return the expressions of a law with the forces of all laws inserted; None if the law or the
+    model's unknowns do not determine them.
+    """
+    try:
+        found = by_laws(model, ca.vertcat(*write()))
+    except (ValueError, TypeError, NotImplementedError):
+        return None
+    known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
+    return None if strays(found, known) else found
 
 
 @final
@@ -76,33 +108,30 @@ class Sliding:
     power: ca.Function
     needs: list[int]
     rows: ca.SX
+    _checked: dict[Hashable, bool] = field(default_factory=dict[Hashable, bool])
 
     def suspect(self, p: Array) -> bool:
-        """Return True if steady friction adds energy at some speed and load."""
-        slips, loads = np.meshgrid(np.concatenate([-SPEEDS, SPEEDS]), LOADS)
-        every = np.tile(p[:, None], (1, slips.size))
-        power = self.power(slips.reshape(1, -1), loads.reshape(1, -1), every)
-        return bool(np.any(power.full() < 0))
+        """Return True if steady friction adds energy at some speed and load; cached."""
+        key = p[self.needs].tobytes()
+        if key not in self._checked:
+            slips, loads = np.meshgrid(np.concatenate([-SPEEDS, SPEEDS]), LOADS)
+            every = np.tile(p[:, None], (1, slips.size))
+            power = self.power(slips.reshape(1, -1), loads.reshape(1, -1), every)
+            remember(self._checked, key, bool(np.any(power.full() < 0)), REMEMBERED)
+        return self._checked[key]
 
 
 def gains(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
     """Yield messages about contacts whose friction adds energy to the motion."""
-    memory = integrator.model.memory
-    known: dict[Hashable, bool] = memory.setdefault("active", {})
-    for k, sliding in enumerate(sliding_places(integrator.model)):
-        key = k, p[sliding.needs].tobytes()
-        if key not in known:
-            remember(known, key, sliding.suspect(p), REMEMBERED)
-        if not known[key]:
+    for sliding in sliding_places(integrator.model):
+        if not sliding.suspect(p):
             continue
-        t, y = run.seen
-        d = np.hstack([np.tile(p, (t.size, 1)), inputs.values[:, inputs.interval(t)].T])
-        (values,) = Columns(integrator.of_time("sliding", sliding.rows))([t, y, d], backend="vm")
-        slip, force, steady = values.T
+        (t, y), contact = run.seen, sliding.contact
+        name, unit = f"sliding '{contact.name}'", contact.unit
+        slip, force, steady = _over_time(integrator, inputs, name, sliding.rows, t, y, p)
         power, worst = force * slip, int(np.argmin(steady * slip))
         work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
         if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:
-            contact, unit = sliding.contact, sliding.contact.unit
             yield (
                 f"In contact '{contact.name}' friction by {type(contact.law).__name__} adds "
                 f"{-work:.3g} J to the motion: at a slip of {slip[worst]:.3g} {unit('m/s')} its "
@@ -113,35 +142,29 @@ def gains(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iter
 def sliding_places(model: Model) -> tuple[Sliding, ...]:
     """Return the contacts of a model whose steady friction is known."""
     if "sliding" not in model.memory:
-        found = (_sliding(model, contact) for contact in model.contacts)
-        model.memory["sliding"] = tuple(s for s in found if s is not None)
+        model.memory["sliding"] = tuple(s for c in model.contacts if (s := _sliding(model, c)))
     return model.memory["sliding"]
 
 
 def _sliding(model: Model, contact: Contact) -> Sliding | None:
     """Return the friction of a contact; None if the model's unknowns do not determine it."""
     law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
-    try:
-        still = dict.fromkeys(contact.given, 0.0)
-        alone = ca.SX(law.force(v, N, law.steady_state(v, N), **still)) * v
-        z = law.steady_state(contact.slip, contact.N)
-        steady = ca.SX(law.force(contact.slip, contact.N, z, **contact.given))
-        rows = by_laws(model, ca.vertcat(contact.slip, contact.friction, steady))
-    except (ValueError, TypeError, NotImplementedError):
+
+    def steady(slip: Any, load: Any, given: Mapping[str, Any]) -> ca.SX:
+        return ca.SX(law.force(slip, load, law.steady_state(slip, load), **given))
+
+    def rows() -> list[Any]:
+        there = steady(contact.slip, contact.N, contact.given)
+        return [contact.slip, contact.friction, there]
+
+    found = _determined(model, rows)
+    if found is None:
         return None
-    known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
-    if strays(rows, known) or strays(alone, ca.vertcat(v, N, p)):
+    alone = steady(v, N, dict.fromkeys(contact.given, 0.0)) * v
+    if strays(alone, ca.vertcat(v, N, p)):
         return None
     needs = [i for i in range(p.numel()) if ca.depends_on(alone, p[i])]
-    return Sliding(contact, ca.Function("power", [v, N, p], [alone]), needs, rows)
-
-
-MARGIN = 0.05
-"""Fraction by which integration errors may raise friction above its level."""
-WIDE = 0.25
-"""The same for a varying load: laws that follow it with a delay exceed their level for a while."""
-LOOKS = 200
-"""Maximum number of peaks checked in a run with a varying load."""
+    return Sliding(contact, ca.Function("power", [v, N, p], [alone]), needs, found)
 
 
 @final
@@ -154,95 +177,68 @@ class Held:
         rows: indices of its states among those of the model.
         force: of the states at zero slip [N].
         level: largest possible force, in either direction [N].
-        fixed: True if the load is independent of the motion.
-        screen: (z, p) -> force, level and the slope of the force; empty if the load varies.
+        screen: (z, p) -> force, level and the slope of the force; None if the load depends on the
+            motion.
     """
 
     contact: Contact
     rows: list[int]
     force: ca.SX
     level: ca.SX
-    fixed: bool
-    screen: ca.Function
-    _columns: dict[Integrator, Columns] = field(default_factory=dict[Integrator, Columns])
-    _limits: dict[bytes, tuple[float, Array]] = field(default_factory=dict[bytes, Any])
+    screen: ca.Function | None
+    _limits: dict[Hashable, tuple[float, Array]] = field(default_factory=dict[Hashable, Any])
 
     @cached_property
-    def growth(self) -> ca.SX:
-        """Force times its rate: positive while it grows."""
+    def watched(self) -> ca.SX:
+        """Force, level, and force times its rate: positive while it grows."""
         z = symbols_of(self.contact.states)
-        return self.force * ca.jtimes(self.force, z, self.contact.rate)
-
-    def ratios(self, z: Array, p: Array) -> Array:
-        """Return force over level at the extreme states `z` of runs, both (n, runs)."""
-        force, level, _ = (rows.full() for rows in self.screen(z, p))
-        return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
-
-    def bound(self, run: Run, p: Array) -> float:
-        """Return an upper bound of force over level in a run, from the extremes of each state."""
-        tops = np.array([run.farthest(i) for i in self.rows])
-        if self.linear:
-            level, slope = self.limits(p)
-            return float(np.abs(slope) @ tops) / level
-        return max(float(self.ratios(side * tops[:, None], p)[0]) for side in (1.0, -1.0))
-
-    def limits(self, p: Array) -> tuple[float, Array]:
-        """Return the level and the slope of a force that is linear in the states."""
-        key = p.tobytes()
-        if key not in self._limits:
-            _, level, slope = self.screen(0.0, p)
-            self._limits[key] = float(level) or inf, slope.full()[0]
-        return self._limits[key]
+        growth = self.force * ca.jtimes(self.force, z, self.contact.rate)
+        return ca.vertcat(self.force, self.level, growth)
 
     @cached_property
     def linear(self) -> bool:
         """True if the force is linear in the states."""
         return bool(ca.is_linear(self.force, symbols_of(self.contact.states)))
 
-    def over_time(
-        self, integrator: Integrator, inputs: InputData, t: Array, y: Array, p: Array
-    ) -> tuple[Array, Array, Array]:
-        """Return force, level and growth at the times `t` with the unknowns `y`, (times, n)."""
-        if integrator not in self._columns:
-            rows = ca.vertcat(self.force, self.level, self.growth)
-            self._columns[integrator] = Columns(integrator.of_time("held", rows))
-        d = np.hstack([np.tile(p, (t.size, 1)), inputs.values[:, inputs.interval(t)].T])
-        (values,) = self._columns[integrator]([t, y, d], backend="vm")
-        return values[:, 0], values[:, 1], values[:, 2]
+    def ratios(self, screen: ca.Function, z: Array, p: Array) -> Array:
+        """Return force over level at the extreme states `z` of runs, both (n, runs)."""
+        force, level, _ = (rows.full() for rows in screen(z, p))
+        return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
 
-
-def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
-    """Return warnings about a run that ended well; empty if there are none."""
-    if not run.status.ok:
-        return []
-    found: list[UserWarning] = [
-        OverloadWarning(said) for said in _overloads(integrator, inputs, run, p)
-    ]
-    return found + [EnergyWarning(said) for said in gains(integrator, inputs, run, p)]
+    def bound(self, run: Run, p: Array) -> float:
+        """Return an upper bound of force over level in a run, from the extremes of each state."""
+        if self.screen is None:
+            return inf
+        tops = np.array([*map(run.farthest, self.rows)])
+        if self.linear:
+            if (limits := self._limits.get(p.tobytes())) is None:
+                _, level, slope = self.screen(0.0, p)
+                limits = float(level) or inf, np.abs(slope.full()[0])
+                remember(self._limits, p.tobytes(), limits, REMEMBERED)
+            return float(limits[1] @ tops) / limits[0]
+        every = np.column_stack([tops, -tops])
+        return float(self.ratios(self.screen, every, np.tile(p[:, None], (1, 2))).max())
 
 
 def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
     for held in places(integrator.model):
-        most = held.bound(run, p) if held.fixed else 0.0
-        if held.fixed and most <= 1 + MARGIN:
+        most, fixed = held.bound(run, p), held.screen is not None
+        if most <= 1 + MARGIN:
             continue
         t, y = run.seen
-        if held.fixed and held.linear and run.complete:
-            level, slope = held.limits(p)
-            if np.abs(y[:, held.rows] @ slope).max() <= (1 + MARGIN) * level:
-                continue
-        if not held.fixed:
+        if not fixed:
             k = _peaks(y[:, held.rows])
             t, y = t[k], y[k]
-        force, level, growth = held.over_time(integrator, inputs, t, y, p)
+        name = f"held '{held.contact.name}'"
+        force, level, growth = _over_time(integrator, inputs, name, held.watched, t, y, p)
         ratio = np.abs(force) / np.where(level > 0, level, np.inf)
         start = max(1.0, ratio[0])  # the start value may exceed the level
-        allowed = (1 + (MARGIN if held.fixed else WIDE)) * start
-        ratio = ratio if held.fixed else np.where(growth > 0, ratio, 0.0)
+        allowed = (1 + (MARGIN if fixed else WIDE)) * start
+        ratio = ratio if fixed else np.where(growth > 0, ratio, 0.0)
         k = int(ratio.argmax())
         if ratio[k] > allowed:
             yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
-        elif most > allowed and not run.complete:  # the peak is between the result times
+        elif fixed and most > allowed and not run.complete:  # between the result times
             yield overload(held, most)
 
 
@@ -267,23 +263,16 @@ def _held(model: Model, contact: Contact) -> Held | None:
     """Return the force that its states carry; None if the force or the level is unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
-    z = symbols_of(contact.states)
-    try:
-        force = ca.SX(contact.law.force(0.0, contact.N, z, **contact.given))
-        both = by_laws(model, ca.vertcat(force, contact.most_held))
-    except (ValueError, TypeError, NotImplementedError):
+    z, p = symbols_of(contact.states), model.vector("p")
+    force_at, N = contact.law.force, contact.N
+    both = _determined(model, lambda: [force_at(0.0, N, z, **contact.given), contact.most_held])
+    if both is None or not ca.depends_on(both[0], z):
         return None
-    force, level = ca.vertsplit(both)
-    p = model.vector("p")
-    known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
-    if strays(both, known) or not ca.depends_on(force, z):
-        return None
-    fixed, screen = not strays(both, ca.vertcat(z, p)), ca.Function()
-    if fixed:
+    (force, level), screen = ca.vertsplit(both), None
+    if not strays(both, ca.vertcat(z, p)):
         screen = ca.Function("held", [z, p], [force, level, ca.jacobian(force, z)])
     own = [v.name for v in contact.states]
-    rows = [i for i, v in enumerate(model.x) if v.name in own]
-    return Held(contact, rows, force, level, fixed, screen)
+    return Held(contact, [i for i, v in enumerate(model.x) if v.name in own], force, level, screen)
 
 
 def _peaks(z: Array) -> NDArray[np.intp]:
@@ -308,9 +297,9 @@ def of_members(
     found: dict[int, str] = {}
     for held in places(model):
         own = [v.name for v in held.contact.states]
-        if not held.fixed or not set(own).isdisjoint(given):
+        if held.screen is None or not set(own).isdisjoint(given):
             continue
-        ends = [held.ratios(np.array([reach[name][k] for name in own]), p.T) for k in (0, 1)]
-        ratio = np.fmax(*ends)
+        ends = (np.array([reach[name][k] for name in own]) for k in (0, 1))
+        ratio = np.fmax(*(held.ratios(held.screen, end, p.T) for end in ends))
         found |= {int(m): overload(held, ratio[m]) for m in np.flatnonzero(ratio > 1 + MARGIN)}
     return found

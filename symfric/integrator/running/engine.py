@@ -1,51 +1,112 @@
 """Run many step attempts per call, either in CasADi's virtual machine or in compiled C.
 
 Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted step.
+
+The C is assembled from templates. `attempts.c` makes steps with one set of run data and searches
+them for events with `search.c`, which matches `running.events` in Python. `march.c` advances over
+the input intervals and writes the unknowns at the times of the result. All data are in one struct,
+so a call from Python passes a single address (`Work`).
 """
 
 import ctypes
-from dataclasses import dataclass, field
-from enum import IntEnum
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Protocol, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import bound
+from symfric.foundation.numeric import address, bound
+from symfric.integrator.compiled.columns import filled
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.following import Following
-from symfric.integrator.equations.initial import FLOOR
-from symfric.integrator.running.crossings import Crossings
-from symfric.integrator.running.events import Change, Eventful, Happened, Search
-from symfric.integrator.running.loop import Work, loop_source, width
-from symfric.integrator.running.record import pieces_of
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.equations.blocks import Following
+from symfric.integrator.equations.initial import FLOOR, SURE
+from symfric.integrator.running import crossings as limits
+from symfric.integrator.running.crossings import LOOKS, Crossings
+from symfric.integrator.running.events import Change, Eventful, Search, Stop
+from symfric.integrator.running.record import Dense, Outputs
+from symfric.integrator.step.layout import GROWTH_MEMORY, Given, Record, State
 
 Array = NDArray[np.float64]
-
-
-class Stop(IntEnum):
-    """Reason why an engine returned.
-
-    It includes requests of events (`running.events`) and algebraic unknowns that need a full search
-    after a jump of inputs.
-    """
-
-    END = 0
-    FULL = 1
-    ATTEMPTS = 2
-    STEP_TOO_SMALL = 3
-    TERMINAL = 4
-    STORM = 5
-    FOLLOW = 6
-    SEARCH = 7
-
-
 STOPS = tuple(Stop)
 """Reasons by number."""
+MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20
+"""Limits of accepted steps in a buffer, and its size in bytes; the buffer is kept between runs."""
 BATCH, FEW = 32, 8
 """Attempts per call of the virtual machine, and in intervals that need only a few."""
+
+
+class Loop(ctypes.Structure):
+    """Struct `symfric_loop` of the C code, field by field."""
+
+    _fields_ = (
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("S", "R", "rows", "times", "out", "breaks", "data", "memory", "jumps")
+        ),
+        ("h_min", ctypes.c_double),
+        *(
+            (name, ctypes.c_longlong)
+            for name in ("max_rows", "max_attempts", "max_jumps", "n_times", "found", "intervals",
+                         "interval", "n_data", "count", "made", "jumped")
+        ),
+    )  # fmt: skip
+
+
+@final
+class Work:
+    """Buffers of one run, shared with the engines; reused by later runs.
+
+    Attributes:
+        S, R: memory and unknowns of the step, and the constant data of an attempt.
+        rows: buffer of records.
+        loop: counters, limits and addresses.
+        outputs: requested values at given times.
+        events: state of the event search; None for a model without events.
+    """
+
+    def __init__(self, n: int, given: int, dense_rows: int, rows: int | None = None) -> None:
+        self.n, width = n, Record(n, dense_rows).width
+        if rows is None:
+            rows = max(LEAST_ROWS, min(MOST_ROWS, BYTES // (8 * width)))
+        self.S, self.R = np.zeros(State.MEMORY + n), np.zeros(given)
+        self.rows = np.empty((rows, width))
+        self.loop = Loop(
+            S=self.S.ctypes.data, R=self.R.ctypes.data, rows=self.rows.ctypes.data, max_rows=rows
+        )
+        self.address = ctypes.addressof(self.loop)
+        self.outputs: Outputs = Outputs.at(np.zeros(0), n)
+        self.events: Eventful | None = None
+        self.breaks, self.data = np.zeros(2), np.zeros((0, 1))
+
+    def over(self, breaks: Array, data: Array) -> None:
+        """Set the input intervals: `breaks` (k + 1,) and the `data` (n_data, k) on each of them."""
+        loop, self.breaks, self.data = self.loop, breaks, data
+        loop.intervals, loop.n_data = breaks.size - 1, data.shape[0]
+        if breaks.size > 2:
+            self.breaks, self.data = np.ascontiguousarray(breaks), np.ascontiguousarray(data)
+            loop.breaks, loop.data = self.breaks.ctypes.data, self.data.ctypes.data
+        self.enter(0)
+
+    def interval(self, times: Array) -> NDArray[np.intp]:
+        """Return the index of the input interval of each time; at a break the later one."""
+        return np.searchsorted(self.breaks[1:-1], times, side="right")
+
+    def enter(self, interval: int) -> None:
+        """Start an input interval: set its end and its data."""
+        self.loop.interval = interval
+        self.R[Given.T_END] = self.breaks[interval + 1]
+        if self.data.shape[0]:
+            self.R[-self.data.shape[0] :] = self.data[:, interval]
+
+    def want(self, outputs: Outputs, events: Eventful | None) -> None:
+        """Set the `outputs` to fill and the `events` to carry out."""
+        loop, self.outputs, self.events = self.loop, outputs, events
+        loop.n_times = outputs.times.size
+        loop.times, loop.out = address(outputs.times), address(outputs.values)
+        if events is not None:
+            loop.memory, loop.jumps, loop.max_jumps = events.pointers
 
 
 class Engine(Protocol):
@@ -67,14 +128,12 @@ class Engine(Protocol):
         ...
 
 
-@final
 class _Batch:
     """Buffers and mapped function for a fixed number of attempts in one call of the virtual
     machine.
     """
 
     def __init__(self, step: ca.Function, size: int) -> None:
-        self.size = size
         self.S, self.S_out = np.zeros(step.numel_in(0)), np.zeros((size, step.numel_in(0)))
         self.R, self.D = np.zeros((size, step.numel_in(1))), np.zeros((size, step.numel_out(1)))
         attempts = step.mapaccum("batch", size)
@@ -82,59 +141,34 @@ class _Batch:
 
 
 @final
-@dataclass(frozen=True, eq=False)
 class VmEngine:
     """Engine in CasADi's virtual machine: batches of attempts in one call; needs no compiler.
 
     It makes the same attempts as the compiled loop, bit for bit: both evaluate one graph operation
-    by
-    operation, each rounded once (`compiled.compiler.FLAGS`), with one math library.
+    by operation, each rounded once (`compiled.compiler.FLAGS`), with one math library.
     """
 
-    step: ca.Function
-    size: int
-    follows: bool = False
-    name: str = "vm"
-    _batches: dict[int, list["_Batch"]] = field(default_factory=dict[int, list["_Batch"]])
+    name = "vm"
 
-    @classmethod
-    def of(cls, step: ca.Function, size: int = BATCH, follows: bool = False) -> "VmEngine":
-        """Return the engine for a step Function; with `follows`, unknowns follow jumps of
-        inputs.
+    def __init__(self, step: ca.Function, size: int = BATCH, follows: bool = False) -> None:
+        self.step, self.size, self.follows = step, size, follows
+        self._batches: dict[int, list[_Batch]] = {}
+
+    def _attempts(self, work: Work, rows: int, attempts: int, size: int) -> tuple[Array, int, Stop]:
+        """Advance S, by `size` attempts in one call, up to the end in R; return the records, the
+        attempts made and the reason to stop.
         """
-        return cls(step, size, follows)
-
-    def _batch(self, size: int) -> "_Batch":
-        """Return a free batch of `size` attempts, to be given back after use."""
         try:
-            return self._batches.setdefault(size, []).pop()
+            batch = self._batches.setdefault(size, []).pop()
         except IndexError:
-            return _Batch(self.step, size)
-
-    def _attempts(
-        self,
-        S: Array,
-        R: Array,
-        rows: int,
-        attempts: int,
-        h_min: float,
-        events: Eventful | None,
-        size: int,
-    ) -> tuple[Array, int, Stop]:
-        """Advance S; return the records, the attempts made and the reason to stop.
-
-        Events in `events`, if given, are carried out; `size` attempts are made in one call.
-        """
-        batch, search = self._batch(size), None if events is None else events.search
-        S_out, D = batch.S_out, batch.D
+            batch = _Batch(self.step, size)
+        S, R, events, h_min = work.S, work.R, work.events, work.loop.h_min
+        S_out, D, t_end = batch.S_out, batch.D, R[Given.T_END]
         batch.R[:] = R
-        found: list[Array] = []
-        count = made = 0
-        t_end = R[Given.T_END]
         surely = max(h_min, FLOOR * max(abs(t_end), abs(S[State.T])))
-        asked = Happened.NOTHING
+        found, count, made, request = list[Array](), 0, 0, None
         while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
-            if asked or (events is not None and events.full):
+            if request or (events is not None and events.full):
                 break
             batch.S[:] = S
             batch.call()
@@ -146,31 +180,28 @@ class VmEngine:
                 and S_out[:, State.H].min() >= surely
                 and size <= min(rows - count, attempts - made)
             ):  # discard attempts of the batch that the compiled loop would not make
-                room = np.cumsum(took) - took < rows - count
-                goes = (before[:, State.T] < t_end) & _large(before, h_min) & room
+                fits = np.cumsum(took) - took < rows - count
+                goes = (before[:, State.T] < t_end) & _large(before, h_min) & fits
                 used = min(size if goes.all() else int(np.argmin(goes)), attempts - made)
                 took[used:] = False
-            found.append(
-                np.hstack(
-                    [
-                        before[took, State.T, None],
-                        S_out[took, State.T, None],
-                        before[took, State.Y],
-                        S_out[took, State.Y],
-                        D[took],
-                    ]
-                )
-            )
-            if search is not None:
-                found[-1], used, asked = _searched(search, found[-1], S_out, (took, used), R)
+            times = before[took, State.T, None], S_out[took, State.T, None]
+            found.append(np.hstack([*times, before[took, State.Y], S_out[took, State.Y], D[took]]))
+            if events is not None:
+                found[-1], used, request = _searched(events.search, found[-1], S_out, took, used, R)
             count += found[-1].shape[0]
             made += used
             S[:] = S_out[used - 1]
         self._batches[size].append(batch)
-        n = S.size - State.MEMORY
-        records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
-        full = count >= rows or (events is not None and events.full)
-        return records, made, Stop(asked) if asked else _reason(S, R, full, h_min)
+        records = np.vstack([work.rows[:0], *found]) if len(found) != 1 else found[0]
+        if request is None:
+            request = Stop.ATTEMPTS
+            if S[State.T] >= t_end:
+                request = Stop.END
+            elif not _large(S, h_min).all():
+                request = Stop.STEP_TOO_SMALL
+            elif count >= rows or (events is not None and events.full):
+                request = Stop.FULL
+        return records, made, request
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
         """Advance `work`; return the records, the attempts made and the reason to stop."""
@@ -179,13 +210,13 @@ class VmEngine:
         if work.events is not None:
             work.events.count = work.events.steps = 0
         while True:
-            limits = loop.max_rows - count, attempts - made, loop.h_min
-            records, tried, stop = self._attempts(work.S, work.R, *limits, work.events, size)
+            left = loop.max_rows - count, attempts - made
+            records, tried, stop = self._attempts(work, *left, size)
             size = self.size if tried > FEW else min(self.size, FEW)
             found.append(records)
             count, made = count + records.shape[0], made + tried
             if records.shape[0]:
-                work.outputs.fill(pieces_of(records, work.n))
+                work.outputs.fill(Dense.of(records, work.n))
             if stop is not Stop.END or loop.interval + 1 == loop.intervals:
                 break
             work.enter(loop.interval + 1)
@@ -201,29 +232,25 @@ class VmEngine:
 
 
 def _searched(
-    search: Search,
-    records: Array,
-    S_out: Array,
-    attempts: tuple[NDArray[np.bool_], int],
-    R: Array,
-) -> tuple[Array, int, Happened]:
-    """Return the records of a batch up to its first events, the attempts used and the event
-    request.
+    search: Search, records: Array, S_out: Array, took: NDArray[np.bool_], used: int, R: Array
+) -> tuple[Array, int, Stop | None]:
+    """Return the records of a batch up to its first events, the attempts used and the request of
+    events.
 
     Args:
+        search: the search.
         records, S_out: of the batch; the attempt that led to events continues after them.
-        attempts: mask of accepted attempts, and how many attempts count.
+        took, used: mask of accepted attempts, and how many attempts count.
         R: run data of the batch.
     """
-    took, used = attempts
     accepted, i = np.flatnonzero(took), 0
     while (i := i + search.without(records[i:], R)) < accepted.size:
         k = int(accepted[i])
-        change, asked = search(records[i], S_out[k], R)
+        change, request = search(records[i], S_out[k], R)
         i += 1
         if change:
-            return records[: i - (change is Change.DROPPED)], k + 1, asked
-    return records, used, Happened.NOTHING
+            return records[: i - (change is Change.DROPPED)], k + 1, request
+    return records, used, None
 
 
 def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
@@ -231,41 +258,17 @@ def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
     return S[..., State.H] >= np.maximum(h_min, FLOOR * np.abs(S[..., State.T]))
 
 
-def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:
-    if S[State.T] >= R[Given.T_END]:
-        return Stop.END
-    if not _large(S, h_min).all():
-        return Stop.STEP_TOO_SMALL
-    return Stop.FULL if full else Stop.ATTEMPTS
-
-
 @final
-@dataclass(frozen=True, eq=False)
 class CompiledEngine:
     """Engine in a compiled loop around the generated C of the step; releases the GIL."""
 
-    library: ctypes.CDLL
-    name: str = "compiled"
+    name = "compiled"
 
-    @classmethod
-    def of(
-        cls,
-        step: ca.Function,
-        dense_rows: int,
-        crossings: Crossings | None = None,
-        follows: bool = False,
-        follow: Following | None = None,
-        source: str = "",
-    ) -> "CompiledEngine":
-        """Compile the loop of these parts (`loop_source`), or load it from the cache.
-
-        `source` is its C if already generated.
-        """
-        source = source or loop_source(step, dense_rows, crossings, follows, follow)
-        library = load(source, "symfric_march")
-        library.symfric_march.restype = ctypes.c_int
-        library.symfric_march.argtypes = [ctypes.c_void_p]
-        return cls(library)
+    def __init__(self, source: str) -> None:
+        """Compile the `loop_source`, or load it from the cache."""
+        self.library = load(source, "symfric_march")
+        self.library.symfric_march.restype = ctypes.c_int
+        self.library.symfric_march.argtypes = [ctypes.c_void_p]
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
         """Advance `work`; return records in its buffer, the attempts made and the reason to
@@ -278,3 +281,81 @@ class CompiledEngine:
         if work.events is not None:
             work.events.count = loop.jumped
         return work.rows[: loop.count], loop.made, STOPS[reason]
+
+
+FOLDER = Path(__file__).parent
+
+
+def c_source(
+    step: ca.Function,
+    dense_rows: int,
+    *others: ca.Function,
+    crossings: Crossings | None = None,
+) -> str:
+    """Return the CasADi C of the step with the attempt loop that calls it until it must stop.
+
+    `others` are Functions that further C calls by name. Without events, the code has no event
+    search.
+    """
+    generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
+    called = (step, *(crossings.functions if crossings else ()))
+    for function in (*called, *others):
+        generator.add(function)
+    n, given = step.numel_in(0) - State.MEMORY, step.numel_in(1)
+    attempts = filled(
+        FOLDER / "attempts.c", *called,
+        n=n, memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, given=given,
+        width=Record(n, dense_rows).width, dense=2 + 2 * n, dense_rows=dense_rows, floor=FLOOR,
+        jump=crossings.width if crossings else 0, searches=int(crossings is not None),
+    )  # fmt: skip
+    search = "" if crossings is None else search_source(crossings, given)
+    return generator.dump() + search + attempts
+
+
+def loop_source(
+    step: ca.Function,
+    dense_rows: int,
+    crossings: Crossings | None = None,
+    follows: bool = False,
+    follow: Following | None = None,
+) -> str:
+    """Return the C of the whole loop.
+
+    Args:
+        step, dense_rows: one attempt.
+        crossings: events.
+        follows: True if there are algebraic unknowns, which follow a jump of inputs.
+        follow: update of these unknowns; without it the loop returns at each jump and each event.
+    """
+    settles = follow is not None and crossings is not None and not crossings.closes
+    march = filled(
+        FOLDER / "march.c",
+        follows=0 if not follows else 1 if follow is None else 2,
+        settles=int(settles),
+        data=0 if follow is None else follow.round.numel_in(1),
+    )
+    if follow is None:
+        return c_source(step, dense_rows, crossings=crossings) + march
+    return c_source(step, dense_rows, follow.round, crossings=crossings) + follow.c_source + march
+
+
+def search_source(crossings: Crossings, given: int) -> str:
+    """Return the C of the event search in an accepted step; `given` is the length of R."""
+    record, resets = crossings.record, crossings.resets
+    return filled(
+        FOLDER / "search.c", *crossings.functions,
+        n=record.n, row=record.width, y0=record.y0.start, y1=record.y1.start,
+        events=crossings.count, resets=len(resets),
+        directions=_table(crossings.directions), terminal=_table(crossings.terminal),
+        by_event=_table(i for i, _ in resets), of_state=_table(j for _, j in resets),
+        follows=int(crossings.follows),
+        looks=len(LOOKS) - 1, at_looks=", ".join(map(repr, LOOKS)), kept=limits.KEPT,
+        alike=limits.ALIKE, finer=limits.FINER, sharper=limits.SHARPER, soon=limits.SOON,
+        straight=limits.STRAIGHT, restart=limits.RESTART, least=limits.LEAST, sure=SURE,
+        growth=GROWTH_MEMORY, memory=State.MEMORY, d=given - crossings.data, h_max=Given.H_MAX,
+    )  # fmt: skip
+
+
+def _table(values: Iterable[int]) -> str:
+    """Return the entries of a C array, at least one."""
+    return ", ".join(str(int(value)) for value in values) or "0"

@@ -4,8 +4,7 @@ This is the search for the virtual machine, and the types that both engines shar
 repeats the search in C, operation by operation.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 from functools import cached_property, partial
 from typing import final
@@ -16,14 +15,10 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import bound
 from symfric.integrator.equations.initial import SURE
+from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import (
-    ALIKE,
     AT_ONCE,
-    KEPT,
-    LEAST,
     LOOKS,
-    RESTART,
-    SOON,
     Crossings,
     Isolation,
     Memory,
@@ -31,10 +26,28 @@ from symfric.integrator.running.crossings import (
 )
 from symfric.integrator.running.record import Jumps
 from symfric.integrator.step.layout import Given, Record, State
+from symfric.model.parts import Event
 
 Array = NDArray[np.float64]
 JUMPS = 512
 """Jumps recorded between two returns of an engine."""
+
+
+class Stop(IntEnum):
+    """Reason why an engine returned, some of them requests of events.
+
+    `SEARCH`: algebraic unknowns need a full search after a jump of inputs; `FOLLOW`: they have to
+    follow an event.
+    """
+
+    END = 0
+    FULL = 1
+    ATTEMPTS = 2
+    STEP_TOO_SMALL = 3
+    TERMINAL = 4
+    STORM = 5
+    FOLLOW = 6
+    SEARCH = 7
 
 
 class Change(IntEnum):
@@ -46,17 +59,7 @@ class Change(IntEnum):
     DROPPED = 3
 
 
-class Happened(IntEnum):
-    """Action requested by events."""
-
-    NOTHING = 0
-    TERMINAL = 4
-    STORM = 5
-    FOLLOW = 6
-
-
 @final
-@dataclass(eq=False)
 class Eventful:
     """Event data of a run in progress, which engines read and write.
 
@@ -68,21 +71,16 @@ class Eventful:
         rows: records of jumps, the first `count` of them in use.
     """
 
-    crossings: Crossings
-    tolerance: float
-    count: int = 0
-    steps: int = 0
-    memory: Array = field(init=False)
-    rows: Array = field(init=False)
+    def __init__(self, crossings: Crossings, tolerance: float) -> None:
+        self.crossings, self.tolerance = crossings, tolerance
+        self.count = self.steps = 0
+        self.memory = Memory.new(crossings.count, tolerance)
+        self.rows = np.empty((JUMPS, crossings.width))
 
     @cached_property
     def search(self) -> "Search":
         """The search of the virtual machine, with its buffers."""
         return Search(self)
-
-    def __post_init__(self) -> None:
-        self.memory = Memory.new(self.crossings.count, self.tolerance)
-        self.rows = np.empty((JUMPS, self.crossings.width))
 
     @property
     def full(self) -> bool:
@@ -105,10 +103,15 @@ class Eventful:
         if self.memory[Memory.PHASE] == Memory.ON:
             self.memory[Memory.PHASE] = Memory.JUMPED
 
-    def jumped(self, before: Array) -> None:
-        """Start just after a jump; `before` are the event values before it."""
-        self.memory[Memory.PHASE] = Memory.JUMPED
-        self.memory[Memory.before(self.crossings.count)] = before
+    def started(self, events: Sequence[Event], values: Array) -> None:
+        """Give events that have already happened at the start, with these values, the values just
+        before them.
+        """
+        if any(event.at_start for event in events):
+            self.memory[Memory.PHASE] = Memory.JUMPED
+            self.memory[Memory.before(self.crossings.count)] = [
+                -e.direction if e.at_start else x for e, x in zip(events, values, strict=True)
+            ]
 
 
 @final
@@ -123,13 +126,13 @@ class Search:
         self._looks, self._noise, _, self._values, self._cut, self._jump = functions
         self._doubts = _called(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
-        self._none = np.zeros(self.crossings.count)
-        possible, count = self.crossings.possible, self.crossings.count
-        self._first, self._ends = np.zeros(count), np.zeros((AT_ONCE, count))
+        count = self.crossings.count
+        self._none, self._first = np.zeros((2, count))
+        self._ends = np.zeros((AT_ONCE, count))
         self._rows = np.zeros((AT_ONCE, self.crossings.record.width))
         self._data, self._some = np.zeros((AT_ONCE, self.crossings.data)), np.zeros(AT_ONCE)
         inputs = self._first, self._rows, self._data
-        self._possible = bound(possible, inputs, (self._ends, self._some))
+        self._possible = bound(self.crossings.possible, inputs, (self._ends, self._some))
 
     def without(self, rows: Array, R: Array) -> int:
         """Return how many accepted steps from the first of `rows` on have no event for certain."""
@@ -151,20 +154,23 @@ class Search:
         self.eventful.steps += done
         return done
 
-    def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
+    def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Stop | None]:
         """Search the accepted step `row`, which led to S, for events.
 
         The first events are carried out: the row is cut there and S continues after them. If they
-        happen
-        at the very start of the step, the row is dropped. Without events the step in S may be
-        lengthened
-        if a previous event shortened it.
+        happen at the very start of the step, the row is dropped. Without events the step in S may
+        be lengthened if a previous event shortened it.
         """
         d = R[R.size - self.crossings.data :]
         found = self._crossing(row, d)
         if found is None:
             self.eventful.steps += 1
-            return self._resume(S, float(R[Given.H_MAX])), Happened.NOTHING
+            h = min(float(self.memory[Memory.RESUME]), float(R[Given.H_MAX]))
+            self.memory[Memory.RESUME] = 0.0
+            if S[State.H] >= h:
+                return Change.NOTHING, None
+            S[State.H] = h
+            return Change.RESUMED, None
         theta, which = found
         h = float(row[Record.T1] - row[Record.T0])
         self.memory[Memory.RESUME] = max(self.memory[Memory.RESUME], h)
@@ -185,26 +191,17 @@ class Search:
         self.eventful.count += 1
         # the step size after an event is a guess: the earlier ones are no guide, dynamics may be
         # faster
-        again = max(min(h, RESTART * self.tolerance), LEAST * h, SURE * abs(t))
+        again = max(min(h, limits.RESTART * self.tolerance), limits.LEAST * h, SURE * abs(t))
         S[:] = State.at(t, again, after)
-        return (Change.CUT if kept else Change.DROPPED), self._asked(t, which)
+        return (Change.CUT if kept else Change.DROPPED), self._request(t, which)
 
-    def _resume(self, S: Array, h_max: float) -> Change:
-        """Restore the step size from before an event."""
-        h = min(float(self.memory[Memory.RESUME]), h_max)
-        self.memory[Memory.RESUME] = 0.0
-        if S[State.H] >= h:
-            return Change.NOTHING
-        S[State.H] = h
-        return Change.RESUMED
-
-    def _asked(self, t: float, which: NDArray[np.bool_]) -> Happened:
-        """Return the action that the events `which` at time `t` request."""
+    def _request(self, t: float, which: NDArray[np.bool_]) -> Stop | None:
+        """Return the request of the events `which` at time `t`."""
         if any(over for over, here in zip(self.crossings.terminal, which, strict=True) if here):
-            return Happened.TERMINAL
+            return Stop.TERMINAL
         if storm(self.memory, t, which):
-            return Happened.STORM
-        return Happened.FOLLOW if self.crossings.follows else Happened.NOTHING
+            return Stop.STORM
+        return Stop.FOLLOW if self.crossings.follows else None
 
     def _crossing(self, row: Array, d: Array) -> tuple[float, NDArray[np.bool_]] | None:
         """Return the place of the first events in the step and a mask of them; None without events.
@@ -221,7 +218,7 @@ class Search:
         elif memory[Memory.PHASE] == Memory.FRESH:
             g[0] = self._inside(row, d, 0.0)
         else:
-            low = min(SOON * self.tolerance / h, 0.1)
+            low = min(limits.SOON * self.tolerance / h, 0.1)
             g[0] = self._inside(row, d, low)
             jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
         g[1:] = self._looks(np.array([low]), row, d)[0].reshape(-1, count)
@@ -275,14 +272,14 @@ def storm(memory: Array, t: float, which: NDArray[np.bool_]) -> bool:
     memory[Memory.ALIKE] = memory[Memory.ALIKE] + 1 if (last == which).all() else 1
     last[:] = which
     count = int(memory[Memory.COUNT]) + 1
-    times[(count - 1) % KEPT] = t
+    times[(count - 1) % limits.KEPT] = t
     memory[Memory.COUNT] = count
     tolerance = float(memory[Memory.TOLERANCE])
     apart = max(tolerance, float(np.spacing(abs(t))))
-    if count >= KEPT and t - times[count % KEPT] < 10 * apart * KEPT:
+    if count >= limits.KEPT and t - times[count % limits.KEPT] < 10 * apart * limits.KEPT:
         return True
-    if memory[Memory.ALIKE] < ALIKE:
+    if memory[Memory.ALIKE] < limits.ALIKE:
         return False
-    recent = times[np.arange(count - ALIKE, count) % KEPT]
+    recent = times[np.arange(count - limits.ALIKE, count) % limits.KEPT]
     a, b, c = (float(gap) for gap in np.diff(recent))
     return b < a and c < b and c * c / (b - c) < 1000 * tolerance

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -15,37 +15,37 @@ from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.blocks import refinement
-from symfric.integrator.equations.following import Following, corrected, following
+from symfric.integrator.equations.blocks import Following, corrected, following, refinement
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.matrices import Order
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method, suited
 from symfric.integrator.running.crossings import Crossings, crossings
-from symfric.integrator.running.engine import BATCH, CompiledEngine, Engine, VmEngine
-from symfric.integrator.running.loop import Work, loop_source
+from symfric.integrator.running.engine import (
+    BATCH,
+    CompiledEngine,
+    Engine,
+    VmEngine,
+    Work,
+    loop_source,
+)
 from symfric.integrator.step.attempt import written
 from symfric.model import Model
 from symfric.model.kinds import in_results
 
 Array = NDArray[np.float64]
-Point = tuple[bytes | float, ...]
-Parts = tuple[ca.Function, int, Crossings | None, bool, Following | None]
-Orders = tuple[tuple[str, Order], ...]
 JUDGED = 4
 """Number of argument sets of `Integrator.suited` whose results are cached."""
-
 INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
 same form.
 """
-
 EVENT_BATCH = 8
 """Attempts per virtual machine call with events; attempts after an event are wasted."""
-
 SPARE = 2
 """Buffer sets kept: one for a run, one for a run within its callback."""
+REMEMBERED = 16
+"""Integrators cached per model; the oldest is dropped first."""
 
 
 @final
@@ -56,9 +56,16 @@ class Integrator:
     The engine affects speed only: both give the same bits.
 
     Mutable state is only a cache: engines, the time spent in the virtual machine (from which it
-    decides
-    when compiling saves time), the last start, and integrators of the same system with other
-    pivots.
+    decides when compiling saves time), the last start, and integrators of the same system with
+    other pivots.
+
+    Attributes:
+        model, inputs, tableau: model, structure of its inputs, and method.
+        whole: the system, if its pivots are not those chosen by default.
+        memory: what is derived from it elsewhere.
+        step: attempt as in `step.attempt`.
+        f: (y, d) -> right-hand sides.
+        events, resets: (t, y, d) -> event expressions, and values of all resets.
     """
 
     model: Model
@@ -68,12 +75,10 @@ class Integrator:
     build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0
-    _engines: dict[str, Engine] = field(default_factory=dict[str, Engine])
-    _starts: dict[tuple[bytes, bytes], Array] = field(
-        default_factory=dict[tuple[bytes, bytes], Array]
-    )
-    _judged: dict[Point, "Integrator"] = field(default_factory=dict[Point, "Integrator"])
-    _others: dict[Orders, "Integrator"] = field(default_factory=dict[Orders, "Integrator"])
+    memory: dict[str, Any] = field(default_factory=dict[str, Any])
+    _start: tuple[bytes, bytes, Array] = (b"", b"", np.zeros(0))
+    _others: dict[Hashable, "Integrator"] = field(default_factory=dict[Hashable, "Integrator"])
+    _judged: dict[Hashable, "Integrator"] = field(default_factory=dict[Hashable, "Integrator"])
     _spare: list[Work] = field(default_factory=list[Work])
 
     def __post_init__(self) -> None:
@@ -81,78 +86,54 @@ class Integrator:
         self.system: System = self.whole or system(self.model, self.inputs)
         self.step, self.instructions = written(self.system, self.tableau, INLINE)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
-        self.events = self._event_function()
-        self.resets = self._reset_function()
-        self.crossings = self._crossings() if self.model.events else None
-        self.prospect = Prospect(self._written, ("symfric_march",), self.instructions)
-        self.schedules = self._schedules()
+        self.events, sizes = self._event_functions()
+        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
+        self.resets = self.of_time("resets", stacked(resets))
+        self.crossings: Crossings | None = None
+        if self.model.events:
+            manifold = self.system.manifold
+            closes, rows = manifold is not None and manifold.m > 0, self.tableau.H.shape[0]
+            self.crossings = crossings(
+                self.model, self.events, sizes, self.resets, rows, self.follows, closes
+            )
+        self.prospect = Prospect(self._source, ("symfric_march",), self.instructions)
         self.build_time = perf_counter() - begin
 
-    def _written(self) -> str:
-        """Return the C of the loop."""
-        return loop_source(*self._parts)
-
-    def _schedules(self) -> tuple[str, ...]:
-        """Return event expressions that depend on time only, serialised; error control does not
-        see them.
-        """
-        own, t = [ca.SX(event.expression) for event in self.model.events], self.model.t
-        alone = (e for e in own if not any(not ca.is_equal(s, t) for s in ca.symvar(e)))
-        return tuple(ca.SX.serialize(e) for e in alone)
-
-    def _event_function(self) -> ca.Function:
+    def _event_functions(self) -> tuple[ca.Function, ca.Function]:
         """Return the event expressions (t, y, d), with algebraic unknowns that solve their
-        equations.
+        equations, and the magnitudes of the contributions of t and y to them.
 
         Within a step these unknowns are accurate to the tolerance, and after an event exact.
         Without one step of Newton's method an event that depends on them may pass through zero a
         second time there. Those of a mechanism are unchanged.
         """
-        values = stacked(ca.SX(e.expression) for e in self.model.events)
-        events, s = self.of_time("events", ca.densify(values)), self.system
-        moved = s.y[[int(i) for i in np.flatnonzero(s.free.any(axis=1))]]
-        if s.manifold is not None or not ca.depends_on(events(ca.SX(0), s.y, s.d), moved):
-            return events
-        t = ca.SX.sym("time")
-        solved = events(t, corrected(s)(s.y, s.d), s.d)
-        return ca.Function("events", [t, s.y, s.d], [solved], {"cse": True})
-
-    def _reset_function(self) -> ca.Function:
-        """Return the values of all resets, event after event, as a Function (t, y, d)."""
-        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
-        return self.of_time("resets", stacked(resets))
-
-    def _crossings(self) -> Crossings:
-        """Return the Functions of the event search."""
-        manifold = self.system.manifold
-        return crossings(
-            self.model.events,
-            [v.name for v in self.model.x],
-            self.events,
-            self._sizes(),
-            self.resets,
-            self.tableau.H.shape[0],
-            self.follows,
-            manifold is not None and manifold.m > 0,
-        )
-
-    def _sizes(self) -> ca.Function:
-        """Return the magnitudes of the contributions of t and y to event expressions, as a
-        Function (t, y, d).
-        """
         s, t = self.system, ca.SX.sym("time")
         values = stacked(ca.SX(e.expression) for e in self.model.events)
-        own = ca.vertcat(t, s.y)
-        slopes = ca.jacobian(self.of_time("events", ca.densify(values))(t, s.y, s.d), own)
-        return ca.Function("sizes", [t, s.y, s.d], [ca.fabs(slopes) @ ca.fabs(own)])
+        events, of = self.of_time("events", ca.densify(values)), ca.vertcat(t, s.y)
+        expressions = events(t, s.y, s.d)
+        size = ca.fabs(ca.jacobian(expressions, of)) @ ca.fabs(of)
+        sizes = ca.Function("sizes", [t, s.y, s.d], [size])
+        moved = s.y[np.flatnonzero(s.free.any(axis=1)).tolist()]
+        if s.manifold is None and ca.depends_on(expressions, moved):
+            solved = events(t, corrected(s)(s.y, s.d), s.d)
+            events = ca.Function("events", [t, s.y, s.d], [solved], {"cse": True})
+        return events, sizes
+
+    @cached_property
+    def schedules(self) -> tuple[str, ...]:
+        """Event expressions that depend on time only, serialised; error control does not see
+        them.
+        """
+        own, t = [ca.SX(event.expression) for event in self.model.events], self.model.t
+        alone = (e for e in own if all(ca.is_equal(s, t) for s in ca.symvar(e)))
+        return tuple(ca.SX.serialize(e) for e in alone)
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
         """Return `expression` of the model as a Function (t, y, d) with the inputs inserted."""
-        s, t = self.system, ca.SX.sym("time")
-        driven = ca.substitute(expression, self.model.vector("u"), self.inputs.expression)
-        if s.timed:
-            return ca.Function(name, [t, s.y, s.d], [driven])
-        return ca.Function(name, [self.model.t, s.y, s.d], [driven])
+        s, u = self.system, self.model.vector("u")
+        driven = ca.substitute(expression, u, self.inputs.expression)
+        t = ca.SX.sym("time") if s.timed else self.model.t
+        return ca.Function(name, [t, s.y, s.d], [driven])
 
     @cached_property
     def follows(self) -> bool:
@@ -182,11 +163,11 @@ class Integrator:
 
         Between steps the constraints of a mechanism hold to the tolerance only, in results exactly.
         """
-        signals, manifold = self.of_time("signals", expression), self.system.manifold
-        if manifold is None:
+        signals, s = self.of_time("signals", expression), self.system
+        if s.manifold is None:
             return signals
-        t, y, d = ca.SX.sym("t"), ca.SX.sym("y", self.system.n), ca.SX.sym("d", signals.numel_in(2))
-        return ca.Function("signals", [t, y, d], [signals(t, refinement(self.system)(y, d), d)])
+        t, y, d = ca.SX.sym("t"), ca.SX.sym("y", s.n), ca.SX.sym("d", s.d.numel())
+        return ca.Function("signals", [t, y, d], [signals(t, refinement(s)(y, d), d)])
 
     @cached_property
     def signal_columns(self) -> Columns:
@@ -218,12 +199,10 @@ class Integrator:
         """
         if not self.follows:
             return y
-        key = (y.tobytes(), d.tobytes())
-        found = self._starts.get(key)
-        if found is None:  # another thread may cache another one meanwhile
-            found = self.consistent(f"model '{self.model.name}'", y, d)
-            self._starts = {key: found}
-        return found
+        key, last = (y.tobytes(), d.tobytes()), self._start
+        if last[:2] != key:  # another thread may cache another one meanwhile
+            last = self._start = (*key, self.consistent(f"model '{self.model.name}'", y, d))
+        return last[2]
 
     def consistent(self, where: str, y: Array, d: Array) -> Array:
         """Return `y` with consistent algebraic unknowns.
@@ -238,8 +217,8 @@ class Integrator:
 
     @cached_property
     def has_pivots(self) -> bool:
-        """True if pivots have to be chosen, which may be stable at one point and not at another."""
-        return self.system.manifold is None and not self.system.is_ode
+        """See `System.has_pivots`."""
+        return self.system.has_pivots
 
     def suited(self, points: Sequence[tuple[Array, Array]], span: float) -> "Integrator":
         """Return this integrator, or one of the same model with stable pivots.
@@ -248,8 +227,7 @@ class Integrator:
 
         Args:
             points: (y, d) that a run has to pass, the newest last; algebraic unknowns of the first
-            one
-                are computed.
+                one are computed.
             span: duration of the run [s].
         """
         if not self.has_pivots:
@@ -258,19 +236,15 @@ class Integrator:
         found = self._judged.get(key)
         if found is None:
             consistent_at = [(self.start(*points[0]), points[0][1]), *points[1:]]
-            whole = suited(self.system, self.tableau, consistent_at, span)
-            found = self if whole is self.system else self._other(whole)
-            while len(self._judged) >= JUDGED:
-                self._judged.pop(next(iter(self._judged)), None)
-            self._judged[key] = found
+            found, whole = self, suited(self.system, self.tableau, consistent_at, span)
+            if whole is not self.system:
+                orders = tuple(sorted(whole.orders.items()))
+                if orders not in self._others:
+                    other = Integrator(self.model, self.inputs, self.tableau, whole)
+                    self._others[orders] = other
+                found = self._others[orders]
+            remember(self._judged, key, found, JUDGED)
         return found
-
-    def _other(self, whole: System) -> "Integrator":
-        """Return the integrator of the same equations with other pivots, built once."""
-        orders = tuple(sorted(whole.orders.items()))
-        if orders not in self._others:
-            self._others[orders] = Integrator(self.model, self.inputs, self.tableau, whole)
-        return self._others[orders]
 
     def borrow(self) -> Work:
         """Return buffers for exclusive use by a run; threads and callbacks may run another one."""
@@ -284,33 +258,30 @@ class Integrator:
         if len(self._spare) < SPARE:
             self._spare.append(work)
 
+    @cached_property
     def vm(self) -> Engine:
-        """Return the engine that needs no compiler."""
-        if "vm" not in self._engines:
-            size = EVENT_BATCH if self.model.events else BATCH
-            self._engines["vm"] = VmEngine.of(self.step, size, self.follows)
-        return self._engines["vm"]
+        """Engine that needs no compiler."""
+        size = EVENT_BATCH if self.model.events else BATCH
+        return VmEngine(self.step, size, self.follows)
 
-    @property
-    def _parts(self) -> Parts:
-        """Arguments from which the compiled loop is built."""
+    def _source(self) -> str:
+        """Return the C of the loop."""
         # models without inputs and events seldom jump: not worth the compile time
         jumps = bool(self.model.u or self.model.events)
         follow = self.follow if self.follows and jumps else None
-        return self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow
+        return loop_source(self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow)
 
+    @cached_property
     def compiled(self) -> Engine:
-        """Return the compiled engine; compiles, or loads from the cache, on first use.
+        """Compiled engine; compiled, or loaded from the cache, on first use.
 
         Raises:
             CompileError: no compiler was found, or it failed.
         """
-        if "compiled" not in self._engines:
-            begin = perf_counter()
-            source = self.prospect.written()
-            self._engines["compiled"] = CompiledEngine.of(*self._parts, source=source)
-            self.compile_time = perf_counter() - begin
-        return self._engines["compiled"]
+        begin = perf_counter()
+        engine = CompiledEngine(self.prospect.written())
+        self.compile_time = perf_counter() - begin
+        return engine
 
     def choose(self, backend: str, left: float) -> Engine:
         """Return the engine for `backend`; "auto" compiles if that is expected to save time.
@@ -319,30 +290,23 @@ class Integrator:
             backend: "vm", "compiled" or "auto".
             left: predicted time [s] that the virtual machine still needs, 0 if unknown.
         """
-        if backend == "compiled":
-            return self.compiled()
         if backend == "vm":
-            return self.vm()
-        if "compiled" in self._engines:
-            return self._engines["compiled"]
+            return self.vm
+        if backend == "compiled" or "compiled" in self.__dict__:
+            return self.compiled
         if self.prospect.pays(max(left, self.vm_time)):
             try:
-                return self.compiled()
+                return self.compiled
             except CompileError:  # simulate in the VM if the compiler is broken
                 self.prospect.hopeless = True
-        return self.vm()
-
-
-REMEMBERED = 16
-"""Integrators cached per model; the oldest is dropped first."""
+        return self.vm
 
 
 def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, bool]:
     """Return the integrator of this model, input structure and method, and True if it is new.
 
     The cache belongs to the model: an integrator refers to its model, and a global table would keep
-    both
-    alive for ever.
+    both alive for ever.
     """
     known: dict[Hashable, Integrator] = model.memory.setdefault("integrators", {})
     key = (method.name, method.finer, inputs.key)

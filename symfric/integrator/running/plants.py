@@ -7,20 +7,17 @@ order: a loop in C around the generated step, and one in Python around CasADi's 
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from time import perf_counter
 from typing import final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import bound
-from symfric.foundation.programs import find_compiler
+from symfric.foundation.numeric import bound, evaluate
+from symfric.integrator.compiled.columns import densified, filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
-from symfric.integrator.running import loop
-from symfric.integrator.running.engine import Engine, Stop
-from symfric.integrator.running.events import Eventful
+from symfric.integrator.running.engine import FOLDER, Engine, Work, c_source
+from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.step.layout import Given, State
@@ -29,7 +26,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
 """State of a plant: at its sample; out of attempts; steps too small; algebraic unknowns too far
-from the last ones to follow (`symfric.integrator.equations.following`); resolved by the caller, to
+from the last ones to follow (`symfric.integrator.equations.blocks`); resolved by the caller, to
 be continued; event storm; ended by a terminal event.
 """
 SAMPLES = 1000
@@ -92,6 +89,8 @@ class Plants:
             getattr(self, name)[:] = getattr(before, name)
 
 
+MEMBERS = (FOLDER / "members.h").read_text(encoding="utf-8")
+"""C struct of the arrays."""
 SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
 """Arrays that C reads and writes, in this order."""
 
@@ -118,20 +117,19 @@ def compiled(integrator: Integrator, plants: Plants) -> Advance:
     Raises:
         CompileError: no compiler was found, or it failed.
     """
-    return loaded(integrator, plants, "plants", c_source)
+    return loaded(integrator, plants, "plants", plants_source)
 
 
 def loaded(
     integrator: Integrator, plants: Plants, name: str, source: Callable[[Integrator], str]
 ) -> Advance:
     """Return the C function `symfric_plants` bound to arrays; the integrator caches its library."""
-    kept = integrator.__dict__
-    if name not in kept:
+    if name not in integrator.memory:
         library = load(source(integrator), "symfric_plants")
         library.symfric_plants.restype = ctypes.c_longlong
         library.symfric_plants.argtypes = [ctypes.c_void_p, ctypes.c_int]
-        kept[name] = library
-    function, members = kept[name].symfric_plants, _Members.of(plants)
+        integrator.memory[name] = library
+    function, members = integrator.memory[name].symfric_plants, _Members.of(plants)
     address = ctypes.addressof(members)
 
     def advance(begin: int, _alive: object = (members, plants)) -> int:
@@ -143,52 +141,126 @@ def loaded(
     return advance
 
 
-def in_vm(integrator: Integrator, plants: Plants) -> Advance:
-    """Return the loop in Python; needs no compiler."""
-    step, follow, nx = integrator.step, integrator.follow, integrator.system.nx
-    S, R, after = (np.zeros(k) for k in (step.numel_in(0), step.numel_in(1), step.numel_in(0)))
-    attempt = bound(step, (S, R), (after,))
-    data, held = Given.d(nx), plants.u.shape[1]
+def plants_source(integrator: Integrator) -> str:
+    """Return the C of the step, of the update after a jump, and of the loop around them."""
+    follow, data = integrator.follow, Given.d(integrator.system.nx).start
+    n_d, nu = integrator.system.d.numel(), integrator.inputs.data.numel()
+    others = () if follow is None else (follow.round,)
+    plants = filled(
+        FOLDER / "plants.c",
+        nu=nu, data=data, held=data + n_d - nu, follows=int(follow is not None),
+        search=SEARCH, again=AGAIN, refused=REFUSED,
+    )  # fmt: skip
+    attempts = c_source(integrator.step, integrator.tableau.H.shape[0], *others)
+    jump = "" if follow is None else follow.c_source
+    return attempts + jump + MEMBERS + plants
 
-    def runs(b: int) -> int:
-        S[:], R[:], made = plants.S[b], plants.R[b], 0
-        end = R[Given.T_END]
+
+def in_python(integrator: Integrator, plants: Plants, engine: Engine, tolerance: float) -> Advance:
+    """Return the loop in Python: one plant after the other.
+
+    Args:
+        integrator, plants: model and data.
+        engine: of models with events, for which it searches (`symfric.integrator.running.events`).
+        tolerance: of event times [s].
+    """
+    return _InPython(integrator, plants, engine, tolerance).advance
+
+
+@final
+class _InPython:
+    """Loop in Python, with buffers for one plant."""
+
+    def __init__(
+        self, integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
+    ) -> None:
+        self.integrator, self.plants, self.engine = integrator, plants, engine
+        system, step, rows = integrator.system, integrator.step, integrator.tableau.H.shape[0]
+        self.work, self.after = Work(system.n, step.numel_in(1), rows), np.zeros(step.numel_in(0))
+        self.events, self.data = None, Given.d(system.nx)
+        if integrator.crossings is not None:
+            self.events = Eventful(integrator.crossings, tolerance)
+        self.work.want(Outputs.at(np.zeros(0), system.n), self.events)
+        self.work.over(np.zeros(2), np.zeros((0, 1)))
+        self.work.loop.h_min = plants.h_min
+        self.attempt = bound(step, (self.work.S, self.work.R), (self.after,))
+
+    def advance(self, begin: int) -> int:
+        """Advance all plants, as `Advance`."""
+        plants, S, R = self.plants, self.work.S, self.work.R
+        if begin and not np.isfinite(plants.u).all():
+            return REFUSED
+        if begin:
+            plants.happened.clear()
+        for b in range(plants.S.shape[0]):
+            if plants.why[b] == OVER or not (begin or plants.why[b] == AGAIN):
+                continue
+            S[:], R[:] = plants.S[b], plants.R[b]
+            if self.events is not None:
+                self.events.memory[:] = plants.memory[b]
+            follows = self._takes_over(b) if begin else True
+            plants.why[b] = self._runs(b) if follows else SEARCH
+            plants.S[b], plants.R[b] = S, R
+            if self.events is not None:
+                plants.memory[b] = self.events.memory
+        return int(np.count_nonzero(plants.why > 0))
+
+    def _takes_over(self, b: int) -> bool:
+        """Take over inputs and the next sample time; return False if unknowns could not follow."""
+        plants, S, R, ready = self.plants, self.work.S, self.work.R, bool(self.plants.ready[b])
+        plants.count[b] += S[State.T] >= R[Given.T_END]
+        plants.made[b] = plants.ready[b] = 0
+        R[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
+        R[R.size - plants.u.shape[1] :] = plants.u[b]
+        if self.events is not None and ready:
+            t, y, d = S[State.T : State.T + 1], S[State.Y], R[self.data]
+            values = evaluate(self.integrator.events, t, y, d)
+            self.events.started(self.integrator.model.events, values)
+        elif self.events is not None:
+            self.events.entered()
+        return ready or self._follow()
+
+    def _follow(self) -> bool:
+        """Update algebraic unknowns after a jump; return False if that fails."""
+        follow, y = self.integrator.follow, self.work.S[State.Y]
+        found = y if follow is None else follow(y, self.work.R[self.data])
+        if found is not None:
+            y[:] = found
+        return found is not None
+
+    def _runs(self, b: int) -> int:
+        """Make steps and events up to the sample; return the reason to stop."""
+        plants, S, end = self.plants, self.work.S, self.work.R[Given.T_END]
+        if self.events is not None:
+            return self._runs_with(self.events, b)
+        made = 0
         while S[State.T] < end and made < plants.attempts and _large(S, plants.h_min):
-            attempt()
-            S[:] = after
+            self.attempt()
+            S[:] = self.after
             made += 1
-        plants.S[b] = S
         plants.made[b] += made
         if S[State.T] >= end:
             return END
         return ATTEMPTS if _large(S, plants.h_min) else STEP_TOO_SMALL
 
-    def takes_over(b: int) -> bool:
-        own = plants.R[b]
-        plants.count[b] += plants.S[b, State.T] >= own[Given.T_END]
-        plants.made[b] = 0
-        own[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
-        own[own.size - held :] = plants.u[b]
-        if follow is None or plants.ready[b]:
-            return True
-        found = follow(plants.S[b, State.Y], own[data])
-        if found is None:
-            return False
-        plants.S[b, State.Y] = found
-        return True
-
-    def advance(begin: int) -> int:
-        if begin and not np.isfinite(plants.u).all():
-            return REFUSED
-        for b in range(plants.S.shape[0]):
-            if begin and not takes_over(b):
-                plants.why[b] = SEARCH
-            elif begin or plants.why[b] == AGAIN:
-                plants.ready[b] = 0
-                plants.why[b] = runs(b)
-        return int(np.count_nonzero(plants.why))
-
-    return advance
+    def _runs_with(self, events: Eventful, b: int) -> int:
+        """Make steps and events up to the sample; return the reason to stop."""
+        plants, manifold = self.plants, self.integrator.system.manifold
+        model = self.integrator.model
+        while plants.made[b] < plants.attempts:
+            allowed = min(EVENTFUL_ATTEMPTS, plants.attempts - int(plants.made[b]))
+            _, made, stop = self.engine.march(self.work, allowed)
+            plants.made[b] += made
+            jumps = events.jumps(0)
+            for t, which in zip(jumps.t.tolist(), jumps.which, strict=True):
+                plants.happened += [(b, t, model.events[i].name) for i in np.flatnonzero(which)]
+            if stop in WHY:
+                return WHY[stop]
+            if stop is Stop.FOLLOW:
+                moved = any(model.events[i].reset for i in np.flatnonzero(jumps.which[-1]))
+                if (moved and manifold is not None and manifold.m) or not self._follow():
+                    return SEARCH
+        return ATTEMPTS
 
 
 def _large(S: Array, h_min: float) -> bool:
@@ -202,192 +274,20 @@ EVENTFUL_ATTEMPTS = 50_000
 WHY = {Stop.END: END, Stop.STEP_TOO_SMALL: STEP_TOO_SMALL, Stop.TERMINAL: OVER, Stop.STORM: STORM}
 
 
-def with_events(
-    integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
-) -> Advance:
-    """Return the loop for models with events: one plant after the other, by an engine of runs.
-
-    Python handles the samples and event requests; the engine searches for events
-    (`symfric.integrator.running.events`).
-
-    Args:
-        integrator, plants: model and data.
-        engine: makes the steps.
-        tolerance: of event times [s].
+def looking(integrator: Integrator, plants: Plants, backend: str) -> Callable[[], Array]:
+    """Return a function that computes the signals of all plants at their current times, shape
+    (plants, signals).
     """
-    return _Eventful(integrator, plants, engine, tolerance).advance
+    S, d = plants.S, plants.R[:, Given.d(integrator.system.nx)]
+    if len(S) > 1:
+        rows = [S[:, State.T], S[:, State.Y], d]
+        return lambda: integrator.signal_columns(rows, backend=backend)[0]
+    function, arguments = densified(integrator.signals), (S[0, : State.T + 1], S[0, State.Y], d[0])
+    values = np.zeros((1, function.numel_out(0)))
+    call = bound(function, arguments, [values])
 
+    def look() -> Array:
+        call()
+        return values
 
-@final
-class _Eventful:
-    """Loop for models with events, with buffers for one plant."""
-
-    def __init__(
-        self, integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
-    ) -> None:
-        self.integrator, self.plants, self.engine = integrator, plants, engine
-        system, rows = integrator.system, integrator.tableau.H.shape[0]
-        if integrator.crossings is None:
-            raise ValueError(f"plants of '{integrator.model.name}': expected a model with events")
-        self.work = loop.Work(system.n, integrator.step.numel_in(1), rows)
-        self.events = Eventful(integrator.crossings, tolerance)
-        self.work.want(Outputs.at(np.zeros(0), system.n), self.events)
-        self.work.over(np.zeros(2), np.zeros((0, 1)))
-        self.work.loop.h_min = plants.h_min
-        self.data = Given.d(system.nx)
-
-    def advance(self, begin: int) -> int:
-        """Advance all plants, as `Advance`."""
-        plants = self.plants
-        if begin and not np.isfinite(plants.u).all():
-            return REFUSED
-        if begin:
-            plants.happened.clear()
-        for b in range(plants.S.shape[0]):
-            if plants.why[b] == OVER or not (begin or plants.why[b] == AGAIN):
-                continue
-            self.work.S[:], self.work.R[:] = plants.S[b], plants.R[b]
-            self.events.memory[:] = plants.memory[b]
-            first = bool(plants.ready[b])
-            follows = self._takes_over(b, first) if begin else True
-            plants.why[b] = self._runs(b) if follows else SEARCH
-            plants.S[b], plants.R[b] = self.work.S, self.work.R
-            plants.memory[b] = self.events.memory
-        return int(np.count_nonzero(plants.why > 0))
-
-    def _takes_over(self, b: int, first: bool) -> bool:
-        """Take over inputs and the next sample time; return False if unknowns could not follow."""
-        plants, S, R = self.plants, self.work.S, self.work.R
-        plants.count[b] += S[State.T] >= R[Given.T_END]
-        plants.made[b] = plants.ready[b] = 0
-        R[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
-        R[R.size - plants.u.shape[1] :] = plants.u[b]
-        if first:
-            self._before_start()
-            return True
-        self.events.entered()
-        return self._follow()
-
-    def _before_start(self) -> None:
-        """Give events that have already happened at the start the values just before them."""
-        events = self.integrator.model.events
-        if any(event.at_start for event in events):
-            S, d = self.work.S, self.work.R[self.data]
-            now = self.integrator.events(S[State.T], S[State.Y], d).full().ravel()
-            signs = [-e.direction if e.at_start else x for e, x in zip(events, now, strict=True)]
-            self.events.jumped(np.array(signs))
-
-    def _follow(self) -> bool:
-        """Update algebraic unknowns after a jump; return False if that fails."""
-        follow = self.integrator.follow
-        if follow is None:
-            return True
-        found = follow(self.work.S[State.Y], self.work.R[self.data])
-        if found is not None:
-            self.work.S[State.Y] = found
-        return found is not None
-
-    def _runs(self, b: int) -> int:
-        """Make steps and events up to the sample; return the reason to stop."""
-        plants, manifold = self.plants, self.integrator.system.manifold
-        events = self.integrator.model.events
-        while plants.made[b] < plants.attempts:
-            allowed = min(EVENTFUL_ATTEMPTS, plants.attempts - int(plants.made[b]))
-            _, made, stop = self.engine.march(self.work, allowed)
-            plants.made[b] += made
-            jumps = self.events.jumps(0)
-            for t, which in zip(jumps.t.tolist(), jumps.which, strict=True):
-                plants.happened += [(b, t, events[int(i)].name) for i in np.flatnonzero(which)]
-            if stop in WHY:
-                return WHY[stop]
-            if stop is Stop.FOLLOW:
-                moved = any(events[int(i)].reset for i in np.flatnonzero(jumps.which[-1]))
-                if (moved and manifold is not None and manifold.m) or not self._follow():
-                    return SEARCH
-        return ATTEMPTS
-
-
-def c_source(integrator: Integrator) -> str:
-    """Return the C of the step, of the update after a jump, and of the loop around them."""
-    follow, nx = integrator.follow, integrator.system.nx
-    n_d, nu = integrator.system.d.numel(), integrator.inputs.data.numel()
-    others = () if follow is None else (follow.round,)
-    attempts = loop.c_source(integrator.step, integrator.tableau.H.shape[0], *others)
-    plants = loop.filled(
-        "plants.c",
-        nu=nu, data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
-        follows=int(follow is not None), search=SEARCH, again=AGAIN, refused=REFUSED,
-    )  # fmt: skip
-    return (
-        attempts + ("" if follow is None else follow.c_source) + loop.filled("members.h") + plants
-    )
-
-
-@final
-@dataclass(eq=False)
-class Looks:
-    """Signals of all plants at their current times: in the virtual machine until compiling saves
-    time.
-
-    Attributes:
-        integrator: of the plants.
-        plants: their current data.
-        values: the signals, shape (plants, signals), overwritten by each call.
-    """
-
-    integrator: Integrator
-    plants: Plants
-    values: Array
-    spent: float = 0.0
-    _compiled: Callable[[], None] | None = None
-
-    def __call__(self, backend: str) -> Array:
-        """Compute the signals by "vm", "compiled" or "auto"."""
-        if self._compiled is None and self._pays(backend):
-            self._compiled = self._in_c()
-        if self._compiled is not None:
-            self._compiled()
-        else:
-            began = perf_counter()
-            self._in_vm()
-            self.spent += perf_counter() - began
-        return self.values
-
-    def _pays(self, backend: str) -> bool:
-        if backend == "vm" or find_compiler() is None:
-            return False
-        n = self.integrator.signals.n_instructions()
-        return backend == "compiled" or self.spent > 2 * (0.1 + 1.5e-4 * n)
-
-    def _in_vm(self) -> None:
-        function, nx = self.integrator.signals, self.integrator.system.nx
-        p, data = self.plants, Given.d(nx)
-        for S, R, out in zip(p.S, p.R, self.values, strict=True):
-            bound(function, (S[State.T : State.T + 1], S[State.Y], R[data]), (out,))()
-
-    def _in_c(self) -> Callable[[], None]:
-        library = load(look_source(self.integrator), "symfric_look")
-        library.symfric_look.restype = None
-        library.symfric_look.argtypes = [ctypes.c_void_p] * 2
-        members, out = _Members.of(self.plants), self.values.ctypes.data
-        address = ctypes.addressof(members)
-
-        def look(_alive: object = (members, library)) -> None:
-            library.symfric_look(address, out)
-
-        return look
-
-
-def look_source(integrator: Integrator) -> str:
-    """Return the C of the signals and of the loop over plants."""
-    function, nx = integrator.signals, integrator.system.nx
-    generator = ca.CodeGenerator("symfric_look.c", {"static_aux": True})
-    generator.add(function)
-    look = loop.filled(
-        "look.c",
-        columns=integrator.step.numel_in(0), given=integrator.step.numel_in(1),
-        memory=State.MEMORY, t=State.T, data=Given.d(nx).start, rows=function.numel_out(0),
-        arg=function.sz_arg(), res=function.sz_res(), name=function.name(),
-        iw=max(1, function.sz_iw()), w=max(1, function.sz_w()),
-    )  # fmt: skip
-    return generator.dump() + loop.filled("members.h") + look
+    return look

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,18 @@ class Dense:
     y1: Array
     D: Array
 
+    @classmethod
+    def of(cls, rows: Array, n: int) -> "Dense":
+        """Return pieces as views of the rows (t0, t1, y0, y1, D) that an engine writes."""
+        y0, y1, D = rows[:, 2 : 2 + n], rows[:, 2 + n : 2 + 2 * n], rows[:, 2 + 2 * n :]
+        return cls(rows[:, 0], rows[:, 1], y0, y1, D.reshape(len(rows), D.shape[1] // n, n))
+
     @property
-    def nbytes(self) -> int:
-        """Memory of the arrays [bytes]."""
-        return sum(a.nbytes for a in (self.t0, self.t1, self.y0, self.y1, self.D))
+    def rows(self) -> Array:
+        """Rows of `of`."""
+        k, r, n = self.D.shape
+        ends = self.t0[:, None], self.t1[:, None], self.y0, self.y1
+        return np.hstack([*ends, self.D.reshape(k, r * n)])
 
     def __call__(self, times: Array) -> Array:
         """Return values at `times`, shape (n, m); at an event the value after it."""
@@ -71,31 +79,6 @@ def hermite(t: Array, y: Array, slope: Array) -> Dense:
     second = rise - h * slope[:, 1:] - first
     D = np.stack([first.T, second.T], axis=1)
     return Dense(t[:-1], t[1:], y[:, :-1].T, y[:, 1:].T, D)
-
-
-def pieces_of(records: Array, n: int) -> Dense:
-    """Return pieces as views of the rows (t0, t1, y0, y1, D) that an engine writes."""
-    k, rows = records.shape[0], (records.shape[1] - 2) // n - 2
-    return Dense(
-        records[:, 0],
-        records[:, 1],
-        records[:, 2 : 2 + n],
-        records[:, 2 + n : 2 + 2 * n],
-        records[:, 2 + 2 * n :].reshape(k, rows, n),
-    )
-
-
-def join(pieces: list[Dense]) -> Dense:
-    """Concatenate pieces of several runs, in order."""
-    if len(pieces) == 1:
-        return pieces[0]
-    return Dense(
-        np.concatenate([p.t0 for p in pieces]),
-        np.concatenate([p.t1 for p in pieces]),
-        np.concatenate([p.y0 for p in pieces]),
-        np.concatenate([p.y1 for p in pieces]),
-        np.concatenate([p.D for p in pieces]),
-    )
 
 
 @final
@@ -174,26 +157,14 @@ class Jumps:
         """Build from records (steps before, t, size, y before, y after, which), `steps` already
         made.
         """
-        rows = rows.copy()
+        rows, after = rows.copy(), 3 + n
         return cls(
             rows[:, 0].astype(np.intp) + steps,
             rows[:, 1],
             rows[:, 2],
-            rows[:, 3 : 3 + n],
-            rows[:, 3 + n : 3 + 2 * n],
-            rows[:, 3 + 2 * n :] != 0.0,
-        )
-
-    @classmethod
-    def joined(cls, parts: "list[Jumps]") -> "Jumps":
-        """Concatenate the events of several parts of a run, at least one."""
-        return cls(
-            np.concatenate([p.step for p in parts]),
-            np.concatenate([p.t for p in parts]),
-            np.concatenate([p.size for p in parts]),
-            np.concatenate([p.before for p in parts]),
-            np.concatenate([p.after for p in parts]),
-            np.concatenate([p.which for p in parts]),
+            rows[:, 3:after],
+            rows[:, after : after + n],
+            rows[:, after + n :] != 0.0,
         )
 
 
@@ -203,9 +174,7 @@ times; dense output is then recomputed by a second run with the same bits.
 """
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Extent:
+class Extent(NamedTuple):
     """Shortest and longest accepted step [s], least and greatest unknowns (2, n)."""
 
     shortest: float
@@ -225,10 +194,12 @@ class Run:
         happened: (time, name) of every event.
         steps, attempts: number of accepted steps and of all attempts.
         engine: name of the engine.
-        most: memory limit of the accepted steps [bytes].
         again: (times, bytes) -> another run with these outputs and this memory limit; None if this
             run has kept all steps.
         status, message: how it ended.
+        most: memory limit of the accepted steps [bytes].
+        kept: rows of accepted steps (`Dense.of`), batch by batch; only the last row of those that
+            exceeded the limit.
     """
 
     t: float
@@ -243,32 +214,19 @@ class Run:
     status: Status = Status.SUCCESS
     message: str = Status.SUCCESS.value
     most: float = MOST_BYTES
-    _kept: list[Dense | Array] = field(default_factory=list[Dense | Array])
+    kept: list[Array] = field(default_factory=list[Array])
     _held: int = 0
     _before: Extent | None = None
 
-    def keep(self, piece: Dense | Array) -> None:
-        """Append accepted steps with their continuous solution, or their record rows.
-
-        The run takes ownership of them.
-        """
-        count = piece.shape[0] if isinstance(piece, np.ndarray) else piece.t0.size
-        if not count:
+    def keep(self, rows: Array) -> None:
+        """Append rows of accepted steps; the run takes ownership of them."""
+        if not len(rows):
             return
-        self.steps += count
-        self._kept.append(piece)
-        self._held += piece.nbytes
+        self.steps += len(rows)
+        self.kept.append(rows)
+        self._held += rows.nbytes
         if self._held > self.most:
-            self._before, self._kept = self.extent, [self.last]
-
-    def keep_all(self, steps: Dense) -> None:
-        """Replace the kept steps by all steps of the finished run; the counters stay."""
-        self._kept = [steps]
-
-    @property
-    def kept(self) -> int:
-        """Number of accepted steps in memory."""
-        return sum(p.shape[0] if isinstance(p, np.ndarray) else p.t0.size for p in self._kept)
+            self._before, self.kept = self.extent, [rows[-1:].copy()]
 
     @property
     def complete(self) -> bool:
@@ -279,60 +237,56 @@ class Run:
         """End the run with `status` and `message`, by default the sentence of the status."""
         self.status, self.message = status, message or status.value
 
-    def _pieces(self) -> list[Dense]:
-        n = self.y.size
-        found = [pieces_of(p, n) if isinstance(p, np.ndarray) else p for p in self._kept]
-        if found:
-            return found
-        at, y = np.array([self.t]), self.y[None]
-        return [Dense(at, np.nextafter(at, np.inf), y, y, np.zeros((1, 0, n)))]
+    @property
+    def _rows(self) -> list[Array]:
+        """Kept rows, or one for a start without steps."""
+        if self.kept:
+            return self.kept
+        return [np.concatenate([[self.t, np.nextafter(self.t, np.inf)], self.y, self.y])[None]]
 
     @cached_property
     def dense(self) -> Dense:
         """Continuous solution over all accepted steps; a long run is recomputed."""
         if self.again is not None:
             return self.again(np.zeros(0), np.inf).dense
-        return join(self._pieces())
+        rows = self._rows
+        return Dense.of(rows[0] if len(rows) == 1 else np.vstack(rows), self.y.size)
 
     @property
     def last(self) -> Dense:
         """Last accepted step, as a copy."""
-        p = self._pieces()[-1]
-        return Dense(*(a[-1:].copy() for a in (p.t0, p.t1, p.y0, p.y1, p.D)))
+        return Dense.of(self._rows[-1][-1:].copy(), self.y.size)
 
     @property
     def reached(self) -> float:
         """Time at the end of the last accepted step [s]."""
-        if not self._kept:
-            return self.t
-        p = self._kept[-1]
-        return float(p[-1, 1] if isinstance(p, np.ndarray) else p.t1[-1])
+        return float(self.kept[-1][-1, 1]) if self.kept else self.t
+
+    @property
+    def _ends(self) -> list[Array]:
+        """Unknowns at the ends of steps, batch by batch."""
+        n = self.y.size
+        return [rows[:, 2 + n : 2 + 2 * n] for rows in self._rows]
 
     @property
     def end(self) -> Array:
         """Unknowns at the end of the last accepted step, shape (n,)."""
-        if not self._kept:
-            return self.y
-        p, n = self._kept[-1], self.y.size
-        return p[-1, 2 + n : 2 + 2 * n] if isinstance(p, np.ndarray) else p.y1[-1]
+        return self._ends[-1][-1]
 
     @property
     def extent(self) -> Extent:
         """Range of the step lengths and of the unknowns."""
-        lengths = [p.t1 - p.t0 for p in self._pieces()]
-        shortest = [float(h.min()) for h in lengths]
-        longest = [float(h.max()) for h in lengths]
+        lengths = [rows[:, 1] - rows[:, 0] for rows in self._rows]
         if self._before is not None:
-            shortest.append(self._before.shortest)
-            longest.append(self._before.longest)
-        return Extent(min(shortest), max(longest), self.reach)
+            lengths.append(np.array(self._before[:2]))
+        every = np.concatenate(lengths)
+        return Extent(float(every.min()), float(every.max()), self.reach)
 
     @property
     def reach(self) -> Array:
         """Least and greatest unknowns at the start and at the ends of steps, shape (2, n)."""
-        found = self._pieces()
-        first = found[0].y0[:1] if self._before is None else self._before.reach
-        ends = [first, *(p.y1 for p in found)]
+        first = self._rows[0][:1, 2 : 2 + self.y.size]
+        ends = [first if self._before is None else self._before.reach, *self._ends]
         least, most = ([f(y, axis=0) for y in ends] for f in (np.min, np.max))
         return np.array([np.min(least, axis=0), np.max(most, axis=0)])
 
@@ -341,27 +295,21 @@ class Run:
         """Start and ends of steps, (k,) and (k, n); for a long run the times of the result."""
         if not self.complete:
             return self.outputs.times[: self.outputs.found], self.outputs.reached.T
-        found = self._pieces()
-        times, unknowns = [p.t1 for p in found], [p.y1 for p in found]
-        return np.concatenate([[self.t], *times]), np.concatenate([self.y[None], *unknowns])
-
-    @property
-    def largest(self) -> Array:
-        """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
-        return np.abs(self.reach).max(axis=0)
+        times = [self.t], *(rows[:, 1] for rows in self._rows)
+        return np.concatenate(times), np.concatenate([self.y[None], *self._ends])
 
     def farthest(self, unknown: int) -> float:
         """Return the largest magnitude of an unknown at the start and at the ends of steps."""
-        found = self._pieces()
-        first = found[0].y0[0] if self._before is None else self._before.reach
-        ends = (first[..., unknown], *(p.y1[:, unknown] for p in found))
+        rows, n = self._rows, self.y.size
+        first = rows[0][0, 2:] if self._before is None else self._before.reach
+        ends = first[..., unknown], *(part[:, 2 + n + unknown] for part in rows)
         return max(float(np.abs(y).max()) for y in ends)
 
     def at(self, times: Array) -> Array:
         """Return unknowns at `times` [s], shape (n, times); for a long run by recomputation."""
         if self.again is None or "dense" in self.__dict__:
             return self.dense(times)
-        if times.size and times.min() >= self._pieces()[-1].t0[0]:
+        if times.size and times.min() >= self._rows[-1][0, 0]:
             return self.last(times)
         wanted, places = np.unique(times, return_inverse=True)
         return self.again(wanted, self.most).outputs.values[:, places]

@@ -8,7 +8,6 @@ scale.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from time import perf_counter
 from typing import final
 
@@ -17,38 +16,22 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import evaluate
 from symfric.foundation.status import Status
-from symfric.integrator.equations.expressions import pace
+from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.diagnosis import chattering, explain
-from symfric.integrator.running.engine import Stop
-from symfric.integrator.running.events import Eventful
+from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import Work
 from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
 """Sizes, in nominal values, below which a motion gets its own scale, and below which it is treated
-as
-zero: such values are rounding errors of the states that it is coupled to.
+as zero: such values are rounding errors of the states that it is coupled to.
 """
-
 ROUNDS = 3
 """Maximum number of repetitions: an unresolved motion may have seemed larger than it is."""
-
-
-def ample(run: Run, nominal: Array) -> bool:
-    """Return True if no state of a run is small all the time; most are not even small at the
-    end.
-    """
-    # few numbers: faster than NumPy
-    ends = zip(run.end.tolist(), nominal.tolist(), strict=False)
-    return all(
-        abs(end) >= SMALL * typical or run.farthest(i) >= SMALL * typical
-        for i, (end, typical) in enumerate(ends)
-    )
 
 
 def own_scale(size: Array, nominal: Array) -> Array:
@@ -128,223 +111,175 @@ def integrate(
     nominal = integrator.system.nominal
     if integrator.model.events:
         # at equilibrium only the events show that an input has become large enough to start motion
-        quickest = min([inputs.pace, *(pace(f, *inputs.span) for f in integrator.schedules)])
-        tolerances = replace(tolerances, max_step=min(tolerances.max_step, PACES * quickest))
-    scale, allowed = nominal, tolerances
-    run, last = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
-    for _ in range(ROUNDS if tolerances.follow and not ample(run, nominal) else 0):
-        own = finer(scale, run.largest[: nominal.size], nominal)
-        if own is None or not run.status.ok:
+        paces = (pieces(f, *inputs.span).pace for f in integrator.schedules)
+        longest = min(tolerances.max_step, PACES * min(inputs.pace, *paces, np.inf))
+        tolerances = replace(tolerances, max_step=longest)
+    settings = tolerances, backend, progress, times, MOST_BYTES
+    march, scale = _March(integrator, inputs, y0, p, *settings), nominal
+    run = march.run()
+    for _ in range(ROUNDS if tolerances.follow else 0):
+        # most states are not even small at the end
+        if (np.abs(run.end[: nominal.size]) >= SMALL * nominal).all() or not run.status.ok:
+            break
+        own = finer(scale, np.array([*map(run.farthest, range(nominal.size))]), nominal)
+        if own is None:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
-        again, other = _integrated(last, inputs, y0, p, allowed, backend, None, times)
+        other = replace(march, tolerances=allowed, progress=None)
+        again = other.run()
         if not again.status.ok and again.status is not Status.INTERRUPTED:
             run.message += f" Tiny motions were not resolved on their own scale: {again.message}"
             break
-        run, last = again, other
-    return run, last
-
-
-def _integrated(
-    integrator: Integrator,
-    inputs: InputData,
-    y0: Array,
-    p: Array,
-    tolerances: Tolerances,
-    backend: str,
-    progress: Callable[[float], None] | None,
-    times: Array,
-    most: float | None = None,
-) -> tuple[Run, Integrator]:
-    """Run once over all input intervals; keep steps of up to `most` bytes."""
-    data = inputs.values[:, 0]
-    y = integrator.start(y0, np.concatenate([p, data]) if data.size else p)
-    work = integrator.borrow()
-    march = _March(integrator, inputs, tolerances, backend, progress, y, p, times, work)
-    run = march.run
-    run.most = MOST_BYTES if most is None else most
-    try:
-        march.whole()
-    except KeyboardInterrupt:
-        reached = f"{Status.INTERRUPTED.value} It reaches t = {run.reached:g} s."
-        run.stop(Status.INTERRUPTED, reached)
-        run.outputs.back_to(run.reached)
-    march.finish()
-    integrator.give_back(work)
-    if not run.complete:
-        same = replace(tolerances, max_steps=run.attempts, extends=False)
-        again = partial(_integrated, integrator, inputs, y0, p, same, backend, None)
-        run.again = lambda times, most: again(times, most)[0]
+        run, march = again, other
     return run, march.integrator
 
 
 @final
+@dataclass(eq=False)
 class _March:
-    """Run in progress: the step's memory and unknowns S, and the results so far."""
+    """Run to be made; its `integrator` is replaced if pivots fail."""
 
-    def __init__(
-        self,
-        integrator: Integrator,
-        inputs: InputData,
-        tolerances: Tolerances,
-        backend: str,
-        progress: Callable[[float], None] | None,
-        y: Array,
-        p: Array,
-        times: Array,
-        work: Work,
-    ) -> None:
-        self.integrator, self.inputs, self.tolerances = integrator, inputs, tolerances
-        self.backend, self.progress, self.work = backend, progress, work
-        self.t_start, self.t_end = inputs.span
-        self.span = self.t_end - self.t_start
-        system, crossings = integrator.system, integrator.crossings
-        self.events = None if crossings is None else Eventful(crossings, tolerances.event)
-        h = min(first_step(self.span, self.t_start), tolerances.max_step)
-        State.begin(work.S, self.t_start, h, y)
-        Given.begin(work.R, tolerances.rtol, tolerances.max_step, tolerances.atol, p)
-        work.loop.h_min = smallest_step(self.span)
-        outputs = Outputs.at(times, system.n)
+    integrator: Integrator
+    inputs: InputData
+    y0: Array
+    p: Array
+    tolerances: Tolerances
+    backend: str
+    progress: Callable[[float], None] | None
+    times: Array
+    most: float
+
+    def run(self) -> Run:
+        """Run once over all input intervals; keep steps of up to `most` bytes."""
+        integrator, allowed, crossings = self.integrator, self.tolerances, self.integrator.crossings
+        (t_start, t_end), d = self.inputs.span, np.concatenate([self.p, self.inputs.values[:, 0]])
+        y = integrator.start(self.y0, d)
+        work = self.work = integrator.borrow()
+        self.events = None if crossings is None else Eventful(crossings, allowed.event)
+        h = min(first_step(t_end - t_start, t_start), allowed.max_step)
+        work.S[:], work.R[:] = State.at(t_start, h, y), allowed.given(t_end, d)
+        work.loop.h_min = smallest_step(t_end - t_start)
+        outputs = Outputs.at(self.times, y.size)
         work.want(outputs, self.events)
-        work.over(inputs.breaks, inputs.values)
-        self.run = Run(self.t_start, y, outputs)
-        self.places = [y]
-        self.limit, self.limit_set_at = tolerances.max_steps, self.t_start
+        work.over(self.inputs.breaks, self.inputs.values)
+        run = self.made = Run(t_start, y, outputs, most=self.most)
+        self.places, self.limit, self.limit_set_at = [y], allowed.max_steps, t_start
+        try:
+            self._march(t_start, t_end)
+        except KeyboardInterrupt:
+            reached = f"{Status.INTERRUPTED.value} It reaches t = {run.reached:g} s."
+            run.stop(Status.INTERRUPTED, reached)
+            outputs.back_to(run.reached)
+        if outputs.found < outputs.times.size:  # engines leave the final time open
+            outputs.fill(run.last, last=True)
+        integrator.give_back(work)
+        if not run.complete:
+            same = replace(allowed, max_steps=run.attempts, extends=False)
+            again = replace(self, integrator=integrator, tolerances=same, progress=None)
+            run.again = lambda times, most: replace(again, times=times, most=most).run()
+        return run
 
     @property
     def t(self) -> float:
         """Current time [s]."""
-        return float(self.S[State.T])
-
-    @property
-    def S(self) -> Array:
-        """Memory and unknowns of the step."""
-        return self.work.S
+        return float(self.work.S[State.T])
 
     @property
     def y(self) -> Array:
         """Unknowns; a view of S."""
-        return self.S[State.Y]
+        return self.work.S[State.Y]
 
     @property
     def d(self) -> Array:
         """Run data on the current input interval, as a copy."""
         return self.work.R[Given.d(self.integrator.system.nx)].copy()
 
-    def whole(self) -> None:
+    def _march(self, t_start: float, t_end: float) -> None:
         """Integrate over all input intervals."""
-        self.before_start()
+        run, model = self.made, self.integrator.model
+        if self.events is not None:
+            t = self.work.S[State.T : State.T + 1]
+            self.events.started(model.events, evaluate(self.integrator.events, t, self.y, self.d))
         left, reason = 0.0, Stop.FULL
-        while reason is not Stop.END and self.run.status is Status.SUCCESS:
-            records, reason, left = self.attempts(left)
-            if self.run.status is Status.SUCCESS:
-                self.happen()
-                self.run.keep(records.copy())
-                self.heed(reason)
-            if self.run.status is Status.SUCCESS and self.progress is not None:
-                self.progress((self.t - self.t_start) / self.span)
+        while reason is not Stop.END and run.status is Status.SUCCESS:
+            records, reason, left = self._attempts(left, t_end)
+            if run.status is Status.SUCCESS:
+                if self.events is not None and self.events.count:
+                    jumps = self.events.jumps(run.steps)
+                    for t, which in zip(jumps.t.tolist(), jumps.which, strict=True):
+                        run.happened += [(t, model.events[i].name) for i in np.flatnonzero(which)]
+                    run.jumps.append(jumps)
+                run.keep(records.copy())
+                self._act(reason)
+            if run.status is Status.SUCCESS and self.progress is not None:
+                self.progress((self.t - t_start) / (t_end - t_start))
 
-    def finish(self) -> None:
-        """Fill in outputs at the final time, which engines leave open."""
-        outputs = self.run.outputs
-        if outputs.found < outputs.times.size:
-            outputs.fill(self.run.last, last=True)
-
-    def attempts(self, left: float) -> tuple[Array, Stop, float]:
+    def _attempts(self, left: float, t_end: float) -> tuple[Array, Stop, float]:
         """Make a batch of attempts; return records, reason to stop, remaining time of the VM
         [s].
         """
-        engine = self.integrator.choose(self.backend, left)
-        self.run.engine = engine.name
-        if self.run.attempts >= self.limit and self.tolerances.extends:
-            self.extend_limit()
-        allowed = min(ATTEMPTS[engine.name], self.limit - self.run.attempts)
+        run, engine = self.made, self.integrator.choose(self.backend, left)
+        run.engine = engine.name
+        if run.attempts >= self.limit and self.tolerances.extends:
+            # allow more attempts if the recent progress reaches the end within `MOST_STEPS`
+            advance, self.limit_set_at = self.t - self.limit_set_at, self.t
+            if (t_end - self.t) * MANY_STEPS <= MOST_STEPS * advance:
+                self.limit += MANY_STEPS
+        allowed = min(ATTEMPTS[engine.name], self.limit - run.attempts)
         if allowed <= 0:
             hint = chattering(self.integrator.model)
-            said = f"{Status.MAX_STEPS.value} Stopped at t = {self.t:g} s.{hint}"
-            self.run.stop(Status.MAX_STEPS, said)
+            message = f"{Status.MAX_STEPS.value} Stopped at t = {self.t:g} s.{hint}"
+            run.stop(Status.MAX_STEPS, message)
             return self.work.rows[:0], Stop.ATTEMPTS, left
-        virtual = engine.name == "vm"
-        began, from_t = (perf_counter(), self.t) if virtual else (0.0, 0.0)
+        began, from_t = perf_counter(), self.t
         records, made, reason = engine.march(self.work, allowed)
-        self.run.attempts += made
-        if reason is Stop.STEP_TOO_SMALL and self.found_pivots():
+        run.attempts += made
+        if reason is Stop.STEP_TOO_SMALL and self._found_pivots():
             reason = Stop.ATTEMPTS
-        if virtual:
+        if engine.name == "vm":
             spent, advance = perf_counter() - began, self.t - from_t
             self.integrator.vm_time += spent
-            left = spent * (self.t_end - self.t) / advance if advance > 0 else left
+            left = spent * (t_end - self.t) / advance if advance > 0 else left
         return records, reason, left
 
-    def extend_limit(self) -> None:
-        """Allow more attempts if the recent progress rate reaches the end within `MOST_STEPS`."""
-        advance, self.limit_set_at = self.t - self.limit_set_at, self.t
-        if (self.t_end - self.t) * MANY_STEPS <= MOST_STEPS * advance:
-            self.limit += MANY_STEPS
-
-    def found_pivots(self) -> bool:
+    def _found_pivots(self) -> bool:
         """Return True if steps failed because of unstable pivots, after replacing these.
 
         No step size compensates for unstable pivots: steps shrink to nothing. The check is
-        therefore made
-        there, at the same place for every engine.
+        therefore made there, at the same place for every engine.
         """
         if len(self.places) > MOST_ORDERS:
             return False
-        here, d = self.y.copy(), self.d
-        points = [(y, d) for y in (*self.places, here)]
-        other = self.integrator.suited(points, self.span)
+        here, d, span = self.y.copy(), self.d, float(np.diff(self.inputs.span)[0])
+        other = self.integrator.suited([(y, d) for y in (*self.places, here)], span)
         if other is self.integrator:
             return False
         self.integrator = other
         self.places.append(here)
-        h = max(float(self.S[State.H]), first_step(self.span, self.t))
-        self.S[:] = State.at(self.t, h, here)
+        h = max(float(self.work.S[State.H]), first_step(span, self.t))
+        self.work.S[:] = State.at(self.t, h, here)
         return True
 
-    def happen(self) -> None:
-        """Record the events in the steps about to be kept."""
-        if self.events is None or not self.events.count:
-            return
-        jumps = self.events.jumps(self.run.steps)
-        events = self.integrator.model.events
-        times, numbers = np.nonzero(jumps.which)
-        found = zip(jumps.t[times].tolist(), numbers.tolist(), strict=True)
-        self.run.happened += [(t, events[i].name) for t, i in found]
-        self.run.jumps.append(jumps)
-
-    def heed(self, reason: Stop) -> None:
+    def _act(self, reason: Stop) -> None:
         """Act on the `reason` to stop."""
+        run, events = self.made, self.integrator.model.events
         if reason is Stop.STEP_TOO_SMALL:
-            h = self.S[State.H]
-            self.run.stop(*explain(self.integrator, self.t, self.y, self.d, h))
+            h = self.work.S[State.H]
+            run.stop(*explain(self.integrator, self.t, self.y, self.d, h))
         elif reason is Stop.TERMINAL:
-            self.run.stop(Status.TERMINATED)
+            run.stop(Status.TERMINATED)
         elif reason is Stop.STORM:
-            which = self.run.jumps[-1].which[-1]
-            name = self.integrator.model.events[int(np.argmax(which))].name
-            self.run.stop(
-                Status.EVENT_STORM,
-                f"{Status.EVENT_STORM.value} Stopped at t = {self.t:.9g} s, event '{name}'.",
-            )
+            name = events[int(np.argmax(run.jumps[-1].which[-1]))].name
+            stopped = f"Stopped at t = {self.t:.9g} s, event '{name}'."
+            run.stop(Status.EVENT_STORM, f"{Status.EVENT_STORM.value} {stopped}")
         elif reason is Stop.SEARCH:
-            self.make_consistent()
+            self._make_consistent()
         elif reason is Stop.FOLLOW:
-            last, events = self.run.jumps[-1], self.integrator.model.events
-            self.make_consistent(moved=any(events[i].reset for i in np.flatnonzero(last.which[-1])))
+            last = run.jumps[-1]
+            self._make_consistent(any(events[i].reset for i in np.flatnonzero(last.which[-1])))
             last.after[-1] = self.y
 
-    def before_start(self) -> None:
-        """Give events that have already happened at the start the values just before them."""
-        if self.events is None:
-            return
-        events = self.integrator.model.events
-        if any(event.at_start for event in events):
-            now = evaluate(self.integrator.events, self.S[State.T : State.T + 1], self.y, self.d)
-            signs = (-e.direction if e.at_start else x for e, x in zip(events, now, strict=True))
-            self.events.jumped(np.array(list(signs)))
-
-    def make_consistent(self, moved: bool = False) -> None:
+    def _make_consistent(self, moved: bool = False) -> None:
         """Update the algebraic unknowns after a jump, or stop the run if that fails.
 
         If states `moved`, the states of a mechanism are projected back onto its constraints, too.
@@ -362,4 +297,4 @@ class _March:
             self.y[:] = consistent(self.integrator.system, where, self.y, self.d)
         except ValueError as error:
             jams = isinstance(error, JammedError)
-            self.run.stop(Status.JAMMED if jams else Status.SINGULAR, str(error))
+            self.made.stop(Status.JAMMED if jams else Status.SINGULAR, str(error))

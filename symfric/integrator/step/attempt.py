@@ -22,8 +22,7 @@ derivatives and C code.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -46,9 +45,7 @@ FINEST = 1e-14
 end."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Watch:
+class Watch(NamedTuple):
     """Monitored expressions of a system over one trial.
 
     Attributes:
@@ -80,10 +77,7 @@ class Watch:
 
     def leap(self) -> Any:
         """Return the largest travel of a sliding velocity, in units of the limit."""
-        here = range(self.slips)
-        before, half, after, scale = (
-            x[here] for x in (self.before, self.half, self.after, self.nominal)
-        )
+        before, half, after, scale = (x[range(self.slips)] for x in self[:4])
         bow = ca.fabs(half - (before + after) / 2)
         nearest = ca.fmax(0, ca.fmax(ca.fmin(before, after), -ca.fmax(before, after)) - bow)
         return ca.mmax((ca.fabs(after - before) + bow) / (REACH / self.finer * (scale + nearest)))
@@ -139,7 +133,7 @@ def steps(system: System, method: Method) -> Trials:
     def projected(y: Any, h: Any, d: Any) -> Trial:
         found = free(y, h, d)
         end = manifold.project(found.end, d)
-        return replace(found, end=end, shift=end - found.end)
+        return found._replace(end=end, shift=end - found.end)
 
     return projected
 
@@ -151,13 +145,10 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
         (y, h, d) -> a number, negative if the step over h must not end at y.
 
     Breakaway would be missed without notice: where a contact turns unstable, a long step stays on
-    the
-    sticking solution, with a small error estimate; `signs` detects that. Where the loop from normal
-    forces over friction to reactions and back, det(I - dN/dN), is negative, friction has jammed:
-    that
-    solution is not physical, nor is one in which a bearing pulls. A pivot of I - dN/dN below
-    `SHOCK` is
-    close to that. Mechanisms without friction need no test.
+    the sticking solution, with a small error estimate; `signs` detects that. Where the loop from
+    normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction has
+    jammed: that solution is not physical, nor is one in which a bearing pulls. A pivot of I - dN/dN
+    below `SHOCK` is close to that. Mechanisms without friction need no test.
     """
     gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
     if gamma is None or (manifold is not None and not system.rubs):
@@ -167,11 +158,8 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     every = signs(inside, gamma, loop)
 
     def sign(y: Any, h: Any, d: Any) -> Any:
-        here, data = y, d
-        if chart is not None:
-            data = chart.open(y, d)
-            here = chart.enter(y, data)
-        own, tiny, pivots = every(here, h, data)
+        data = d if chart is None else chart.open(y, d)
+        own, tiny, pivots = every(y if chart is None else chart.enter(y, data), h, data)
         if manifold is None:
             return own * tiny
         # with a definite mass matrix and no friction, the sign for n accelerations is (-1)^n
@@ -181,47 +169,41 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     return sign
 
 
-def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
+def build_fixed(system: System, method: Method) -> ca.Function:
     """Return the bare step (y, h, d) -> y_next, without error control, for derivatives."""
-    y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
-    h = kind.sym("h")
-    end = steps(system.plain, method)(y, h, d).end
-    return ca.Function("fixed", [y, h, d], [end], ["y", "h", "d"], ["y_next"], {"cse": True})
+    return _bare(system, method, "fixed", "y_next", lambda trial: trial.end)
 
 
 def build_dense_step(system: System, method: Method) -> ca.Function:
     """Return the bare step with its dense output, (y, h, d) -> all = (y_next, D), for
     sensitivities.
     """
-    y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
-    h = ca.SX.sym("h")
-    trial = steps(system.plain, method)(y, h, d)
-    everything = ca.vertcat(trial.end, *trial.dense)
-    return ca.Function("dense", [y, h, d], [everything], ["y", "h", "d"], ["all"], {"cse": True})
+    return _bare(system, method, "dense", "all", lambda trial: ca.vertcat(trial.end, *trial.dense))
 
 
-Norm = Callable[[Any], Any]
+def _bare(
+    system: System, method: Method, name: str, result: str, of: Callable[[Trial], ca.SX]
+) -> ca.Function:
+    y, h, d = ca.SX.sym("y", system.n), ca.SX.sym("h"), ca.SX.sym("d", system.d.numel())
+    found = of(steps(system.plain, method)(y, h, d))
+    return ca.Function(name, [y, h, d], [found], ["y", "h", "d"], [result], {"cse": True})
 
 
 def error_norm(
     system: System, y: Any, y_new: Any, atol: Any, rtol: Any, d: Any, watch: Watch | None
-) -> Norm:
+) -> Callable[[Any], Any]:
     """Return the mean square norm of an error of y_new in states and monitored expressions, scaled.
 
     A state is scaled by atol + rtol max|x|, monitored expressions as in `Watch.error`.
     """
-    nx = system.nx
-    scale = atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx]))
+    nx, count = system.nx, system.nx + system.monitors.numel()
+    per_scale = reciprocal(atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx])))
 
-    per_scale = reciprocal(scale)
+    def norm(error: Any) -> Any:
+        total = ca.sumsqr(error[:nx] * per_scale)
+        return (total if watch is None else total + watch.error(y_new, error, d, rtol)) / count
 
-    def of_states(error: Any) -> Any:
-        return ca.sumsqr(error[:nx] * per_scale)
-
-    if watch is None:
-        return lambda error: of_states(error) / nx
-    count = nx + system.monitors.numel()
-    return lambda error: (of_states(error) + watch.error(y_new, error, d, rtol)) / count
+    return norm
 
 
 def converged(before: Any, last: Any) -> Any:
@@ -311,9 +293,8 @@ def written(system: System, method: Method, inline: int) -> tuple[ca.Function, i
     """
     if least(system, method) <= inline:
         step = build_step(system, method)
-        count = step.n_instructions()
-        if count <= inline:
-            return step, count
+        if step.n_instructions() <= inline:
+            return step, step.n_instructions()
     step = build_step(system, method, ca.MX)
     return step, instructions(step)
 

@@ -7,8 +7,7 @@
 Columns of many members are the rows of a matrix.
 """
 
-from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,12 +32,6 @@ class State:
         """Return S at the time `t` without history, to try the step `h`; y (..., n)."""
         return _joined([t, h, h, GROWTH_MEMORY, 0.0], np.asarray(y, dtype=float))
 
-    @staticmethod
-    def begin(S: Array, t: float, h: float, y: Array) -> None:
-        """Write `at` into S."""
-        S[: State.MEMORY] = (t, h, h, GROWTH_MEMORY, 0.0)
-        S[State.Y] = y
-
 
 @final
 class Given:
@@ -53,14 +46,6 @@ class Given:
         return _joined([t_end, rtol, h_max, *np.asarray(atol, dtype=float)], np.asarray(d))
 
     @staticmethod
-    def begin(R: Array, rtol: float, h_max: float, atol: Array, p: Array) -> None:
-        """Write the entries of R that hold on all intervals, all but their ends and their data."""
-        nx = atol.size
-        R[Given.RTOL], R[Given.H_MAX], R[Given.atol(nx)] = rtol, h_max, atol
-        if p.size:
-            R[Given.FIXED + nx : Given.FIXED + nx + p.size] = p
-
-    @staticmethod
     def atol(nx: int) -> slice:
         """Return the slice of the absolute tolerances of `nx` states."""
         return slice(Given.FIXED, Given.FIXED + nx)
@@ -71,9 +56,13 @@ class Given:
         return slice(Given.FIXED + nx, None)
 
 
-@final
-@dataclass(frozen=True)
-class Record:
+def _joined(common: list[float], own: Array) -> Array:
+    """Prepend the same first entries to every row of `own`."""
+    first = np.broadcast_to(np.array(common), (*own.shape[:-1], len(common)))
+    return np.concatenate([first, own], axis=-1)
+
+
+class Record(NamedTuple):
     """Layout of the record (t0, t1, y0, y1, D) of an accepted step.
 
     Attributes:
@@ -83,8 +72,8 @@ class Record:
 
     n: int
     rows: int
-    T0: ClassVar[int] = 0
-    T1: ClassVar[int] = 1
+    T0 = 0
+    T1 = 1
 
     @property
     def width(self) -> int:
@@ -94,21 +83,13 @@ class Record:
     @property
     def y0(self) -> slice:
         """Slice of the unknowns at the start."""
-        return slice(2, 2 + self.n)
+        return self.bend(-2)
 
     @property
     def y1(self) -> slice:
         """Slice of the unknowns at the end."""
-        return slice(2 + self.n, 2 + 2 * self.n)
+        return self.bend(-1)
 
     def bend(self, k: int) -> slice:
         """Return the slice of row `k` of the dense output."""
         return slice(2 + (2 + k) * self.n, 2 + (3 + k) * self.n)
-
-
-def _joined(common: list[float], own: Array) -> Array:
-    """Prepend the same first entries to every row of `own`."""
-    if own.ndim == 1:
-        return np.concatenate([common, own])
-    shape = (*own.shape[:-1], len(common))
-    return np.concatenate([np.broadcast_to(np.array(common), shape), own], axis=-1)

@@ -7,13 +7,12 @@ integers, no calls between functions. Double precision has CasADi's bits.
 An SX Function becomes one C function (`in_c`). An MX Function that calls others, such as the step
 of a large mechanism, becomes a C function for each of those and one that calls them; the code
 between two calls is written out. Code size and compile time then grow with the blocks and not with
-how often a
-step calls them: those of a six-joint arm in 0.5 MB and 3 s. The bits are CasADi's in both forms.
+how often a step calls them: those of a six-joint arm in 0.5 MB and 3 s. The bits are CasADi's in
+both forms.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import final
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, final
 
 import casadi as ca
 
@@ -22,9 +21,7 @@ from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 
 
-@final
-@dataclass(frozen=True)
-class Written:
+class Written(NamedTuple):
     """C function.
 
     Attributes:
@@ -67,10 +64,12 @@ def in_c(
     Raises:
         ValueError: operations that C does not have.
     """
-    arguments = arguments or function.name_in()
-    results = results or function.name_out()
+    arguments, results = arguments or function.name_in(), results or function.name_out()
     kept = [k for k, result in enumerate(results) if result]
-    source = _dense(function, kept)
+    function = function if function.is_a("SXFunction") else function.expand()
+    symbols = [ca.SX.sym(name, *function.size_in(k)) for k, name in enumerate(function.name_in())]
+    values = function.call(symbols, True, False)
+    source = ca.Function(function.name(), symbols, [ca.densify(values[k]) for k in kept])
     whole = representable(graph(source), real)
     places = [[f"{x}[{i}]" for i in range(source.numel_in(k))] for k, x in enumerate(arguments)]
     targets = [
@@ -97,14 +96,6 @@ def macros(written: Iterable[Written], real: Real = DOUBLE) -> str:
     return "".join(f"#define {macro(call, real)} {call}{real.letter}\n" for call in calls)
 
 
-def _dense(function: ca.Function, kept: Sequence[int]) -> ca.Function:
-    """Return the results `kept` of a Function, dense and inlined."""
-    function = function if function.is_a("SXFunction") else function.expand()
-    symbols = [ca.SX.sym(name, *function.size_in(k)) for k, name in enumerate(function.name_in())]
-    values = function.call(symbols, True, False)
-    return ca.Function(function.name(), symbols, [ca.densify(values[k]) for k in kept])
-
-
 def all_macros() -> str:
     """Return definitions of all macros through which written functions call transcendental ones."""
     called = sorted(set(TRANSCENDENTAL.values()))
@@ -126,28 +117,20 @@ def routine(function: ca.Function, name: str) -> str:
     return in_c(function, name, arguments, results).text + "\n"
 
 
-def _heading(function: ca.Function, name: str) -> str:
-    arguments = [f"const double *a{i}" for i in range(function.n_in())]
-    results = [f"double *r{i}" for i in range(function.n_out())]
-    return f"static void {name}({', '.join([*arguments, *results])})"
-
-
 @final
-@dataclass(eq=False)
 class _Pieces:
     """C functions of the blocks that an MX Function calls, and its own C.
 
     Attributes:
         name: of the function in C, prefix of the names of its blocks.
-        known: the blocks written so far, by their hash.
+        blocks: C of the blocks; `known` has their names by the hash of their Functions.
         arrays: symbols (n, 1) and the C arrays that hold them.
+        lines: statements.
     """
 
-    name: str
-    blocks: list[str] = field(default_factory=list[str])
-    known: dict[int, str] = field(default_factory=dict[int, str])
-    arrays: list[tuple[ca.SX, str]] = field(default_factory=list[tuple[ca.SX, str]])
-    lines: list[str] = field(default_factory=list[str])
+    def __init__(self, name: str) -> None:
+        self.name, self.blocks, self.lines = name, list[str](), list[str]()
+        self.known, self.arrays = dict[int, str](), list[tuple[ca.SX, str]]()
 
     def written(self, function: ca.Function) -> str:
         """Return the C of `function` and of all functions that it calls."""
@@ -167,15 +150,19 @@ class _Pieces:
                 slots |= {i: value for i, value in zip(into, found, strict=True) if i >= 0}
             else:
                 slots[into[0]] = _between(function.instruction_MX(k), [slots[i] for i in of])
-        values = [_joined(results.get(i, [])) for i in range(function.n_out())]
+        values: list[ca.SX] = []
+        for i in range(function.n_out()):
+            parts = sorted(results.get(i, []), key=lambda part: part[0])
+            column = ca.vertcat(ca.SX(0, 1), *(ca.vec(part) for _, part in parts))
+            values.append(ca.densify(column))
         self._write(values, [f"r{i}" for i in range(len(values))])
-        idle = [f"(void)a{i};" for i in range(function.n_in()) if not self._reads(f"a{i}")]
-        heading = _heading(function, self.name)
+        into = [f"a{i}" for i in range(function.n_in())]
+        idle = [f"(void){a};" for a in into if not any(a in line for line in self.lines)]
+        handed = [f"const double *{a}" for a in into]
+        handed += [f"double *r{i}" for i in range(len(values))]
         body = "".join(f"    {line}\n" for line in (*idle, *self.lines))
-        return "".join(self.blocks) + f"{heading}\n{{\n{body}}}\n\n"
-
-    def _reads(self, array: str) -> bool:
-        return any(array in line for line in self.lines)
+        head = f"static void {self.name}({', '.join(handed)})"
+        return "".join(self.blocks) + f"{head}\n{{\n{body}}}\n\n"
 
     def _array(self, name: str, sparsity: ca.Sparsity) -> ca.SX:
         """Return symbols for the numbers of a C array."""
@@ -185,17 +172,13 @@ class _Pieces:
         self.arrays.append((symbols, name))
         return ca.reshape(symbols, sparsity.size1(), sparsity.size2())
 
-    def _block(self, function: ca.Function) -> str:
-        """Return the name of the C function of a block, which is written at its first call."""
+    def _call(self, function: ca.Function, arguments: list[ca.SX], number: int) -> list[ca.SX]:
+        """Return the results of a call; the block is written at the first one."""
         key = function.__hash__()
         if key not in self.known:
             self.known[key] = f"{self.name}_{len(self.known) + 1}_{function.name()}"
             self.blocks.append(routine(function, self.known[key]))
-        return self.known[key]
-
-    def _call(self, function: ca.Function, arguments: list[ca.SX], number: int) -> list[ca.SX]:
-        """Return the results of a call."""
-        name = self._block(function)
+        name = self.known[key]
         places = [self._place(a, f"x{number}_{i}") for i, a in enumerate(arguments)]
         made = [f"y{number}_{i}" for i in range(function.n_out())]
         sizes = [max(1, function.numel_out(i)) for i in range(function.n_out())]
@@ -230,26 +213,14 @@ class _Pieces:
         self.lines += ["{", *(f"    {line}" for line in code.lines), "}"]
 
 
-def _joined(parts: list[tuple[int, ca.SX]]) -> ca.SX:
-    """Assemble a result from its parts and their offsets."""
-    ordered = sorted(parts, key=lambda part: part[0])
-    return ca.densify(ca.vertcat(ca.SX(0, 1), *(ca.vec(part) for _, part in ordered)))
-
-
 def _within(column: ca.SX, symbols: ca.SX) -> int | None:
     """Return the offset of `column` in `symbols`; None if it is not a contiguous part."""
     count = column.numel()
     if not count or count > symbols.numel():
         return None
-    own, whole = list(_hashes(column)), list(_hashes(symbols))
-    if own[0] not in whole:
-        return None
-    begin = whole.index(own[0])
+    own, whole = ([e.__hash__() for e in ca.vertsplit(x)] for x in (column, symbols))
+    begin = whole.index(own[0]) if own[0] in whole else count
     return begin if whole[begin : begin + count] == own else None
-
-
-def _hashes(column: ca.SX) -> Iterator[int]:
-    return (ca.SX(element).__hash__() for element in ca.vertsplit(column))
 
 
 def _between(node: ca.MX, arguments: list[ca.SX]) -> ca.SX:

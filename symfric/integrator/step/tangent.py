@@ -23,9 +23,8 @@ space: no basis is ever chosen, and none turns singular.
 Source: Haug, Mech. Based Des. Struct. Mach., 2016-2018 (tangent-space index-0 DAE).
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -41,9 +40,7 @@ and from 1, and the stages of a method of order 5 need 5.
 """
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Tangent:
+class Tangent(NamedTuple):
     """Functions between the unknowns y of a mechanism and y_c = (w, w', other unknowns) in a chart.
 
     Attributes:
@@ -81,137 +78,27 @@ class Tangent:
         )
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Layout of y = (q, q', s, a, lam and normal forces, V, t)."""
-
-    n: int
-    nv: int
-    m: int
-    states: range
-    algebraic: range
-    basis: range
-    time: range
-
-    @classmethod
-    def of(cls, system: System, manifold: Manifold) -> "_Rows":
-        n, m, nx, basis = manifold.n, manifold.m, manifold.first, manifold.basis
-        return cls(
-            n, n - m, m, range(2 * n, nx), range(nx, basis.start), basis,
-            range(basis.stop, system.n),
-        )  # fmt: skip
-
-    @property
-    def others(self) -> list[int]:
-        """Rows that a chart leaves unchanged, except time."""
-        return [*self.states, *self.algebraic]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Constraints:
-    """Constraints as Functions of positions, velocities, time and run data.
-
-    Attributes:
-        phi: (q, t, d) -> constraints.
-        rate: (q, q', t, d) -> r = phi_q q' + phi_t.
-        slopes: (q, q', t, d) -> phi_q, phi_t, r_q, r_t.
-        pattern: of phi_q.
-    """
-
-    phi: ca.Function
-    rate: ca.Function
-    slopes: ca.Function
-    pattern: ca.Sparsity
-
-    @classmethod
-    def of(cls, system: System, manifold: Manifold, rows: _Rows) -> "_Constraints":
-        y, d, n = system.y, system.d, rows.n
-        q, qd, t = y[:n], y[n : 2 * n], y[list(rows.time), 0]
-        both = manifold.defect(y, d)
-        phi, rate = both[: rows.m], both[rows.m :]
-        slopes = [ca.jacobian(e, x) for e, x in ((phi, q), (phi, t), (rate, q), (rate, t))]
-        return cls(
-            ca.Function("phi", [q, t, d], [phi], {"cse": True}),
-            ca.Function("rate", [q, qd, t, d], [rate], {"cse": True}),
-            ca.Function("slopes", [q, qd, t, d], slopes, {"cse": True}),
-            slopes[0].sparsity(),
-        )
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Chart:
-    """Symbols of a chart.
-
-    Attributes:
-        q0, V: point and basis.
-        phi_q: Jacobian of the constraints there.
-        lu: factors of phi_q phi_q'.
-        factor: phi_q -> lu.
-        solve: (lu, r) -> B r.
-    """
-
-    q0: ca.SX
-    V: ca.SX
-    phi_q: ca.SX
-    lu: ca.SX
-    factor: ca.Function
-    solve: ca.Function
-
-    @classmethod
-    def of(cls, rows: _Rows, pattern: ca.Sparsity) -> "_Chart":
-        phi_q, r = ca.SX.sym("phi_q", pattern), ca.SX.sym("r", rows.m)
-        lu = factorise(ca.sparsify(phi_q @ phi_q.T), [range(rows.m)])
-        return cls(
-            ca.SX.sym("q0", rows.n),
-            ca.SX.sym("V", rows.n, rows.nv),
-            phi_q,
-            lu.packed_symbol,
-            ca.Function("factor_chart", [phi_q], [lu.packed], {"cse": True}),
-            ca.Function("solve_chart", [lu.packed_symbol, r], [lu.solve(r)]),
-        )
-
-    @property
-    def symbols(self) -> ca.SX:
-        """All symbols as one column."""
-        return ca.vertcat(self.q0, ca.vec(self.V), _entries(self.phi_q), self.lu)
-
-    def across(self, r: ca.SX) -> ca.SX:
-        """Return U B r, column by column."""
-        columns = (self.phi_q.T @ self.solve(self.lu, r[:, i]) for i in range(r.shape[1]))
-        return ca.horzcat(ca.SX(self.q0.numel(), 0), *columns)
-
-    def along(self, x: ca.SX) -> ca.SX:
-        """Return the part of x in the chart, V V' x."""
-        return self.V @ (self.V.T @ x)
-
-
 @lru_cache(maxsize=2)
 def tangent(system: System) -> Tangent | None:
     """Return the tangent-space form of a mechanism that requests it; None for any other system."""
     manifold = system.manifold
     if manifold is None or not manifold.charted:
         return None
-    rows = _Rows.of(system, manifold)
-    constraints = _Constraints.of(system, manifold, rows)
-    chart = _Chart.of(rows, constraints.pattern)
-    reduced = _reduced(system, rows, constraints, chart)
-    y, d, data, n, nv = system.y, system.d, reduced.d, rows.n, rows.nv
-    q, qd, others, t = _embedded(reduced.y, d, rows, constraints, chart)
+    chart, y = _Chart(system, manifold), system.y
+    y_c, data, n, nv = chart.reduced.y, chart.reduced.d, chart.n, chart.nv
+    q, qd, others, t = chart.embedded(y_c)
+    inside = ca.vertcat(ca.SX(nv, 1), chart.V.T @ y[n : 2 * n], y[chart.others], y[chart.time, 0])
+    w, wd, own, dt = chart.parts(y_c)
+    change = ca.vertcat(chart.V @ w, chart.V @ wd, own, ca.SX.zeros(len(manifold.basis)), dt)
     at = ca.vertcat(q, qd, others, ca.vec(chart.V), t)
-    inside = ca.vertcat(ca.SX(nv, 1), chart.V.T @ y[n : 2 * n], y[rows.others], y[list(rows.time)])
-    w, wd, others, t = _parts(reduced.y, rows)
-    change = ca.vertcat(chart.V @ w, chart.V @ wd, others, ca.SX.zeros(len(rows.basis)), t)
     return Tangent(
-        reduced,
-        _open(system, rows, constraints, chart),
+        chart.reduced,
+        chart.open(manifold),
         ca.Function("enter", [y, data], [inside], {"cse": True}),
-        ca.Function("leave", [reduced.y, data], [at], {"cse": True}),
+        ca.Function("leave", [y_c, data], [at], {"cse": True}),
         manifold.polish,
-        ca.Function("lift", [reduced.y, data], [change]),
-        _bend(system, data, rows, chart),
+        ca.Function("lift", [y_c, data], [change]),
+        chart.bend(manifold),
     )
 
 
@@ -220,125 +107,152 @@ def _entries(matrix: ca.SX) -> ca.SX:
     return ca.vec(ca.SX(matrix.nz[:]))
 
 
-def _parts(y_c: ca.SX, rows: _Rows) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return w, w', the unknowns that a chart leaves unchanged, and time."""
-    end = 2 * rows.nv + len(rows.others)
-    return y_c[: rows.nv], y_c[rows.nv : 2 * rows.nv], y_c[2 * rows.nv : end], y_c[end:, 0]
+@final
+class _Chart:
+    """Chart of a system with y = (q, q', s, a, lam and normal forces, V, t), as expressions.
 
+    Attributes:
+        n, nv, m: numbers of coordinates, degrees of freedom and constraints.
+        others: rows that a chart leaves unchanged, s, a, lam and normal forces; `time` likewise.
+        phi: (q, t, d) -> constraints.
+        rate: (q, q', t, d) -> r = phi_q q' + phi_t.
+        slopes: (q, q', t, d) -> phi_q, phi_t, r_q, r_t.
+        q0, V, phi_q: symbols for point, basis, and Jacobian of the constraints there.
+        lu: factors of phi_q phi_q'.
+        reduced: the equations in the chart, with their Jacobian at its origin.
+    """
 
-def _embedded(
-    y_c: ca.SX, d: ca.SX, rows: _Rows, constraints: _Constraints, chart: _Chart
-) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return positions, velocities, other unknowns and time at y_c."""
-    w, wd, others, t = _parts(y_c, rows)
-    q, qd = chart.q0 + chart.V @ w, chart.V @ wd
-    for _ in range(POSITION):
-        q = q - chart.across(constraints.phi(q, t, d))
-    for _ in range(VELOCITY):
-        qd = qd - chart.across(constraints.rate(q, qd, t, d))
-    return q, qd, others, t
+    def __init__(self, system: System, manifold: Manifold) -> None:
+        n, m, nx, y, d = manifold.n, manifold.m, manifold.first, system.y, system.d
+        self.system, self.n, self.nv, self.m = system, n, n - m, m
+        self.others = list(range(2 * n, manifold.basis.start))
+        self.time = list(range(manifold.basis.stop, system.n))
+        self.q, self.qd, self.own, self.t = y[:n], y[n : 2 * n], y[self.others], y[self.time, 0]
+        q, qd, t = self.q, self.qd, self.t
+        phi, rate = ca.vertsplit(manifold.defect(y, d), m)
+        slopes = [ca.jacobian(e, x) for e, x in ((phi, q), (phi, t), (rate, q), (rate, t))]
+        self.phi = ca.Function("phi", [q, t, d], [phi], {"cse": True})
+        self.rate = ca.Function("rate", [q, qd, t, d], [rate], {"cse": True})
+        self.slopes = ca.Function("slopes", [q, qd, t, d], slopes, {"cse": True})
+        self.q0, self.V = ca.SX.sym("q0", n), ca.SX.sym("V", n, self.nv)
+        self.phi_q, r = ca.SX.sym("phi_q", slopes[0].sparsity()), ca.SX.sym("r", m)
+        lu = factorise(ca.sparsify(self.phi_q @ self.phi_q.T), [range(m)])
+        self.lu, self.factor = (
+            lu.symbols,
+            ca.Function("factor", [self.phi_q], [lu.packed], {"cse": True}),
+        )
+        self.solve = ca.Function("solve", [self.lu, r], [lu.solve(r)])
+        self.reduced = self._reduced(nx - 2 * n)
 
+    def across(self, r: ca.SX) -> ca.SX:
+        """Return U B r, column by column."""
+        columns = (self.phi_q.T @ self.solve(self.lu, column) for column in ca.horzsplit(r))
+        return ca.horzcat(ca.SX(self.n, 0), *columns)
 
-def _reduced(system: System, rows: _Rows, constraints: _Constraints, chart: _Chart) -> System:
-    """Return the equations in the chart, with their Jacobian at its origin."""
-    n, nv = rows.n, rows.nv
-    q, qd, t = system.y[:n], system.y[n : 2 * n], system.y[list(rows.time)]
-    own = system.y[rows.others]
-    y_c = ca.vertcat(ca.SX.sym("w", nv), ca.SX.sym("w_dot", nv), own, t)
-    f = ca.Function("others", [q, qd, own, t, system.d], [system.f[rows.others]], {"cse": True})
-    a = own[len(rows.states) : len(rows.states) + n]
-    moved = f(*_embedded(y_c, system.d, rows, constraints, chart), system.d)
-    rates = ca.vertcat(y_c[nv : 2 * nv], chart.V.T @ a, moved, ca.SX.ones(t.numel()))
-    differential = 2 * nv + len(rows.states)
-    first, count = differential, len(rows.algebraic)
-    mass = ca.diagcat(ca.SX.eye(differential), ca.SX(count, count), ca.SX.eye(t.numel()))
-    own_names = [system.names[i] for i in rows.others]
-    return System(
-        y_c,
-        ca.vertcat(system.d, chart.symbols),
-        rates,
-        mass,
-        differential,
-        system.timed,
-        (*(f"chart_{i}" for i in range(2 * nv)), *own_names, *(["t"] if system.timed else [])),
-        np.ones(differential),
-        ca.SX(0, 1),
-        ca.SX(0, 1),
-        pivots=(
-            tuple(range(first, first + n)),
-            tuple(range(first + n, first + n + rows.m)),
-            tuple(range(first + n + rows.m, first + count)),
-            tuple(range(differential)),
-        ),
-        slope=_slope(system, y_c, rows, constraints, chart),
-        branchless=system.branchless,
-    )
+    def parts(self, y_c: ca.SX) -> list[ca.SX]:
+        """Return w, w', the unknowns that a chart leaves unchanged, and time."""
+        nv, end = self.nv, 2 * self.nv + len(self.others)
+        return [y_c[:nv], y_c[nv : 2 * nv], y_c[2 * nv : end], y_c[end:, 0]]
 
+    def embedded(self, y_c: ca.SX) -> list[ca.SX]:
+        """Return positions, velocities, other unknowns and time at y_c."""
+        (w, wd, others, t), d = self.parts(y_c), self.system.d
+        q, qd = self.q0 + self.V @ w, self.V @ wd
+        for _ in range(POSITION):
+            q = q - self.across(self.phi(q, t, d))
+        for _ in range(VELOCITY):
+            qd = qd - self.across(self.rate(q, qd, t, d))
+        return [q, qd, others, t]
 
-def _slope(
-    system: System, y_c: ca.SX, rows: _Rows, constraints: _Constraints, chart: _Chart
-) -> ca.SX:
-    """Return the Jacobian of the reduced equations at the origin of the chart."""
-    n, nv, d = rows.n, rows.nv, system.d
-    _, wd, own, t = _parts(y_c, rows)
-    q, qd, time = system.y[:n], system.y[n : 2 * n], system.y[list(rows.time)]
-    f = system.f[rows.others]
-    to_q, to_qd = ca.SX.sym("to_q", n, nv + t.numel()), ca.SX.sym("to_qd", n, nv + t.numel())
-    along = ca.jtimes(f, ca.vertcat(q, qd), ca.vertcat(to_q, to_qd))
-    slopes = ca.Function(
-        "slopes_f", [q, qd, own, time, d, to_q, to_qd],
-        [along, ca.jtimes(f, qd, to_q[:, :nv]), ca.jacobian(f, own), ca.jacobian(f, time)],
-        {"cse": True},
-    )  # fmt: skip
-    still = chart.V @ wd
-    _, phi_t, r_q, r_t = constraints.slopes(chart.q0, still, t, d)
-    qd_0 = still
-    if t.numel():
-        qd_0 = still - chart.across(phi_t)
-        _, phi_t, r_q, r_t = constraints.slopes(chart.q0, qd_0, t, d)
-    q_w, q_t = chart.V, -chart.across(phi_t)
-    qd_w, qd_t = -chart.across(r_q @ q_w), -chart.across(r_q @ q_t + r_t)
-    moved, f_wd, f_own, f_t = slopes(
-        chart.q0, qd_0, own, t, d, ca.horzcat(q_w, q_t), ca.horzcat(qd_w, qd_t)
-    )
-    moved = ca.horzcat(moved[:, :nv], f_wd, f_own, moved[:, nv:] + f_t)
-    rates = ca.SX(2 * nv, y_c.numel())
-    rates[:nv, nv : 2 * nv] = ca.SX.eye(nv)
-    first = 2 * nv + len(rows.states)
-    rates[nv:, first : first + n] = chart.V.T
-    return ca.sparsify(ca.vertcat(rates, moved, ca.SX(t.numel(), y_c.numel())))
+    def _reduced(self, states: int) -> System:
+        """Return the equations in the chart; `states` is the number of unknowns s."""
+        system, n, nv, t = self.system, self.n, self.nv, self.t
+        y_c = ca.vertcat(ca.SX.sym("w", nv), ca.SX.sym("w_dot", nv), self.own, t)
+        arguments = [self.q, self.qd, self.own, t, system.d]
+        f = ca.Function("others", arguments, [system.f[self.others]], {"cse": True})
+        moved = f(*self.embedded(y_c), system.d)
+        first, end = 2 * nv + states, 2 * nv + len(self.others)
+        a = y_c[first : first + n]
+        rates = ca.vertcat(y_c[nv : 2 * nv], self.V.T @ a, moved, ca.SX.ones(t.numel()))
+        mass = ca.diagcat(ca.SX.eye(first), ca.SX(end - first, end - first), ca.SX.eye(t.numel()))
+        names = [*(f"chart_{i}" for i in range(2 * nv)), *(system.names[i] for i in self.others)]
+        chart = ca.vertcat(self.q0, ca.vec(self.V), _entries(self.phi_q), self.lu)
+        starts = (first, first + n, first + n + self.m, end)
+        return System(
+            y_c,
+            ca.vertcat(system.d, chart),
+            rates,
+            mass,
+            first,
+            system.timed,
+            (*names, *(["t"] if system.timed else [])),
+            np.ones(first),
+            ca.SX(0, 1),
+            ca.SX(0, 1),
+            pivots=(*map(tuple, map(range, starts, starts[1:])), tuple(range(first))),
+            slope=self._slope(y_c, first),
+            branchless=system.branchless,
+        )
 
+    def _slope(self, y_c: ca.SX, first: int) -> ca.SX:
+        """Return the Jacobian of the reduced equations at the origin of the chart; accelerations
+        begin at `first`.
+        """
+        n, nv, d, f = self.n, self.nv, self.system.d, self.system.f[self.others]
+        (_, wd, own, t), count = self.parts(y_c), nv + self.t.numel()
+        to_q, to_qd = ca.SX.sym("to_q", n, count), ca.SX.sym("to_qd", n, count)
+        along = ca.jtimes(f, ca.vertcat(self.q, self.qd), ca.vertcat(to_q, to_qd))
+        slopes = ca.Function(
+            "slopes_f", [self.q, self.qd, self.own, self.t, d, to_q, to_qd],
+            [
+                along, ca.jtimes(f, self.qd, to_q[:, :nv]), ca.jacobian(f, self.own),
+                ca.jacobian(f, self.t),
+            ],
+            {"cse": True},
+        )  # fmt: skip
+        qd = self.V @ wd
+        _, phi_t, r_q, r_t = self.slopes(self.q0, qd, t, d)
+        if t.numel():
+            qd = qd - self.across(phi_t)
+            _, phi_t, r_q, r_t = self.slopes(self.q0, qd, t, d)
+        q_t = -self.across(phi_t)
+        to_q, to_qd = (
+            ca.horzcat(self.V, q_t),
+            ca.horzcat(-self.across(r_q @ self.V), -self.across(r_q @ q_t + r_t)),
+        )
+        moved, f_wd, f_own, f_t = slopes(self.q0, qd, own, t, d, to_q, to_qd)
+        moved = ca.horzcat(moved[:, :nv], f_wd, f_own, moved[:, nv:] + f_t)
+        rates = ca.SX(2 * nv, y_c.numel())
+        rates[:nv, nv : 2 * nv] = ca.SX.eye(nv)
+        rates[nv:, first : first + n] = self.V.T
+        return ca.sparsify(ca.vertcat(rates, moved, ca.SX(t.numel(), y_c.numel())))
 
-def _open(system: System, rows: _Rows, constraints: _Constraints, chart: _Chart) -> ca.Function:
-    """Return the chart at y: its V projected onto the tangent space there and made orthonormal."""
-    y, d, n = system.y, system.d, rows.n
-    before = ca.SX.sym("before", n, rows.nv)
-    projected = before - chart.across(chart.phi_q @ before)
-    columns: list[ca.SX] = []
-    for i in range(rows.nv):
-        v = projected[:, i]
-        for earlier in columns:
-            v = v - earlier * ca.dot(earlier, v)
-        columns.append(v / ca.sqrt(ca.dot(v, v)))
-    turned = ca.Function("turned", [before, chart.phi_q, chart.lu], [ca.horzcat(*columns)])
-    phi_q = constraints.slopes(y[:n], y[n : 2 * n], y[list(rows.time)], d)[0]
-    lu = chart.factor(phi_q)
-    basis = turned(ca.reshape(y[list(rows.basis)], n, rows.nv), phi_q, lu)
-    return ca.Function(
-        "open", [y, d], [ca.vertcat(d, y[:n], ca.vec(basis), _entries(phi_q), lu)], {"cse": True}
-    )
+    def open(self, manifold: Manifold) -> ca.Function:
+        """Return the chart at y: its V projected onto the tangent space there and made
+        orthonormal.
+        """
+        y, d, before = self.system.y, self.system.d, ca.SX.sym("before", self.n, self.nv)
+        columns: list[ca.SX] = []
+        for v in ca.horzsplit(before - self.across(self.phi_q @ before)):
+            for earlier in columns:
+                v = v - earlier * ca.dot(earlier, v)
+            columns.append(v / ca.sqrt(ca.dot(v, v)))
+        turned = ca.Function("turned", [before, self.phi_q, self.lu], [ca.horzcat(*columns)])
+        phi_q = self.slopes(self.q, self.qd, self.t, d)[0]
+        lu = self.factor(phi_q)
+        basis = turned(ca.reshape(y[list(manifold.basis)], self.n, self.nv), phi_q, lu)
+        chart = ca.vertcat(d, self.q, ca.vec(basis), _entries(phi_q), lu)
+        return ca.Function("open", [y, d], [chart], {"cse": True})
 
-
-def _bend(system: System, data: ca.SX, rows: _Rows, chart: _Chart) -> ca.Function:
-    """Return cubics through positions and velocities at both ends, normal to the chart."""
-    n, h = rows.n, ca.SX.sym("h")
-    y0, y1 = system.y, ca.SX.sym("y1", system.n)
-    first, second = ca.SX.zeros(system.n), ca.SX.zeros(system.n)
-    a = rows.algebraic.start
-    for at, slope in ((0, n), (n, a)):
-        rise = y1[at : at + n] - y0[at : at + n]
-        one = h * y0[slope : slope + n] - rise
-        two = rise - h * y1[slope : slope + n] - one
-        first[at : at + n] = one - chart.along(one)
-        second[at : at + n] = two - chart.along(two)
-    return ca.Function("bend", [y0, y1, h, data], [first, second], {"cse": True})
+    def bend(self, manifold: Manifold) -> ca.Function:
+        """Return cubics through positions and velocities at both ends, normal to the chart."""
+        n, h = self.n, ca.SX.sym("h")
+        y0, y1 = self.system.y, ca.SX.sym("y1", self.system.n)
+        first, second = ca.SX.zeros(self.system.n), ca.SX.zeros(self.system.n)
+        for at, slope in ((0, n), (n, manifold.first)):
+            rise = y1[at : at + n] - y0[at : at + n]
+            one = h * y0[slope : slope + n] - rise
+            two = rise - h * y1[slope : slope + n] - one
+            first[at : at + n] = one - self.V @ (self.V.T @ one)
+            second[at : at + n] = two - self.V @ (self.V.T @ two)
+        return ca.Function("bend", [y0, y1, h, self.reduced.d], [first, second], {"cse": True})

@@ -2,11 +2,11 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from dataclasses import fields as fields_of
 from functools import partial
 
 from symfric.foundation.numeric import Scalar, column, empty, tanh
+from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import APPLIED_FORCE, Input, Law, State, StaticLaw, Switch
 
@@ -14,7 +14,7 @@ Fall = Callable[[Scalar, Scalar, Scalar], Scalar]
 """(v, v_s, delta) -> the Stribeck weight exp(-|v / v_s|^delta)."""
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Levels(Law):
     """Law with a static level mu_s N that is not below its dynamic level mu_d N."""
 
@@ -31,20 +31,20 @@ class TwoLevels(Levels, StaticLaw):
         """Return the sliding force [N] at a speed >= 0 in the limit of zero widths."""
         return self.mu_d * N
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the break-away force [N], mu_s N."""
         return self.mu_s * N
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Curve(StaticLaw):
     """Law without states with one formula for both directions s of slip.
 
         F = formula(v, N, s, fall)
 
-    `force` uses s = tanh(v / v_eps), and a fall that rounds |v| over 1e-4 v_eps; `outside` uses s =
-    1 and the fall on one side of rest. v_eps is the first parameter that is a width, or the inverse
-    of a steepness.
+    `force` uses s = tanh(v / v_eps), and a fall that rounds |v| over 1e-4 v_eps; `outside` uses
+    s = 1 and the fall on one side of rest. v_eps is the first parameter that is a width, or the
+    inverse of a steepness.
     """
 
     @abstractmethod
@@ -70,7 +70,7 @@ FINEST = 1e-7
 """Largest relative tolerance of runs with such a law, a reference for other laws."""
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Sticking(Law):
     """Law with a mode: the direction of sliding, or 0 in stick.
 
@@ -89,12 +89,9 @@ class Sticking(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The mode: direction of sliding, or 0 at rest."""
-        return (
-            (State("mode", "1", 1.0, doc="direction of sliding, 0 at rest", whole=True),)
-            if self.has_mode
-            else ()
-        )
+        """Mode: direction of sliding, or 0 at rest."""
+        mode = State("mode", "1", 1.0, doc="direction of sliding, 0 at rest", whole=True)
+        return (mode,) if self.has_mode else ()
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -102,12 +99,11 @@ class Sticking(Law):
         return (APPLIED_FORCE,)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Return zero; in stick beyond the static level the overload (F_e -+ level)/(|F_e| + 1 N)
-        [1/s].
+        """Return zero [1/s]; in stick beyond the static level (F_e -+ level) / (|F_e| + 1 N).
 
-        Nothing depends on it, and stick ends at the instant where it would become nonzero. It lets
-        error control detect a short overload, which a long step would otherwise skip: in stick
-        nothing moves.
+        Nothing depends on this overload, and stick ends at the instant where it would become
+        nonzero. It lets error control detect a short overload, which a long step would otherwise
+        skip: in stick nothing moves.
         """
         if not self.has_mode:
             return empty(v)
@@ -116,13 +112,36 @@ class Sticking(Law):
         share = beyond / (smooth.magnitude(F_e, 0.0) + APPLIED_FORCE.nominal)
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the break-away force [N], mu_s N, the largest force in stick."""
         return self.mu_s * N
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the direction of sliding."""
         return column(smooth.sign(v, 0.0)) if self.has_mode else empty(v)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
+    ) -> tuple[Switch, ...]:
+        """Return the end of sliding at v = 0, and its start where the load exceeds the level.
+
+        Sliding continues in the other direction if the contact cannot hold `F_e`; stick ends at
+        once if the load exceeds the static level from the start. While such a load pulls forward,
+        v = 0 is a start of sliding, not an end.
+        """
+        if not self.has_mode:
+            return ()
+        mode, static = z[0], self.static_level(N)
+        onward, still = smooth.choose(F_e < 0, -1.0, 1.0), rests(mode)
+        excess = smooth.magnitude(F_e, 0.0) - static
+        after = smooth.choose(excess <= 0, 0.0, onward)
+        pull = mode * F_e - static
+        ahead = smooth.choose(mode * v > pull, mode * v, pull)
+        stick, slip = smooth.choose(still, 1.0, ahead), smooth.choose(still, excess, -1.0)
+        return (
+            Switch("stick", stick, -1, {"mode": after}, halts=True),
+            Switch("slip", slip, 1, {"mode": onward}, at_start=True, rtol=FINEST),
+        )
 
 
 def rests(mode: Scalar) -> Scalar:
@@ -137,28 +156,3 @@ def carried(mode: Scalar, F_e: Scalar, slip: Scalar) -> Scalar:
     does the dense output on which that end is located.
     """
     return smooth.choose(rests(mode), F_e, slip)
-
-
-def stick_and_slip(v: Scalar, mode: Scalar, F_e: Scalar, static: Scalar) -> tuple[Switch, ...]:
-    """Return the end of sliding at v = 0, and its start where the load exceeds `static`.
-
-    Sliding continues in the other direction if the contact cannot hold `F_e`; stick ends at once if
-    the load exceeds `static` from the start. While a load above `static` pulls forward, v = 0 is a
-    start of sliding, not an end.
-    """
-    onward, still = smooth.choose(F_e < 0, -1.0, 1.0), rests(mode)
-    excess = smooth.magnitude(F_e, 0.0) - static
-    after = smooth.choose(excess <= 0, 0.0, onward)
-    pull = mode * F_e - static
-    ahead = smooth.choose(mode * v > pull, mode * v, pull)
-    return (
-        Switch("stick", smooth.choose(still, 1.0, ahead), -1, {"mode": after}, halts=True),
-        Switch(
-            "slip",
-            smooth.choose(still, excess, -1.0),
-            1,
-            {"mode": onward},
-            at_start=True,
-            rtol=FINEST,
-        ),
-    )

@@ -15,9 +15,8 @@ LEVEL = partial(param, unit="N", role="level", lower=0.0)
 TORQUE = partial(param, unit="N m", role="level", lower=0.0)
 
 SIGMA_2 = partial(param, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
-MU_V = partial(
-    param, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
-)
+MU_V = partial(SIGMA_2, unit="s/m", doc="viscous coefficient, load-dependent")
+DRAG = partial(SIGMA_2, unit="N m s/rad")
 
 VELOCITY = partial(param, unit="m/s", role="velocity scale", lower=1e-12)
 V_S = partial(VELOCITY, doc="Stribeck velocity")
@@ -34,12 +33,18 @@ SIGMA_0 = partial(STIFFNESS, doc="bristle stiffness")
 SIGMA_1 = partial(param, unit="N s/m", role="damping", doc="bristle damping", lower=0.0)
 LENGTH = partial(param, unit="m", role="length", lower=1e-15)
 TIME = partial(param, unit="s", role="time", lower=1e-12)
+LOAD = partial(param, unit="N", role="load", lower=0.0)
+TEMPERATURE = partial(param, unit="K", role="temperature")
+ANGLE = partial(param, unit="rad", role="geometry")
 
 WIDTH = partial(param, unit="1", role="width", lower=1e-12)
-V_EPS = partial(param, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0)
+V_EPS = partial(WIDTH, unit="m/s", width=1, doc="smoothing velocity", lower=0.0)
+BAND = partial(WIDTH, unit="m/s", width=1)
 F_EPS = partial(WIDTH, unit="N", doc="rounding of the break-away")
 U_EPS = partial(WIDTH, doc="rounding of the peak", lower=0.0, upper=1.0)
-REST_EPS = partial(param, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0)
+REST_EPS = partial(WIDTH, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
 """Width for laws with states, whose bristles smooth the jump at rest: it is not a width of that
 jump."""
 R_EPS = partial(WIDTH, doc="smoothing of the load share")
+
+SAMPLING = partial(param, unit="1", role="sampling")

@@ -5,13 +5,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
 from math import inf, isfinite
+from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
-from symfric.foundation.parameters import Parametric, parameters
+from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.foundation.style import COLOURS
 from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import Rows
@@ -38,9 +39,9 @@ PHENOMENA = {
 CONFIDENCE = {
     "two sources": "the formula was compared with two independent ones",
     "one source": "the formula was compared with one",
-    "textbook": "the formula stands in every textbook",
-    "rebuilt": "the formula was lost or garbled, and rebuilt from what is said of it",
-    "constructed": "made here",
+    "textbook": "the formula is in every textbook",
+    "rebuilt": "the formula was lost or garbled, and rebuilt from descriptions of it",
+    "constructed": "constructed here",
     "unverified": "written from memory, compared with no publication and no public code",
 }
 """Confidence in a formula, by the words in `Facts.confidence`."""
@@ -54,26 +55,32 @@ class Facts:
         phenomena: codes of `PHENOMENA`.
         smoothness: differentiability class in the velocity, and where it breaks.
         confidence: one of `CONFIDENCE`.
-        source: the publication, read or not.
-        odd: the force changes sign with v, states and further inputs together.
-        load: dependence of the dry force on the normal force: "proportional", "independent" or
-            a description.
-        checked: the reference of the comparison, or other evidence.
+        source: publication, read or not; by default the section "Source:" of the docstring.
+        odd: True if the force changes sign with v, states and further inputs together.
+        load: how the dry force depends on N: "proportional", "independent" or a description.
+        checked: reference of the comparison; by default the section "Checked:" of the docstring.
     """
 
     phenomena: tuple[str, ...]
     smoothness: str
     confidence: str
-    source: str
+    source: str = ""
     odd: bool = True
     load: str = "proportional"
     checked: str = ""
 
+    def __set_name__(self, law: type, _: str) -> None:
+        for name in ("source", "checked"):
+            section = rf"\n {{4}}{name.title()}: (.+?)(?=\n\s*\n|\n {{4}}[A-Z]\w+:|\s*\Z)"
+            found = search(section, law.__doc__ or "", DOTALL)
+            if found and not getattr(self, name):
+                object.__setattr__(self, name, " ".join(found[1].split()).removesuffix("."))
+
     @property
     def formula(self) -> str:
         """Confidence in the formula, in words."""
-        said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
-        return f"{said}: {self.checked}" if self.checked else said
+        text = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
+        return f"{text}: {self.checked}" if self.checked else text
 
 
 @dataclass(frozen=True)
@@ -153,7 +160,7 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     return checked
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Law(Parametric, ABC):
     """Friction law F(v, N, z) with internal states dz/dt = rate(v, N, z).
 
@@ -194,9 +201,9 @@ class Law(Parametric, ABC):
         By default it is that of its first nonzero width or, without one, its first parameter with
         the role "velocity scale"; the inverse of a steepness [s/m].
         """
-        known = parameters(self).values()
-        widths = [p for p in known if p.width and not equals(p.value, 0.0)]
-        for p in widths or [p for p in known if p.role == "velocity scale" and not p.width]:
+        known, widths = parameters(self), self.widths
+        scales = [p for p in known.values() if p.role == "velocity scale" and not p.width]
+        for p in [known[name] for name in widths] or scales:
             return p.value if p.unit in ("m/s", "rad/s") else 1 / p.value
         return inf
 
@@ -216,7 +223,7 @@ class Law(Parametric, ABC):
         return {name: p.width for name, p in known if p.width and not equals(p.value, 0.0)}
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the sliding force [N] at a speed >= 0 in the limit of zero `widths`, when steady.
+        """Return the force [N] of steady sliding at a speed >= 0, in the limit of zero `widths`.
 
         It has one-sided derivatives at speed 0, and is finite below. An odd law defines this
         method, and `sliding` and `static_level` follow from it. All three take further inputs
@@ -227,26 +234,23 @@ class Law(Parametric, ABC):
         """
         raise one_sided(self, "it is not defined; write its method `outside(speed, N)`")
 
-    def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
-        """Return the sliding force [N] on one side of v = 0, `side` 1 or -1, as the `widths`
-        vanish.
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Return the force [N] of steady sliding to one `side`, 1 or -1, for zero `widths`.
 
         It is smooth in v from v = 0 on, with the sign of `side`; a Stribeck curve with a velocity
         of its own stays. Raises as `outside`.
         """
-        return side * self.outside(side * v, N)
+        return side * self.outside(side * v, N, **inputs)
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """Return the largest force [N] in stick against a pull to `side`, in the limit of zero
-        widths.
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the largest force [N] in stick against a pull to `side`, for zero `widths`.
 
         By default it is the top of the curve at rest. Raises as `outside`.
         """
-        return self.outside(0.0, N)
+        return self.outside(0.0, N, **inputs)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return an upper bound of the force [N] carried by the states in any motion at a steady
-        load.
+        """Return an upper bound of the force [N] of the states in any motion at a steady load.
 
         By default it is the static level. Raises as `outside`.
         """
@@ -283,15 +287,11 @@ class Law(Parametric, ABC):
         return None
 
     def warnings(self) -> tuple[str, ...]:
-        """Return warnings about the present parameters, such as missing passivity, one sentence
-        each.
-        """
+        """Return warnings about the parameters, such as missing passivity, one sentence each."""
         return ()
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small figure of the force in steady sliding under 1 N; None for a law with
-        symbols.
-        """
+        """Return a small figure of steady sliding under 1 N; None for a law with symbols."""
         from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
 
         if any(is_symbolic(p.value) for p in parameters(self).values()):
@@ -338,7 +338,7 @@ def check_law(where: str, law: object) -> None:
     raise checks.refused(where, "a law such as LuGre()", law, hint)
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class StaticLaw(Law):
     """Memoryless law: no internal states, no rows of the rate."""
 

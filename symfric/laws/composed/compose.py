@@ -1,31 +1,39 @@
 """Sum, asymmetric and load-dependent laws, which wrap other laws."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
-from itertools import pairwise
-from typing import ClassVar, final
+from dataclasses import fields as fields_of
+from dataclasses import replace
+from itertools import accumulate, pairwise
+from typing import ClassVar
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smallest
-from symfric.foundation.parameters import Parametric, distinct, param, parameters, with_values
-from symfric.laws.base import smooth
+from symfric.foundation.parameters import (
+    Parametric,
+    distinct,
+    parameters,
+    parametric,
+    with_values,
+)
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law, chosen
 from symfric.laws.composed.wrap import Wrapper
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Sum(Law):
     """Sum of friction forces; its states are those of the terms, one after another.
 
         F = F_1 + F_2 + ...
 
     A sum of sums is flattened. Parameters and states that share a name get the number of their
-    term: mu_d_1, mu_d_2, ... Limits: those of the terms. Source: superposition, as in Coulomb +
+    term: mu_d_1, mu_d_2, ...
+    Limits: those of the terms.
+    Source: superposition, as in Coulomb +
     viscous friction.
     """
 
-    facts = Facts((), "that of its terms", "constructed", "constructed")
+    facts = Facts((), "that of its terms", "constructed")
 
     laws: tuple[Law, ...]
 
@@ -56,11 +64,8 @@ class Sum(Law):
 
     def terms(self, z: Scalar) -> list[tuple[Law, Scalar]]:
         """Return the laws, each with its rows of `z`."""
-        ends = [0]
-        for law in self.laws:
-            ends.append(ends[-1] + len(law.states))
-        parts = [z[a:b] for a, b in pairwise(ends)]
-        return list(zip(self.laws, parts, strict=True))
+        ends = accumulate((len(law.states) for law in self.laws), initial=0)
+        return [(law, z[a:b]) for law, (a, b) in zip(self.laws, pairwise(ends), strict=True)]
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -95,13 +100,13 @@ class Sum(Law):
     ) -> tuple[Switch, ...]:
         """Return the changes of mode of all terms, with the state names of the sum."""
         names = iter(state.name for state in self.states)
-        found: list[Switch] = []
+        switches: list[Switch] = []
         for law, part in self.terms(z):
             new = {state.name: next(names) for state in law.states}
             for switch in law.switches(v, N, part, **chosen(law, inputs)):
                 reset = {new[name]: value for name, value in switch.reset.items()}
-                found.append(replace(switch, reset=reset))
-        return tuple(found)
+                switches.append(replace(switch, reset=reset))
+        return tuple(switches)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
         """Return the held steps of the terms, if every term with states has one."""
@@ -127,27 +132,26 @@ class Sum(Law):
         return _join(v, [law.steady_state(v, N) for law in self.laws if law.states])
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Asymmetric(Wrapper):
     """Law with different parameters for the two directions of sliding.
 
         p(v) = p_pos w + p_neg (1 - w),   w = [1 + tanh(v / v_blend)] / 2
 
-    Every parameter that differs between `positive` and `negative` is blended, so a bristle law
-    keeps its one state and equal parameters cost nothing. Limits: one-sided curves beyond 3
-    v_blend; keep v_blend below the smoothing velocity of the law. Source: separate parameter sets
+    Every parameter that differs between `positive` and `negative` is blended: a bristle law keeps
+    its one state, and equal parameters cost nothing.
+    Limits: one-sided curves beyond 3
+    v_blend; keep v_blend below the smoothing velocity of the law.
+    Source: separate parameter sets
     per direction, usual for drives (Armstrong-Helouvry 1991).
     """
 
-    facts = Facts((), "that of its law", "constructed", "separate sets")
+    facts = Facts((), "that of its law", "constructed")
     suffixes: ClassVar[tuple[str, ...]] = ("pos", "neg")
 
     positive: Law
     negative: Law
-    v_blend: Scalar = param(
-        1e-4, unit="m/s", role="width", width=1, doc="blending velocity of the sides", lower=1e-12
-    )
+    v_blend: Scalar = fields.BAND(1e-4, doc="blending velocity of the sides")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -167,12 +171,10 @@ class Asymmetric(Wrapper):
         """Return the law with the parameters of the direction of `v`."""
         w = (1 + smooth.sign(v, self.v_blend)) / 2
         rest = 1 - w
-        sides = zip(
-            parameters(self.positive).values(), parameters(self.negative).values(), strict=True
-        )
+        sides = (parameters(law).values() for law in (self.positive, self.negative))
         blended = {
             pos.name: pos.value * w + neg.value * rest
-            for pos, neg in sides
+            for pos, neg in zip(*sides, strict=True)
             if _differ(pos.value, neg.value)
         }
         return with_values(self.positive, blended)
@@ -191,8 +193,7 @@ class Asymmetric(Wrapper):
         return tuple(dict.fromkeys(self.positive.warnings() + self.negative.warnings()))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class LoadDependent(Wrapper):
     """Law under the effective normal force of a preloaded, load-carrying contact.
 
@@ -200,17 +201,19 @@ class LoadDependent(Wrapper):
 
     N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps,
     so that there is no division by zero and no negative load at lift-off (with N_0 = 0 down to N =
-    -1e7 N_eps, where the difference of the square root rounds to zero). Limits: N_0 = 0, c = 1,
-    N_eps = 0 is the law itself for N >= 0. Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas.
+    -1e7 N_eps, where the difference of the square root rounds to zero).
+    Limits: N_0 = 0, c = 1,
+    N_eps = 0 is the law itself for N >= 0.
+    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas.
     Control 134(5), 2012 (linear load part).
     """
 
-    facts = Facts((), "that of its law", "unverified", "Bittencourt and Gunnarsson 2012")
+    facts = Facts((), "that of its law", "unverified")
 
     law: Law
-    N_0: Scalar = param(0.0, unit="N", role="load", doc="preload", lower=0.0)
-    c: Scalar = param(1.0, unit="1", role="load", doc="share of the external load", lower=0.0)
-    N_eps: Scalar = param(1e-3, unit="N", role="width", doc="smoothing of the lift-off", lower=0.0)
+    N_0: Scalar = fields.LOAD(0.0, doc="preload")
+    c: Scalar = fields.LOAD(1.0, unit="1", doc="share of the external load")
+    N_eps: Scalar = fields.WIDTH(1e-3, unit="N", doc="smoothing of the lift-off", lower=0.0)
 
     def load(self, N: Scalar) -> Scalar:
         """Return the effective normal force [N]."""
@@ -225,7 +228,9 @@ def _added(forces: Iterable[Scalar]) -> Scalar:
 def _structure(value: object) -> object:
     """Return a law without its numbers: class, options, and the same for its parts."""
     if isinstance(value, Parametric):
-        held = (getattr(value, item.name) for item in fields(value) if "unit" not in item.metadata)
+        held = (
+            getattr(value, item.name) for item in fields_of(value) if "unit" not in item.metadata
+        )
         return type(value), *map(_structure, held)
     return tuple(map(_structure, value)) if isinstance(value, tuple) else value
 

@@ -1,15 +1,14 @@
 """Isotropic laws for slip in a plane or in space."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from dataclasses import fields as fields_of
-from itertools import islice
-from typing import ClassVar, final
+from dataclasses import replace
+from typing import ClassVar
 
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar, column, empty
-from symfric.foundation.parameters import Parametric, param
+from symfric.foundation.parameters import Parametric, parametric
 from symfric.foundation.vector import NotIsotropicError, Vector, Vectors
 from symfric.laws.base import fields
 from symfric.laws.base.law import Input, Law, State, Switch, check_law, chosen
@@ -17,7 +16,7 @@ from symfric.laws.composed.compose import Asymmetric, Sum
 from symfric.laws.composed.wrap import Lagged
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Isotropic(Parametric):
     """Friction law for slip v in two or three dimensions d.
 
@@ -31,7 +30,8 @@ class Isotropic(Parametric):
     rounded over `turn`). Maxwell-slip, Bouc-Wen and elasto-plastic elements then are those of
     plasticity in the plane, and LuGre, Dahl, Gonthier those of the literature. Further inputs, such
     as F_e, are vectors (d, 1). In components: vector states along x, then along y, then along z,
-    then the states that are numbers. Limits: slip along a line is the law itself. Equivariant under
+    then the states that are numbers.
+    Limits: slip along a line is the law itself. Equivariant under
     rotations. Every vector state stays within the bound that it has in straight slip. v_eps is for
     laws without states; the others have their own.
 
@@ -44,15 +44,14 @@ class Isotropic(Parametric):
     """Names of the dimensions."""
 
     law: Law
-    v_eps: Scalar = param(1e-9, unit="m/s", role="width", doc="smoothing of the speed", lower=1e-15)
+    v_eps: Scalar = fields.REST_EPS(1e-9, doc="smoothing of the speed", lower=1e-15)
     turn: Scalar = fields.WIDTH(1e-2, doc="rounding from unloading to loading", lower=1e-9)
 
     def __post_init__(self) -> None:
         name = type(self).__name__
         check_law(name, self.law)
         super().__post_init__()
-        reason = anisotropy(self.law)
-        if reason:
+        if reason := anisotropy(self.law):
             kind = type(self.law).__name__
             raise ValueError(f"{name}: expected an isotropic law, got {kind}; {reason}")
 
@@ -93,9 +92,8 @@ class Isotropic(Parametric):
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Return the friction force [N], shape (d, 1), for the sliding velocity v, shape (d, 1)."""
         given = self._given(inputs)
-        return self._rows(
-            [_force(self.law, self._vector(v), N, self._vectors(z), given, self.v_eps)]
-        )
+        F = _force(self.law, self._vector(v), N, self._vectors(z), given, self.v_eps)
+        return self._rows([F])
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Return the rates of the states, in their order."""
@@ -111,16 +109,15 @@ class Isotropic(Parametric):
         slip = self._vector(v)
         w = slip.length(self.v_eps)
         z = self.law.steady_state(w, N)
-        own = enumerate(self.law.states)
-        return self._rows([z[k] if s.even else z[k] / w * slip for k, s in own])
+        states = enumerate(self.law.states)
+        return self._rows([z[k] if s.even else z[k] / w * slip for k, s in states])
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
         """Return no changes of mode: laws with modes are refused."""
         return ()
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class PlanarSlip(Isotropic):
     """Isotropic friction law for slip in a plane, d = 2: see `Isotropic`.
 
@@ -132,8 +129,7 @@ class PlanarSlip(Isotropic):
     axes: ClassVar[str] = "xy"
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class SpatialSlip(Isotropic):
     """Isotropic friction law for slip in space, d = 3, such as a ball in its socket: `Isotropic`.
 
@@ -181,11 +177,9 @@ def _is_odd(law: Law) -> bool:
 Inputs = Mapping[str, Vector]
 
 
-def _terms(law: Law, z: Sequence[Vectors]) -> Iterator[tuple[Law, list[Vectors]]]:
-    """Yield the terms of a sum with their states, or the law itself."""
-    states = iter(z)
-    for term in law.laws if isinstance(law, Sum) else (law,):
-        yield term, list(islice(states, len(term.states)))
+def _terms(law: Law, z: Scalar) -> list[tuple[Law, Scalar]]:
+    """Return the terms of a sum with their states, or the law itself."""
+    return law.terms(z) if isinstance(law, Sum) else [(law, z)]
 
 
 def _force(

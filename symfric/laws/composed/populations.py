@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, expm1, sin
-from symfric.foundation.parameters import Parametric, param
+from symfric.foundation.parameters import Parametric, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Input, Law, State
 
@@ -43,7 +43,7 @@ class Contacts:
     random: np.random.Generator
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Population(Parametric, ABC):
     """Friction of `count` contacts that are made and lost at random, reproducible by `seed`.
 
@@ -60,8 +60,7 @@ class Population(Parametric, ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("count", "seed"):
-            least = 1 if name == "count" else 0
+        for name, least in (("count", 1), ("seed", 0)):
             whole = checks.count(f"{type(self).__name__}: {name}", getattr(self, name), least=least)
             object.__setattr__(self, name, whole)
 
@@ -114,10 +113,9 @@ class Population(Parametric, ABC):
         return Contacts(*self._draw(random), random)
 
     def advance(self, contacts: Contacts, dx: float, dt: float, N: float) -> tuple[Contacts, float]:
-        """Return the contacts after the path `dx` [m] in the time `dt` [s] under N [N], and their
-        force.
+        """Return the contacts, and their force, after the path `dx` [m] in the time `dt` [s].
 
-        A long path is divided into steps.
+        N [N] is the load. A long path is divided into steps.
         """
         z, r, rows = contacts.z, contacts.r, np.zeros(0)
         parts = max(1, ceil(abs(dx) / self.step * (1 - 1e-9)))
@@ -129,8 +127,7 @@ class Population(Parametric, ABC):
         return Contacts(z, r, contacts.random), float(rows[-1].sum())
 
     def force(self, t: ArrayLike, x: ArrayLike, N: float) -> Array:
-        """Return the friction force [N] along the motion x(t) [m] under N [N], from unloaded
-        contacts.
+        """Return the force [N] along the motion x(t) [m] under N [N], from unloaded contacts.
 
         Raises:
             ValueError: t not increasing, or other lengths.
@@ -167,9 +164,7 @@ class Population(Parametric, ABC):
         return np.where(v == 0, 0.0, smooth.sign(v, 0.0) * at)
 
     def _mean_force(self, v: float, N: float) -> float:
-        """Return the force [N] at the speed `v` [m/s], averaged over the second renewal of all
-        contacts.
-        """
+        """Return the mean force [N] at the speed `v` [m/s] over the second renewal of contacts."""
         contacts, F, parts = self.begin(), np.zeros(80), 40
         for i in range(F.size):
             contacts, F[i] = self.advance(contacts, self.path / parts, self.path / parts / v, N)
@@ -184,8 +179,7 @@ AnyLaw = Law | Population
 """Law or population, with a name, facts and figures."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class GenericAsperity(Population):
     """Generic asperity-level friction: many elastic contacts that age (a population).
 
@@ -204,14 +198,13 @@ class GenericAsperity(Population):
     springs lack; hysteresis with memory, velocity weakening, lag and dwell emerge. The
     scatter of the force falls like 1/sqrt(count). A reconstruction from words.
     Source: Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004.
+    Checked: from words.
     """
 
     facts: ClassVar[Facts] = Facts(
-        phenomena=("D", "S", "St", "P", "M", "L", "B", "N", "T"),
-        smoothness="C0 in the position, random",
-        confidence="rebuilt",
-        checked="from words",
-        source="Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004",
+        ("D", "S", "St", "P", "M", "L", "B", "N", "T"),
+        "C0 in the position, random",
+        "rebuilt",
         load="proportional in steady sliding",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_0", "mu_inf"),)
@@ -223,8 +216,8 @@ class GenericAsperity(Population):
     tau_c: Scalar = fields.TIME(0.05, doc="time in which a contact ages")
     lam: Scalar = fields.LENGTH(2e-5, doc="period of the counterface")
     duty: Scalar = fields.SHAPE(0.6, doc="share of a period in contact", lower=1e-3, upper=1.0)
-    count: int = param(1000, unit="1", role="sampling", doc="number of asperities", lower=1)
-    seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
+    count: int = fields.SAMPLING(1000, doc="number of asperities", lower=1)
+    seed: int = fields.SAMPLING(0, doc="seed of the random numbers", lower=0)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -249,8 +242,7 @@ class GenericAsperity(Population):
         return self.lam
 
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """Return place, stretch and age of an asperity after a step, with its force [N] as last
-        row.
+        """Return place, stretch, age and force [N] of an asperity after a step.
 
         Its stiffness is (1 + r/2) times the mean, r in [-1, 1].
         """
@@ -269,8 +261,7 @@ class GenericAsperity(Population):
         return np.stack([s, 0 * s, 0 * s]), r
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class RandomBristles(Population):
     """Bristle friction of Haessig and Friedland (a population).
 
@@ -285,18 +276,14 @@ class RandomBristles(Population):
     """
 
     facts: ClassVar[Facts] = Facts(
-        phenomena=("D", "S", "P"),
-        smoothness="jumps at random",
-        confidence="unverified",
-        source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
-        load="independent",
+        ("D", "S", "P"), "jumps at random", "unverified", load="independent"
     )
     redraws: ClassVar[bool] = True
 
     sigma_0: Scalar = fields.STIFFNESS(1e5, doc="stiffness of all bristles")
     delta_s: Scalar = fields.LENGTH(1e-5, doc="stretch at which a bristle snaps")
-    count: int = param(25, unit="1", role="sampling", doc="number of bristles", lower=1)
-    seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
+    count: int = fields.SAMPLING(25, doc="number of bristles", lower=1)
+    seed: int = fields.SAMPLING(0, doc="seed of the random numbers", lower=0)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -319,7 +306,7 @@ class RandomBristles(Population):
         return 2 * self.delta_s
 
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """Return the stretch of a bristle after a step, with its force [N] as last row.
+        """Return the stretch and the force [N] of a bristle after a step.
 
         After it snaps, it bonds again at r delta_s, r in [-1, 1].
         """

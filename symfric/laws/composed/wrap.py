@@ -1,11 +1,9 @@
 """Laws that wrap a law: lagged, temperature-dependent, and normalised by the load."""
 
-from dataclasses import dataclass
 from dataclasses import fields as fields_of
-from typing import final
 
 from symfric.foundation.numeric import Scalar, column, exp
-from symfric.foundation.parameters import param, parameters, with_values
+from symfric.foundation.parameters import parameters, parametric, with_values
 from symfric.laws.base import fields
 from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
 
@@ -101,8 +99,7 @@ class Wrapper(Law):
         return self.inner.warnings()
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Lagged(Wrapper):
     """Law without states that follows the velocity with a lag (one state).
 
@@ -113,11 +110,12 @@ class Lagged(Wrapper):
     velocity, and after a reversal it keeps its sign for about tau_L, so it may push for an instant.
     Limits: the law itself for v that changes slowly against tau_L; tau_L of bearings 1 to 50 ms.
     As C in float the force is as uncertain as w, 1e-7 of the largest velocity: use double if that
-    is not small against the smoothing velocity. Source: Hess and Soom, ASME J. Tribol. 112(1), 1990
+    is not small against the smoothing velocity.
+    Source: Hess and Soom, ASME J. Tribol. 112(1), 1990
     (pure delay); first-order form constructed.
     """
 
-    facts = Facts(("L",), "that of its law", "constructed", "Hess and Soom 1990")
+    facts = Facts(("L",), "that of its law", "constructed")
 
     law: Law
     tau_L: Scalar = fields.TIME(0.01, doc="time constant of the lag")
@@ -151,10 +149,9 @@ class Lagged(Wrapper):
         """Return None: the rate is sufficient."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class TemperatureDependent(Wrapper):
-    """A law whose coefficients fall with the temperature.
+    """Law whose coefficients fall with the temperature.
 
         mu(T)      = mu      exp(-k_dry (T - T_0))   every dry level: coefficient or force
         sigma_2(T) = sigma_2 exp(-k_wet (T - T_0))   every viscous coefficient
@@ -167,19 +164,13 @@ class TemperatureDependent(Wrapper):
     Meas. Control 134(5), 2012, with other functions of T.
     """
 
-    facts = Facts((), "that of its law", "constructed", "Reynolds' viscosity equation")
+    facts = Facts((), "that of its law", "constructed")
 
     law: Law
-    T: Scalar = param(293.15, unit="K", role="temperature", doc="temperature", lower=0.0)
-    T_0: Scalar = param(
-        293.15, unit="K", role="temperature", doc="temperature of the coefficients", lower=0.0
-    )
-    k_dry: Scalar = param(
-        0.0, unit="1/K", role="temperature", doc="fall of the friction coefficients"
-    )
-    k_wet: Scalar = param(
-        0.03, unit="1/K", role="temperature", doc="fall of the viscous coefficients"
-    )
+    T: Scalar = fields.TEMPERATURE(293.15, doc="temperature", lower=0.0)
+    T_0: Scalar = fields.TEMPERATURE(293.15, doc="temperature of the coefficients", lower=0.0)
+    k_dry: Scalar = fields.TEMPERATURE(0.0, unit="1/K", doc="fall of the friction coefficients")
+    k_wet: Scalar = fields.TEMPERATURE(0.03, unit="1/K", doc="fall of the viscous coefficients")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -200,8 +191,7 @@ class TemperatureDependent(Wrapper):
         )
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class LoadNormalised(Wrapper):
     """Law under one load, whose force is scaled with the actual load.
 
@@ -210,19 +200,19 @@ class LoadNormalised(Wrapper):
 
     Bristles of laws in newtons deflect with the load; if it falls they keep their force, which in
     joints with friction from reactions can leave no solution. Here the deflection does not depend
-    on the load, the force follows the load at once, and N = 0 gives zero force. Limits: N = N_0 is
+    on the load, the force follows the load at once, and N = 0 gives zero force.
+    Limits: N = N_0 is
     the law itself, and so is any N for a law whose force is proportional to the load and without
     states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force is scaled,
-    including viscous friction. A load that grows over a bent bristle does work. Source: LuGre in
+    including viscous friction. A load that grows over a bent bristle does work.
+    Source: LuGre in
     coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws constructed.
     """
 
-    facts = Facts((), "that of its law", "constructed", "Canudas de Wit and Tsiotras, CDC 1999")
+    facts = Facts((), "that of its law", "constructed")
 
     law: Law
-    N_0: Scalar = param(
-        0.8 * 9.81, unit="N", role="load", doc="load at which it is the law itself", lower=1e-12
-    )
+    N_0: Scalar = fields.LOAD(0.8 * 9.81, doc="load at which it is the law itself", lower=1e-12)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -238,15 +228,15 @@ class LoadNormalised(Wrapper):
         return self.N_0
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N], scaled."""
         return N / self.N_0 * super().force(v, N, z)
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Sliding force [N] on one side."""
+        """Return the sliding force [N] on one side, scaled."""
         return N / self.N_0 * super().sliding(v, N, side)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Largest force [N] at rest."""
+        """Return the largest force [N] at rest, scaled."""
         return N / self.N_0 * super().static_level(N, side)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:

@@ -1,18 +1,15 @@
 """Rate-independent friction laws: Dahl, Bliman-Sorine and Bouc-Wen."""
 
-from dataclasses import dataclass
 from math import inf
-from typing import final
 
 from symfric.foundation.numeric import Scalar, column, equals, is_number
-from symfric.foundation.parameters import option
+from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import deflection, onward, spent
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Dahl(Law):
     """Dahl friction (one state), exponent n.
 
@@ -29,15 +26,10 @@ class Dahl(Law):
     ten times above rtol, or the element is so stiff there that a step leaps over a reversal of
     slip and no error is estimated (n = 0.1 with the default at rtol 1e-3). Not valid for N = 0.
     Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
+    Checked: n = 1: Altair MotionSolve's manual and public code; n is unverified.
     """
 
-    facts = Facts(
-        phenomena=("D", "P"),
-        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="two sources",
-        checked="n = 1: Altair MotionSolve's manual and public code; n is unverified",
-        source="Dahl 1968, 1976",
-    )
+    facts = Facts(("D", "P"), "C∞ (C0 at v = 0 as v_eps -> 0)", "two sources")
 
     sigma_0: Scalar = fields.SIGMA_0(1e5)
     mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
@@ -51,15 +43,15 @@ class Dahl(Law):
         return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.sigma_0 * z[0]
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the bristle deflection [m/s], shape (1, 1)."""
+        """Return the rate of the bristle deflection [m/s], shape (1, 1)."""
         level = self.sigma_0 * z[0] / (self.mu_d * N)
         if equals(self.n, 1.0):
             return column(v - smooth.magnitude(v, self.v_eps) * level)
@@ -68,12 +60,11 @@ class Dahl(Law):
         return column(v - lost)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Bristle deflection in steady sliding [m], shape (1, 1)."""
+        """Return the bristle deflection in steady sliding [m], shape (1, 1)."""
         return column(self.mu_d * N / self.sigma_0 * smooth.sign(v, self.v_eps))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class BlimanSorine(Law):
     """Bliman-Sorine friction of second order (two states), or of first order (one).
 
@@ -91,14 +82,13 @@ class BlimanSorine(Law):
     default set, not for every one. |v| is smooth over v_eps.
     Source: Bliman and Sorine, Proc. European Control Conf. 1995; Olsson et al., Eur. J. Control 4,
     1998.
+    Checked: its closed forms hold.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "P"),
-        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="unverified",
-        checked="its closed forms hold",
-        source="Bliman and Sorine, ECC 1995; Olsson et al. 1998",
+        ("D", "S", "P"),
+        "C∞ (C0 at v = 0 as v_eps -> 0)",
+        "unverified",
         load="proportional in steady sliding",
     )
     ordered = (("mu_2", "mu_1"),)
@@ -126,10 +116,10 @@ class BlimanSorine(Law):
         return self.s_f if self.order == "2" else inf
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         return (self.mu_1 if self.order == "1" else self.mu_1 - self.mu_2) * N
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the height [N] of the peak at the path s_p, which the order 1 does not have."""
         if self.order == "1":
             return self.mu_1 * N
@@ -142,11 +132,11 @@ class BlimanSorine(Law):
         return N * (self.mu_1 if self.order == "1" else self.mu_1 + self.mu_2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return z[0] if self.order == "1" else z[0] + z[1]
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rates of the parts [N/s]."""
+        """Return the rates of the parts [N/s]."""
         speed = smooth.magnitude(v, self.v_eps)
         fast = (self.mu_1 * N * v - speed * z[0]) / (self.eta * self.s_f)
         if self.order == "1":
@@ -154,14 +144,13 @@ class BlimanSorine(Law):
         return column(fast, (-self.mu_2 * N * v - speed * z[1]) / self.s_f)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The parts in steady sliding [N]."""
+        """Return the parts in steady sliding [N]."""
         direction = smooth.sign(v, self.v_eps)
         parts = self.mu_1 * N * direction, -self.mu_2 * N * direction
         return column(*parts[: int(self.order)])
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class BoucWen(Law):
     """Bouc-Wen element (one state).
 
@@ -176,14 +165,13 @@ class BoucWen(Law):
     has no non-local memory and drifts under vibration with an offset. sign(v) and sign(z) are
     smooth over v_eps and z_eps; v_eps ten times below the slowest motion. Not valid for N = 0.
     Source: Bouc 1967; Wen, J. Eng. Mech. Div. ASCE 102(2), 1976, 249-263.
+    Checked: diegoandresalvarez/BWBN_TMCMC diff_eq_real.m.
     """
 
     facts = Facts(
-        phenomena=("D", "P"),
-        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="one source",
-        checked="diegoandresalvarez/BWBN_TMCMC diff_eq_real.m",
-        source="Wen, J. Eng. Mech. Div. ASCE 102(2), 1976",
+        ("D", "P"),
+        "C∞ (C0 at v = 0 as v_eps -> 0)",
+        "one source",
         load="proportional in steady sliding",
     )
 
@@ -212,16 +200,16 @@ class BoucWen(Law):
         return (State("z", "1", 1.0, doc="friction force over its limit"),)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         share = (self.A / (self.beta + self.gamma)) ** (1 / self.n)
         return self.mu_d * N * share
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.mu_d * N * z[0]
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the load share [1/s], shape (1, 1)."""
+        """Return the rate of the load share [1/s], shape (1, 1)."""
         used = smooth.overload(z[0], self.n, self.z_eps)
         t, s = smooth.sign(v, self.v_eps), smooth.sign(z[0], self.z_eps)
         yielded = (self.beta - self.gamma) * s + self.gamma * onward(t, s)
@@ -229,6 +217,6 @@ class BoucWen(Law):
         return column(self.sigma_0 / (self.mu_d * N) * stretch)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Load share in steady sliding, shape (1, 1)."""
+        """Return the load share in steady sliding, shape (1, 1)."""
         share = (self.A / (self.beta + self.gamma)) ** (1 / self.n)
         return column(share * smooth.sign(v, self.v_eps))

@@ -1,8 +1,5 @@
 """Friction with memory of the time in stick: Gonthier, Armstrong, and rate and state."""
 
-from dataclasses import dataclass
-from typing import final
-
 from symfric.foundation.numeric import (
     Scalar,
     asinh,
@@ -14,7 +11,7 @@ from symfric.foundation.numeric import (
     log,
     sqrt,
 )
-from symfric.foundation.parameters import option, param
+from symfric.foundation.parameters import option, parametric
 from symfric.foundation.vector import TINY
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import Levels
@@ -22,8 +19,7 @@ from symfric.laws.base.law import Facts, Law, State, one_sided
 from symfric.laws.dynamic.element import deflection, yielding
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Gonthier(Levels):
     """Gonthier friction with dwell time (two states).
 
@@ -42,14 +38,13 @@ class Gonthier(Levels):
     effect. Needs v_d < v_s. dz/dt does not vanish in creep (v < v_s), where only sat bounds F.
     Source: Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004, 209-233; the
     saturation is added here.
+    Checked: behaviour checked; the saturation is constructed.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "L", "B", "T"),
-        smoothness="C1 (dir at v_d; C2 elsewhere)",
-        confidence="unverified",
-        checked="behaviour checked; the saturation is constructed",
-        source="Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004",
+        ("D", "S", "St", "V", "P", "L", "B", "T"),
+        "C1 (dir at v_d; C2 elsewhere)",
+        "unverified",
         load="proportional in steady sliding",
     )
     strictly_ordered = (("v_d", "v_s"),)
@@ -76,6 +71,7 @@ class Gonthier(Levels):
         return self.v_d
 
     def _sticking(self, v: Scalar) -> Scalar:
+        """Return s(v)."""
         return exp(-((v / self.v_s) ** 2))
 
     def _level(self, N: Scalar, s_dw: Scalar) -> Scalar:
@@ -86,7 +82,7 @@ class Gonthier(Levels):
         return u * (1.5 - 0.5 * u * u)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rates of the deflection [m/s] and of the dwell memory [1/s]."""
+        """Return the rates of the deflection [m/s] and of the dwell memory [1/s]."""
         s, fast = self._sticking(v), self.sigma_1 / self.sigma_0
         pull = (self._level(N, z[1]) * self._direction(v) - self.sigma_0 * z[0]) / self.sigma_1
         dwelling = (1 + smooth.sign(s - z[1], self.s_eps)) / 2
@@ -94,11 +90,11 @@ class Gonthier(Levels):
         return column(s * v + (1 - s) * pull, (s - z[1]) / tau)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0, in its limit of small v_d."""
+        """Return the steady sliding force [N] at a speed >= 0, in its limit of small v_d."""
         return self._level(N, self._sticking(speed)) + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         bristle = self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
         if equals(self.kappa, 0.0):
             return bristle + self.sigma_2 * v
@@ -119,8 +115,7 @@ class Gonthier(Levels):
         return column(z, s)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Armstrong(Law):
     """Armstrong's seven-parameter friction in differential form (three states).
 
@@ -139,14 +134,13 @@ class Armstrong(Law):
     Lorentzian law with the excess mu_a. v_e separates rest from slip; keep it above the creep.
     Not valid for N = 0.
     Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, 1083-1138.
+    Checked: the differential form is constructed.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "L", "T"),
-        smoothness="C∞ (the original is switched)",
-        confidence="unverified",
-        checked="the differential form is constructed",
-        source="Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
+        ("D", "S", "St", "V", "P", "L", "T"),
+        "C∞ (the original is switched)",
+        "unverified",
         load="proportional in steady sliding",
     )
     ordered = (("mu_a", "mu_inf"),)
@@ -185,19 +179,19 @@ class Armstrong(Law):
         return N * (self.mu_d + excess / (1 + (w / self.v_s) ** 2))
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0, above v_e, where no rest is remembered."""
+        """Return the sliding force [N] at a speed >= 0 above v_e, without memory of a rest."""
         return self.level(N, speed, 0.0) + self.sigma_2 * speed
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away after a long rest."""
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the force [N] of break-away after a long rest."""
         return self.level(N, 0.0, 1.0)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.k_t * z[0] + self.sigma_2 * v
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rates of the spring [m/s], the filter [m/s^2] and the dwell [1/s]."""
+        """Return the rates of the spring [m/s], the filter [m/s^2] and the dwell [1/s]."""
         xi, w, q = z[0], z[1], z[2]
         rest, slip = self._shares(v)
         share = self.k_t * xi / self.level(N, w, q)
@@ -237,8 +231,7 @@ class Armstrong(Law):
         return self.level(N, w, q) / self.k_t * smooth.sign(v, self.v_eps)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class RateAndState(Law):
     """Rate-and-state friction (one state), regularised at rest.
 
@@ -257,31 +250,21 @@ class RateAndState(Law):
     logarithm makes mu small or negative where a < b.
     Source: Dieterich, J. Geophys. Res. 84, 1979; Ruina, J. Geophys. Res. 88, 1983; asinh form:
     Rice, Ben-Zion, PNAS 93, 1996.
+    Checked: jrleeman/rsfmodel and public MATLAB code (inverse hyperbolic sine).
 
     Raises:
         ValueError: mu_0/a above 150, or with the oldest contact's above 200: derivatives overflow.
     """
 
-    facts = Facts(
-        phenomena=("D", "St", "L", "T"),
-        smoothness="C∞",
-        confidence="two sources",
-        checked="jrleeman/rsfmodel and public MATLAB code (inverse hyperbolic sine)",
-        source="Dieterich 1979; Ruina 1983; Rice and Ben-Zion 1996",
-        load="proportional",
-    )
+    facts = Facts(("D", "St", "L", "T"), "C∞", "two sources", load="proportional")
 
     mu_0: Scalar = fields.COEFFICIENT(0.12, doc="friction coefficient at v_0", lower=1e-12)
     a: Scalar = fields.COEFFICIENT(0.01, doc="direct effect", lower=1e-6)
     b: Scalar = fields.COEFFICIENT(0.015, doc="evolution effect")
     v_0: Scalar = fields.VELOCITY(1e-6, doc="reference velocity", lower=1e-15)
     D_c: Scalar = fields.LENGTH(1e-5, doc="slip that renews the contacts")
-    v_eps: Scalar = param(
-        1e-12,
-        unit="m/s",
-        role="width",
-        doc="counts as rest; D_c/v_eps is the age of the oldest contact",
-        lower=1e-15,
+    v_eps: Scalar = fields.REST_EPS(
+        1e-12, doc="counts as rest; D_c/v_eps is the age of the oldest contact", lower=1e-15
     )
     evolution: str = option("ageing", choices=("ageing", "slip"), doc="Dieterich's or Ruina's law")
 
@@ -310,12 +293,12 @@ class RateAndState(Law):
         raise one_sided(self, "it creeps under any load, and ln v has no limit at rest")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         argument = v / (2 * self.v_0) * exp((self.mu_0 + self.b * z[0]) / self.a)
         return N * self.a * asinh(argument)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of psi [1/s], shape (1, 1)."""
+        """Return the rate of psi [1/s], shape (1, 1)."""
         w = self._speed(v)
         if self.evolution == "slip":
             return column(-w / self.D_c * (log(w / self.v_0) + z[0]))

@@ -6,24 +6,30 @@ from typing import Any, ClassVar, final
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, is_number, sqrt
-from symfric.foundation.parameters import Parametric
+from symfric.foundation.parameters import Parametric, parametric
 from symfric.foundation.vector import ROUND, Vector, Vectors
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
+from symfric.laws.base.families import Levels
 from symfric.laws.base.law import Law, State, Switch
 
 
-class StribeckLevel(Law):
+class _Smoothed(Law):
+    """Law with viscous friction and a smoothing velocity, which its subclasses declare."""
+
+    sigma_2: Scalar
+    v_eps: Scalar
+
+
+@parametric
+class StribeckLevel(Levels, _Smoothed):
     """Law with states that slides at a Stribeck curve.
 
     g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
     """
 
-    mu_s: Scalar
-    mu_d: Scalar
-    v_s: Scalar
-    delta: Scalar
-    sigma_2: Scalar
-    v_eps: Scalar
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
 
     def level(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the Stribeck curve g(v, N) > 0 [N], the limit of the force of the states."""
@@ -31,11 +37,12 @@ class StribeckLevel(Law):
         return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
         return mu * N + self.sigma_2 * speed
 
 
+@parametric
 class Elements(Law):
     """Law of parallel elements, each a spring whose force F_i is a state.
 
@@ -45,8 +52,7 @@ class Elements(Law):
     kind: ClassVar[type[Parametric]]
     """Class of an element."""
 
-    elements: tuple[Any, ...]
-    form: str
+    elements: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         where, one = f"{type(self).__name__}: elements", f"{self.kind.__name__}()"
@@ -69,9 +75,9 @@ class Elements(Law):
         first, *rest = parts
         return sum(rest, start=first)
 
-    def springs(self, z: Scalar) -> Scalar:
-        """Return the sum of the spring forces [N]."""
-        return self.total(z[i] for i in range(len(self.elements)))
+    def springs(self, z: Scalar) -> list[Scalar]:
+        """Return the spring forces [N]."""
+        return [z[i] for i in range(len(self.elements))]
 
     def slip_switches(
         self, v: Scalar, z: Scalar, limits: Sequence[Scalar], resets: Sequence[dict[str, Scalar]]
@@ -94,9 +100,7 @@ class Elements(Law):
 
 
 def held_columns(parts: Iterable[tuple[Scalar, Scalar, Scalar]]) -> tuple[Scalar, Scalar]:
-    """Return columns of ends and means of a held step, from load, mean load and mode of each
-    element.
-    """
+    """Return the columns of ends and means of a held step, from (end, mean, mode) of elements."""
     ends, means, modes = zip(*parts, strict=True)
     return column(*ends, *modes), column(*means, *modes)
 
@@ -127,9 +131,7 @@ def along(t: Vector, s: Vector) -> Scalar:
 
 
 def onward(t: Vectors, s: Vectors) -> Vectors:
-    """Return twice s if slip along t loads it, 0 if it unloads: t + s, of vectors 2 a s,
-    `along`.
-    """
+    """Return t + s: 2 s if slip along t loads, 0 if it unloads; of vectors 2 a s, see `along`."""
     return 2 * along(t, s) * s if isinstance(s, Vector) else t + s
 
 

@@ -1,30 +1,25 @@
 """Bristle laws with a Stribeck level: LuGre in three forms, and elasto-plastic."""
 
-from dataclasses import dataclass
 from math import pi
-from typing import final
 
 from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
-from symfric.foundation.parameters import param
+from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Levels
 from symfric.laws.base.law import Facts, State
 from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
 
 
-@dataclass(frozen=True, eq=False)
-class Bristle(Levels, StribeckLevel):
+@parametric
+class Bristle(StribeckLevel):
     """Bristle of stiffness sigma_0 and damping sigma_1 that slides at a Stribeck level.
 
-        g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
-        F = sigma_0 z + sigma_1 dz/dt + sigma_2 v
+        g     = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
+        dz/dt = v - sigma_0 |v| z / g
+        F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
-    The laws differ in dz/dt and, some, in the damping.
+    The laws differ in dz/dt, in the damping or in the dependence on the load.
     """
 
-    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
-    v_s: Scalar = fields.V_S(1e-3)
-    delta: Scalar = fields.DELTA(2.0)
     sigma_0: Scalar = fields.SIGMA_0(1e5)
     sigma_1: Scalar = fields.SIGMA_1(190.0)
     sigma_2: Scalar = fields.SIGMA_2(0.0)
@@ -35,12 +30,20 @@ class Bristle(Levels, StribeckLevel):
         """Mean deflection z of the bristles [m], positive with v."""
         return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
+    def relaxation(self, v: Scalar, N: Scalar) -> Scalar:
+        """Return sigma_0 |v| / g [1/s]."""
+        return self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Return the rate of the bristle deflection [m/s], shape (1, 1)."""
+        return column(v - self.relaxation(v, N) * z[0])
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0] + self.sigma_2 * v
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Bristle deflection in steady sliding [m], shape (1, 1)."""
+        """Return the bristle deflection in steady sliding [m], shape (1, 1)."""
         return column(self.level(v, N) / self.sigma_0 * smooth.sign(v, self.v_eps))
 
     def warnings(self) -> tuple[str, ...]:
@@ -55,8 +58,7 @@ class Bristle(Levels, StribeckLevel):
         )
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class LuGre(Bristle):
     """LuGre bristle friction (one state).
 
@@ -75,24 +77,15 @@ class LuGre(Bristle):
     not meet: after a jump in v the force may point forward for an instant. Not valid for N = 0 or a
     fast-varying N, since the deflection does not shrink with the load.
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, 419-425.
+    Checked: auralius/LuGre lugre.m; jchristopherson/FrictionModels.jl.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "L", "B"),
-        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="two sources",
-        checked="auralius/LuGre lugre.m; jchristopherson/FrictionModels.jl",
-        source="Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995",
+        ("D", "S", "St", "V", "P", "L", "B"), "C∞ (C0 at v = 0 as v_eps -> 0)", "two sources"
     )
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the bristle deflection [m/s], shape (1, 1)."""
-        relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
-        return column(v - relaxation * z[0])
 
-
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class LuGreNormalised(Bristle):
     """LuGre friction normalised by the load (one state), for a normal force that varies.
 
@@ -106,47 +99,35 @@ class LuGreNormalised(Bristle):
     Limits: at constant N it is `LuGre` with sigma_i N; steady state N (g sign(v) + sigma_2 v).
     Source: Canudas de Wit et al., IEEE TAC 40(3), 1995, in coefficients (the "amended" form that
     tyre models use; Canudas de Wit and Tsiotras, CDC 1999).
+    Checked: documentation of Altair MotionSolve; LuGre at constant load.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "L", "B"),
-        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="two sources",
-        checked="documentation of Altair MotionSolve; LuGre at constant load",
-        source="LuGre in coefficients of friction; Canudas de Wit and Tsiotras, CDC 1999",
+        ("D", "S", "St", "V", "P", "L", "B"), "C∞ (C0 at v = 0 as v_eps -> 0)", "two sources"
     )
 
-    sigma_0: Scalar = param(
-        1.274e4, unit="1/m", role="stiffness", doc="bristle stiffness over load", lower=1e-12
-    )
-    sigma_1: Scalar = param(
-        24.2, unit="s/m", role="damping", doc="bristle damping over load", lower=0.0
-    )
-    sigma_2: Scalar = param(
-        0.0, unit="s/m", role="viscous", doc="viscous coefficient over load", lower=0.0
-    )
+    sigma_0: Scalar = fields.SIGMA_0(1.274e4, unit="1/m", doc="bristle stiffness over load")
+    sigma_1: Scalar = fields.SIGMA_1(24.2, unit="s/m", doc="bristle damping over load")
+    sigma_2: Scalar = fields.SIGMA_2(0.0, unit="s/m", doc="viscous coefficient over load")
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the bristle deflection [m/s], shape (1, 1)."""
-        relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, 1.0)
-        return column(v - relaxation * z[0])
+        """Return the rate of the bristle deflection [m/s], shape (1, 1)."""
+        return super().rate(v, 1.0, z)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         return N * super().outside(speed, 1.0)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        damping = self.sigma_1 * self.rate(v, N, z)[0]
-        return N * (self.sigma_0 * z[0] + damping + self.sigma_2 * v)
+        """Return the friction force [N]."""
+        return N * super().force(v, 1.0, z)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Bristle deflection in steady sliding [m], shape (1, 1)."""
-        return column(self.level(v, 1.0) / self.sigma_0 * smooth.sign(v, self.v_eps))
+        """Return the bristle deflection in steady sliding [m], shape (1, 1)."""
+        return super().steady_state(v, 1.0)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class LuGrePassive(Bristle):
     """LuGre friction whose bristle damping fades with the velocity (one state).
 
@@ -160,35 +141,26 @@ class LuGrePassive(Bristle):
     Limits: v_d -> inf is `LuGre`; steady state g sign(v) + sigma_2 v. Not valid for N = 0.
     Source: Olsson, Control Systems with Friction, PhD thesis, Lund 1996 (velocity-dependent
     damping).
+    Checked: jchristopherson/FrictionModels.jl (v_d = v_s); passivity by computation.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "L", "B"),
-        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="one source",
-        checked="jchristopherson/FrictionModels.jl (v_d = v_s); passivity by computation",
-        source="Olsson, PhD thesis, Lund 1996",
+        ("D", "S", "St", "V", "P", "L", "B"), "C∞ (C0 at v = 0 as v_eps -> 0)", "one source"
     )
 
     v_d: Scalar = fields.VELOCITY(1e-3, doc="velocity over which damping fades")
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the bristle deflection [m/s], shape (1, 1)."""
-        relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
-        return column(v - relaxation * z[0])
-
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         damping = self.sigma_1 * exp(-((v / self.v_d) ** 2))
         return self.sigma_0 * z[0] + damping * self.rate(v, N, z)[0] + self.sigma_2 * v
 
     def warnings(self) -> tuple[str, ...]:
-        """Return no warnings: the fading damping replaces the bound of `LuGre`."""
+        """Return no warnings: the fading damping makes the bound of `LuGre` unnecessary."""
         return ()
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class ElastoPlastic(Bristle):
     """Elasto-plastic friction (one state).
 
@@ -206,23 +178,22 @@ class ElastoPlastic(Bristle):
     it after 3.4 z_ss); z_ba -> 0 is not `LuGre`, since alpha still rises with z. Passivity and the
     choice of v_eps as in `LuGre`. Needs z_ba < mu_d N / sigma_0, hence not valid for small N.
     Source: Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002, 787-792.
+    Checked: jchristopherson/FrictionModels.jl ElastoPlasticModels.jl; MBDyn.
 
     Raises:
         ValueError: from `rate` and `force`: z_ba beyond what the load, a number, allows.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "L", "B", "N"),
-        smoothness="C2 (C0 at v = 0 and C1 in z as v_eps -> 0)",
-        confidence="two sources",
-        checked="jchristopherson/FrictionModels.jl ElastoPlasticModels.jl; MBDyn",
-        source="Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002",
+        ("D", "S", "St", "V", "P", "L", "B", "N"),
+        "C2 (C0 at v = 0 and C1 in z as v_eps -> 0)",
+        "two sources",
     )
 
     z_ba: Scalar = fields.LENGTH(1e-7, doc="break-away deflection", lower=0.0)
 
     def sliding_share(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """alpha: 0 while the bristle is elastic, 1 when it slides."""
+        """Return alpha, 0 while the bristle is elastic and 1 when it slides."""
         z_ss = self.level(v, N) / self.sigma_0
         elastic = self.z_ba / z_ss
 
@@ -235,12 +206,7 @@ class ElastoPlastic(Bristle):
         return ahead(step, smooth.sign(v, self.v_eps), z[0] / z_ss)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the bristle deflection [m/s], shape (1, 1)."""
-        self._check_load(N)
-        relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
-        return column(v - self.sliding_share(v, N, z) * relaxation * z[0])
-
-    def _check_load(self, N: Scalar) -> None:
+        """Return the rate of the bristle deflection [m/s], shape (1, 1)."""
         numbers = (self.mu_d, N, self.sigma_0, self.z_ba)
         if all(map(is_number, numbers)) and self.z_ba >= self.mu_d * N / self.sigma_0:
             raise ValueError(
@@ -248,3 +214,4 @@ class ElastoPlastic(Bristle):
                 f"{self.mu_d * N / self.sigma_0:g} m, got z_ba = {self.z_ba:g} m; "
                 "otherwise the bristle slides before it breaks away"
             )
+        return column(v - self.sliding_share(v, N, z) * self.relaxation(v, N) * z[0])

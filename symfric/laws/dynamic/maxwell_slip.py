@@ -1,12 +1,7 @@
-"""Laws of parallel elements: Maxwell-slip, and Leuven and GMS, which add a Stribeck effect and
-lag.
-"""
-
-from dataclasses import dataclass
-from typing import final
+"""Laws of parallel elements: Maxwell-slip, and Leuven and GMS with a Stribeck effect and lag."""
 
 from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number
-from symfric.foundation.parameters import Parametric, option, param
+from symfric.foundation.parameters import Parametric, option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import (
@@ -19,8 +14,7 @@ from symfric.laws.dynamic.element import (
 )
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Slider(Parametric):
     """Spring of stiffness k on a slider that carries mu N."""
 
@@ -32,8 +26,7 @@ SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slide
 """Four sliders, together 1e5 N/m and mu = 0.1, which slip one after the other."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class MaxwellSlip(Elements):
     """Maxwell-slip (Iwan) friction of n elements, the exact hysteresis with non-local memory.
 
@@ -54,14 +47,13 @@ class MaxwellSlip(Elements):
     inner loops are forgotten. One stiff element is Coulomb friction. |v| is smooth over v_eps, to
     be kept a hundred times below the slowest motion of interest. Not valid for N = 0.
     Source: Iwan, ASME J. Appl. Mech. 33(4), 1966; Prandtl 1928 (play operators).
+    Checked: jchristopherson/friction README; Lampaert, Al-Bender, Swevers 2003.
     """
 
     facts = Facts(
-        phenomena=("D", "P", "M", "N"),
-        smoothness="C∞ (C0 at the corners as n -> inf)",
-        confidence="two sources",
-        checked="jchristopherson/friction README; Lampaert, Al-Bender, Swevers 2003",
-        source="Iwan, J. Appl. Mech. 33(4), 1966",
+        ("D", "P", "M", "N"),
+        "C∞ (C0 at the corners as n -> inf)",
+        "two sources",
         load="proportional in steady sliding",
     )
 
@@ -83,12 +75,12 @@ class MaxwellSlip(Elements):
         return (*super().states, *modes)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         return N * self.total(e.mu for e in self.elements)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        return self.springs(z)
+        """Return the friction force [N]."""
+        return self.total(self.springs(z))
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the rates of the spring forces [N/s] and, zero, of the modes."""
@@ -96,12 +88,7 @@ class MaxwellSlip(Elements):
         if self.form == "event":
             forces = [(1 - z[count + i]) * e.k * v for i, e in enumerate(self.elements)]
             return column(*forces, *(0.0 * v for _ in self.elements))
-        return column(
-            *(
-                e.k * yielding(v, z[i] / (e.mu * N), self.n, self.v_eps, self.r_eps)
-                for i, e in enumerate(self.elements)
-            )
-        )
+        return column(*stretched(self, v, N, z))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return sliders at their limits, with modes in slip."""
@@ -131,21 +118,24 @@ class MaxwellSlip(Elements):
         )
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
-        """Return the spring forces after the slip `dx` [m] in one direction, exactly; their sum
-        is F.
-        """
-        held = [
-            smooth.clip(F[i] + e.k * dx, -e.mu * N, e.mu * N) for i, e in enumerate(self.elements)
-        ]
-        return column(*held)
+        """Return the spring forces after the slip `dx` [m] in one direction, exactly."""
+        pairs = zip(self.springs(F), self.elements, strict=True)
+        return column(*(smooth.clip(F_i + e.k * dx, -e.mu * N, e.mu * N) for F_i, e in pairs))
+
+
+def stretched(law: "MaxwellSlip | Leuven", v: Scalar, N: Scalar, z: Scalar) -> list[Scalar]:
+    """Return the rates of the spring forces [N/s] of sliders that are moved at `v`, smooth form."""
+    return [
+        e.k * yielding(v, F / (e.mu * N), law.n, law.v_eps, law.r_eps)
+        for e, F in zip(law.elements, law.springs(z), strict=True)
+    ]
 
 
 LEUVEN_SLIDERS = (Slider(5e4, 0.05), Slider(2.5e4, 0.05), Slider(1.5e4, 0.05), Slider(1e4, 0.05))
 """Four sliders, together 1e5 N/m and mu = 0.2, above the static level."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Leuven(StribeckLevel, Elements):
     """Leuven friction, modified (n states of the hysteresis).
 
@@ -162,24 +152,18 @@ class Leuven(StribeckLevel, Elements):
     until F_h = g. Needs mu_1 + mu_2 + ... >= mu_s, else z runs away. Not valid for N = 0.
     Source: Swevers, Al-Bender, Ganseman, Prajogo, IEEE TAC 45(4), 2000; Lampaert, Swevers,
     Al-Bender, IEEE TAC 47(4), 2002.
+    Checked: Lampaert, Al-Bender, Swevers 2003, signs corrected.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
-        smoothness="C∞ (C0 as v_eps -> 0 and n -> inf)",
-        confidence="one source",
-        checked="Lampaert, Al-Bender, Swevers 2003, signs corrected",
-        source="Lampaert, Swevers, Al-Bender, IEEE TAC 47(4), 2002",
+        ("D", "S", "St", "V", "P", "M", "L", "B", "N"),
+        "C∞ (C0 as v_eps -> 0 and n -> inf)",
+        "one source",
         load="proportional in steady sliding",
     )
-    ordered = (("mu_d", "mu_s"),)
     kind = Slider
 
     elements: tuple[Slider, ...] = LEUVEN_SLIDERS
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
-    v_s: Scalar = fields.V_S(1e-3)
-    delta: Scalar = fields.DELTA(2.0)
     delta_l: Scalar = fields.SHAPE(7.0, doc="sharpness of the transition", lower=1.0, upper=1e2)
     sigma_1: Scalar = fields.SIGMA_1(0.8)
     sigma_2: Scalar = fields.SIGMA_2(0.0)
@@ -197,25 +181,19 @@ class Leuven(StribeckLevel, Elements):
             )
 
     def stretching(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """dz/dt [m/s] of the hysteretic deflection."""
-        share = self.springs(z) / self.level(v, N)
+        """Return dz/dt [m/s] of the hysteretic deflection."""
+        share = self.total(self.springs(z)) / self.level(v, N)
         spent = smooth.signed_power(share, self.delta_l, self.r_eps)
         return v - smooth.magnitude(v, self.v_eps) * spent
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         damping = self.sigma_1 * self.stretching(v, N, z)
-        return self.springs(z) + damping + self.sigma_2 * v
+        return self.total(self.springs(z)) + damping + self.sigma_2 * v
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rates of the element forces [N/s]."""
-        stretch = self.stretching(v, N, z)
-        return column(
-            *(
-                e.k * yielding(stretch, z[i] / (e.mu * N), self.n, self.v_eps, self.r_eps)
-                for i, e in enumerate(self.elements)
-            )
-        )
+        """Return the rates of the element forces [N/s]."""
+        return column(*stretched(self, self.stretching(v, N, z), N, z))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return one of the states with the sum g sign(v): all elements at the same load share."""
@@ -224,8 +202,7 @@ class Leuven(StribeckLevel, Elements):
         return column(*(e.mu / total * level for e in self.elements))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Element(Parametric):
     """Element: a spring of stiffness k that carries the share alpha of the friction."""
 
@@ -237,8 +214,7 @@ ELEMENTS = (Element(5e4, 0.25), Element(2.5e4, 0.25), Element(1.5e4, 0.25), Elem
 """Four elements, together 1e5 N/m, which slip one after the other."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class GMS(StribeckLevel, Elements):
     """Generalised Maxwell-slip (GMS) friction of n elements (2n states).
 
@@ -267,31 +243,21 @@ class GMS(StribeckLevel, Elements):
     sigma_2 = 0.5 N s/m and 3 700 with 2 N s/m, which ends its stick-slip.
     Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003; Al-Bender, Lampaert, Swevers, IEEE TAC
     50(11), 2005. The smooth form is constructed here; it is not that of Boegli et al.
+    Checked: jchristopherson/friction README; the paper of 2003; smooth form constructed.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
-        smoothness="C2 (switched as rho -> 0)",
-        confidence="two sources",
-        checked="jchristopherson/friction README; the paper of 2003; smooth form constructed",
-        source="Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005",
+        ("D", "S", "St", "V", "P", "M", "L", "B", "N"),
+        "C2 (switched as rho -> 0)",
+        "two sources",
         load="proportional in steady sliding",
     )
-    ordered = (("mu_d", "mu_s"),)
     kind = Element
 
     elements: tuple[Element, ...] = ELEMENTS
-    mu_s: Scalar = fields.MU_S(0.15)
-    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
-    v_s: Scalar = fields.V_S(1e-3)
-    delta: Scalar = fields.DELTA(2.0)
-    C: Scalar = param(
-        24.0, unit="N/s", role="time", doc="attraction to the Stribeck curve", lower=1e-12
-    )
+    C: Scalar = fields.TIME(24.0, unit="N/s", doc="attraction to the Stribeck curve")
     sigma_2: Scalar = fields.SIGMA_2(0.0)
-    v_eps: Scalar = param(
-        1e-15, unit="m/s", role="width", doc="smoothing velocity of sign(v)", lower=1e-15
-    )
+    v_eps: Scalar = fields.REST_EPS(1e-15, doc="smoothing velocity of sign(v)", lower=1e-15)
     rho: Scalar = fields.SHAPE(0.03, doc="share over which slip sets in", lower=1e-6, upper=0.5)
     form: str = option("smooth", choices=("smooth", "event"), doc="latched, or exact with modes")
 
@@ -304,7 +270,7 @@ class GMS(StribeckLevel, Elements):
         return (*super().states, *modes)
 
     def shares(self) -> list[Scalar]:
-        """Return the alpha_i, divided by their sum."""
+        """Return all alpha_i, divided by their sum."""
         total = self.total(e.alpha for e in self.elements)
         return [e.alpha / total for e in self.elements]
 
@@ -315,11 +281,11 @@ class GMS(StribeckLevel, Elements):
         return smooth.step5((r - 1) / self.rho + 1)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        return self.total((self.sigma_2 * v, *(z[i] for i in range(len(self.elements)))))
+        """Return the friction force [N]."""
+        return self.total((self.sigma_2 * v, *self.springs(z)))
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rates of the spring forces [N/s] and of the modes [1/s]."""
+        """Return the rates of the spring forces [N/s] and of the modes [1/s]."""
         count, g, direction = len(self.elements), self.level(v, N), self._direction(v)
         forces: list[Scalar] = []
         modes: list[Scalar] = []

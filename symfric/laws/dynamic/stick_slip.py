@@ -1,19 +1,16 @@
 """Laws with true stick up to a static level: exact, blended, by a reset integrator, in a plane."""
 
-from dataclasses import dataclass
 from math import inf
-from typing import final
 
 from symfric.foundation.numeric import Scalar, column, equals, exp
-from symfric.foundation.parameters import option, param
+from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Levels, Sticking, carried, stick_and_slip
+from symfric.laws.base.families import Levels, Sticking, carried
 from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import Held, deflection, yielding
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class ExactCoulomb(Sticking):
     """Set-valued Coulomb friction with a static level, by modes (one state).
 
@@ -31,15 +28,10 @@ class ExactCoulomb(Sticking):
     Between the switches the mode is constant. A run has a relative tolerance of 1e-7 or less,
     whatever the requested one: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
     Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
+    Checked: Modelica Standard Library; rleine/Keynote_Nonsmooth_Dynamics_ENOC2024.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="set-valued at v = 0, exact by modes",
-        confidence="two sources",
-        checked="Modelica Standard Library; rleine/Keynote_Nonsmooth_Dynamics_ENOC2024",
-        source="Coulomb 1785; Olsson et al., Eur. J. Control 4, 1998",
-    )
+    facts = Facts(("D", "S", "St", "V"), "set-valued at v = 0, exact by modes", "two sources")
     ordered = (("mu_d", "mu_s"),)
 
     mu_d: Scalar = fields.MU_D(0.1)
@@ -50,7 +42,7 @@ class ExactCoulomb(Sticking):
 
     @property
     def has_mode(self) -> bool:
-        """Always True: stick and slip are modes."""
+        """True: stick and slip are modes."""
         return True
 
     @property
@@ -66,25 +58,18 @@ class ExactCoulomb(Sticking):
         return mu * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         mu = self.mu_d
         if self.form == "stribeck":
             mu = mu + (self.mu_s - self.mu_d) * smooth.stribeck(v, self.v_s, 2.0, 0.0)
         return carried(z[0], F_e, mu * N * z[0] + self.sigma_2 * v)
-
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
-    ) -> tuple[Switch, ...]:
-        """Return the end of sliding, and break-away."""
-        return stick_and_slip(v, z[0], F_e, self.mu_s * N)
 
 
 ROOT_STEPS = 10
 """Newton steps that reach a root to rounding for every allowed sharpness."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class StickSlip(Levels):
     """Stick-slip friction with stiction deformation (one state).
 
@@ -102,15 +87,10 @@ class StickSlip(Levels):
     15/8 mu_s N / D_max, is stiff and undamped. An interpretation: the structure is published, the
     formulas of the blend and of D are not known here.
     Source: Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011 (abstract).
+    Checked: the structure is that of the abstract, the formulas are made here.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "P"),
-        smoothness="C2",
-        confidence="rebuilt",
-        checked="the structure is that of the abstract, the formulas are made here",
-        source="Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011",
-    )
+    facts = Facts(("D", "S", "St", "P"), "C2", "rebuilt")
     strictly_ordered = (("v_s", "v_d"),)
 
     v_s: Scalar = fields.VELOCITY(1e-3, doc="velocity of full slip")
@@ -130,25 +110,24 @@ class StickSlip(Levels):
         return smooth.step5(smooth.magnitude(v, self.v_eps) / self.v_s)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0, the plateau mu_s N within v_s."""
+        """Return the steady sliding force [N] at a speed >= 0, the plateau mu_s N within v_s."""
         fallen = smooth.step5((speed - self.v_s) / (self.v_d - self.v_s))
         return N * (self.mu_s - (self.mu_s - self.mu_d) * fallen)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         slip, speed = self._slipping(v), smooth.magnitude(v, self.v_eps)
         fallen = smooth.step5((speed - self.v_s) / (self.v_d - self.v_s))
         mu = self.mu_s - (self.mu_s - self.mu_d) * fallen
+        direction = smooth.sign(v, self.v_eps)
         if self.branch == "published":
-            direction = smooth.sign(v, self.v_eps) * slip
-        else:
-            direction = smooth.sign(v, self.v_eps)
+            direction = direction * slip
         u = smooth.clip(z[0] / self.D_max, -1.0, 1.0)
         stiction = self.mu_s * u * (15 - u * u * (10 - 3 * (u * u))) / 8  # 2 step((u + 1)/2) - 1
         return N * (slip * mu * direction + (1 - slip) * stiction)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the stiction deformation [m/s], shape (1, 1)."""
+        """Return the rate of the stiction deformation [m/s], shape (1, 1)."""
         slip, r = self._slipping(v), z[0] / self.D_max
         stretch = yielding(v, r, self.n, self.v_eps, self.r_eps)
         forgotten = smooth.magnitude(v, self.v_eps) * r
@@ -166,8 +145,7 @@ class StickSlip(Levels):
         return column(self.D_max * r * smooth.sign(v, self.v_eps))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class HaessigFriedland(Levels):
     """Reset-integrator friction (one state, with a mode in the event form).
 
@@ -186,22 +164,19 @@ class HaessigFriedland(Levels):
     `MaxwellSlip` with one element. While the bristle unloads F v < 0: it gives back what it stored,
     at most mu_s mu_d N^2 / (2 sigma_0). |v| is smooth over v_eps. Not valid for N = 0.
     Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
+    Checked: the smooth form is constructed.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "P", "N"),
-        smoothness="C2 (jumps as knee -> 0)",
-        confidence="unverified",
-        checked="the smooth form is constructed",
-        source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
+        ("D", "S", "P", "N"),
+        "C2 (jumps as knee -> 0)",
+        "unverified",
         load="proportional in steady sliding",
     )
 
     mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
     sigma_0: Scalar = fields.STIFFNESS(1e5, doc="bristle stiffness in slip")
-    sigma_1: Scalar = param(
-        190.0, unit="N s/m", role="damping", doc="bristle damping in stick", lower=0.0
-    )
+    sigma_1: Scalar = fields.SIGMA_1(190.0, doc="bristle damping in stick")
     n: Scalar = fields.SHARPNESS(50.0)
     knee: Scalar = fields.SHAPE(0.05, doc="share over which excess is lost", lower=1e-6, upper=1)
     v_eps: Scalar = fields.REST_EPS(1e-15)
@@ -219,21 +194,21 @@ class HaessigFriedland(Levels):
         return self.sigma_0 * z[0] / (self.mu_d * N)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the deflection [m/s] and, zero, of the mode."""
+        """Return the rate of the deflection [m/s] and, zero, of the mode."""
         if self.form == "event":
             return column((1 - z[1]) * v, 0.0 * v)
         return column(yielding(v, self._share(N, z), self.n, self.v_eps, self.r_eps))
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         return self.mu_d * N
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away, mu_s N."""
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the force [N] of break-away, mu_s N."""
         return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         if self.form == "event":
             excess = 1 - z[1]
         else:
@@ -273,8 +248,7 @@ CUBIC_STEPS = 40
 """Newton steps that reach a cubic root of 1e-15 of its start."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Bristle2D(Levels):
     """Bristle friction that slides where a disc ends (one state, in a plane a vector).
 
@@ -290,14 +264,13 @@ class Bristle2D(Levels):
     creep; one bristle and damper in parallel below g. sigma_1 -> 0 tends to Coulomb friction.
     Source: Kikuuwe, Takesue, Sano, Mochiyama, Fujimoto, IEEE T-RO 22(6), 2006 (elastoplastic
     form); the use for contact of Liang, Fillmore, Ma, J. Comput. Nonlinear Dynam. 7(4), 2012.
+    Checked: JuliaRobotics/RigidBodyDynamics.jl contact.jl (viscoelastic Coulomb friction).
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "P", "N"),
-        smoothness="C2 (C0 as kappa -> 0)",
-        confidence="one source",
-        checked="JuliaRobotics/RigidBodyDynamics.jl contact.jl (viscoelastic Coulomb friction)",
-        source="Kikuuwe et al., IEEE T-RO 22(6), 2006; Liang, Fillmore, Ma 2012",
+        ("D", "S", "St", "P", "N"),
+        "C2 (C0 as kappa -> 0)",
+        "one source",
         load="proportional in steady sliding",
     )
 
@@ -317,17 +290,17 @@ class Bristle2D(Levels):
         return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Steady sliding force [N] at a speed >= 0."""
+        """Return the steady sliding force [N] at a speed >= 0."""
         return self._level(speed, N)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         g = self._level(v, N)
         corner = 0.0 if equals(self.kappa, 0.0) else self.kappa * g
         return smooth.hold(self.sigma_0 * z[0] + self.sigma_1 * v, g, corner)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the deflection [m/s], shape (1, 1)."""
+        """Return the rate of the deflection [m/s], shape (1, 1)."""
         return column((self.force(v, N, z) - self.sigma_0 * z[0]) / self.sigma_1)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:

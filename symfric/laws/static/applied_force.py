@@ -1,21 +1,19 @@
 """Laws that use the applied force: true sticking without an internal state."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, pi
-from typing import final
 
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
-from symfric.foundation.parameters import option, param
+from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Levels, Sticking, carried, rests, stick_and_slip
+from symfric.laws.base.families import Levels, Sticking, carried, rests
 from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, State, StaticLaw, Switch, one_sided
 
 FORMS = ("smooth", "original")
 WITH_MODES = (*FORMS, "event")
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Karnopp(Sticking):
     """Karnopp friction: inside a band around rest the contact carries the applied force.
 
@@ -36,26 +34,18 @@ class Karnopp(Sticking):
     never below zero in the event form. Keep sigma_2 D_v < (mu_s - mu_d) N: else that form enters
     the band again as soon as it has left it.
     Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public codes.
+    Checked: fellipegm/valve_estimation and other public code.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "V"),
-        smoothness="C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
-        confidence="two sources",
-        checked="fellipegm/valve_estimation and other public code",
-        source="Karnopp 1985, as in public codes",
+        ("D", "S", "V"),
+        "C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
+        "two sources",
     )
     ordered = (("mu_d", "mu_s"),)
 
     mu_d: Scalar = fields.MU_D(0.1)
-    D_v: Scalar = param(
-        1e-3,
-        unit="m/s",
-        role="width",
-        width=1,
-        doc="half width of the band around rest",
-        lower=1e-12,
-    )
+    D_v: Scalar = fields.BAND(1e-3, doc="half width of the band around rest")
     sigma_2: Scalar = fields.SIGMA_2(0.0)
     F_eps: Scalar = fields.F_EPS(1e-3)
     form: str = option("smooth", choices=WITH_MODES, doc="window, hard switch, or exact with mode")
@@ -68,27 +58,21 @@ class Karnopp(Sticking):
     @property
     def states(self) -> tuple[State, ...]:
         """Mode, and 1 while the contact leaves the band."""
-        return (
-            (
-                *super().states,
-                State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True),
-            )
-            if self.has_mode
-            else ()
-        )
+        leaving = State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True)
+        return (*super().states, leaving) if self.has_mode else ()
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Return the rate of the mode [1/s], and zero."""
-        own = super().rate(v, N, z, F_e=F_e)
-        return column(own[0], 0.0 * v) if self.has_mode else own
+        rate = super().rate(v, N, z, F_e=F_e)
+        return column(rate[0], 0.0 * v) if self.has_mode else rate
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the direction of sliding; moving within the band, the contact is leaving it."""
-        own = super().steady_state(v, N)
+        """Return the direction of sliding; a contact that moves within the band is leaving it."""
+        mode = super().steady_state(v, N)
         if not self.has_mode:
-            return own
+            return mode
         inside = smooth.choose(smooth.magnitude(v, 0.0) < self.D_v, 1.0, 0.0)
-        return column(own[0], inside * smooth.magnitude(own[0], 0.0))
+        return column(mode[0], inside * smooth.magnitude(mode[0], 0.0))
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -96,11 +80,11 @@ class Karnopp(Sticking):
         return inf if self.has_mode else self.D_v
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         if self.has_mode:
             level = self.mu_d * N + self.sigma_2 * z[0] * v
             against = smooth.choose(z[1] > 0.5, self.mu_s * N, level)
@@ -115,25 +99,19 @@ class Karnopp(Sticking):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """Return the switches of a contact that sticks; the band ends sliding, and its edge
-        jumps the force.
-        """
-        if not self.has_mode:
+        """Return stick and slip, the stop at the edge of the band, and the way out of it."""
+        stuck = [
+            replace(s, reset={**s.reset, "leaving": smooth.magnitude(s.reset["mode"], 0.0)})
+            for s in super().switches(v, N, z, F_e=F_e)
+        ]
+        if not stuck:
             return ()
         edge = smooth.choose(rests(z[0]), -1.0, z[0] * v - self.D_v)
-        stuck = tuple(
-            replace(s, reset={**s.reset, "leaving": smooth.magnitude(s.reset["mode"], 0.0)})
-            for s in stick_and_slip(v, z[0], F_e, self.mu_s * N)
-        )
-        return (
-            *stuck,
-            Switch("stop", edge, -1, stuck[0].reset, halts=True),
-            Switch("leave", edge, 1, {"leaving": 0.0}),
-        )
+        stop = Switch("stop", edge, -1, stuck[0].reset, halts=True)
+        return *stuck, stop, Switch("leave", edge, 1, {"leaving": 0.0})
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Awrejcewicz(Levels, StaticLaw):
     """Awrejcewicz-Grzelczyk-Pyryev friction: four branches, continuous, in one expression.
 
@@ -149,19 +127,16 @@ class Awrejcewicz(Levels, StaticLaw):
     may drive: F v >= -0.204 mu_s N epsilon. A moving body comes to rest only asymptotically, as
     with `Karnopp`.
     Source: Awrejcewicz, Grzelczyk, Pyryev 2008 (not read; branches checked to join).
+    Checked: its four branches join.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
-        confidence="unverified",
-        checked="its four branches join",
-        source="Awrejcewicz, Grzelczyk, Pyryev 2008",
+        ("D", "S", "St"),
+        "C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
+        "unverified",
     )
 
-    epsilon: Scalar = param(
-        1e-3, unit="m/s", role="width", width=1, doc="half width of the window", lower=1e-12
-    )
+    epsilon: Scalar = fields.BAND(1e-3, doc="half width of the window")
     v_s: Scalar = fields.V_S(1e-2)
     F_eps: Scalar = fields.F_EPS(1e-3)
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic window")
@@ -172,11 +147,11 @@ class Awrejcewicz(Levels, StaticLaw):
         return (APPLIED_FORCE,)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return N * (self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 2.0))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         soft = self.form == "smooth"
         speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
         beyond = smooth.positive(speed - self.epsilon, 0.0) / self.v_s
@@ -186,8 +161,7 @@ class Awrejcewicz(Levels, StaticLaw):
         return (1 - A) * stick + A * slip * smooth.sign(v, 0.0)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class LeineSwitch(Sticking):
     """Switch model of Leine et al., and its smooth stand-in.
 
@@ -204,24 +178,15 @@ class LeineSwitch(Sticking):
     load and is 6 % short of the original at 10 v_eps, since atan is slow.
     Source: Leine et al., Nonlinear Dynam. 16, 1998 (not read); smooth form and slip law as in the
     author's public code.
+    Checked: rleine's stickslipsmooth.m (slip law, smooth form); switching unverified.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C∞ (original: jump at |v| = eta)",
-        confidence="one source",
-        checked="rleine's stickslipsmooth.m (slip law, smooth form); switching unverified",
-        source="Leine et al. 1998; the author's public code",
-    )
+    facts = Facts(("D", "S", "St"), "C∞ (original: jump at |v| = eta)", "one source")
 
     delta: Scalar = fields.STEEPNESS(3.0, doc="steepness of the fall", lower=0.0)
     v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
-    eta: Scalar = param(
-        1e-6, unit="m/s", role="width", width=1, doc="half width of the band of rest", lower=1e-15
-    )
-    c: Scalar = param(
-        10.0, unit="N s/m", role="damping", doc="pull to the middle, original form", lower=0.0
-    )
+    eta: Scalar = fields.BAND(1e-6, doc="half width of the band of rest", lower=1e-15)
+    c: Scalar = fields.SIGMA_1(10.0, doc="pull to the middle, original form")
     form: str = option("smooth", choices=WITH_MODES, doc="arctangent, switch, or exact with mode")
 
     @property
@@ -240,11 +205,11 @@ class LeineSwitch(Sticking):
         return {"smooth": self.v_eps, "original": self.eta, "event": inf}[self.form]
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_s * N / (1 + smooth.onward(self.delta * speed))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         static = self.mu_s * N
         if self.form == "smooth":
             falling = static / (1 + self.delta * smooth.magnitude(v, smooth.CORNER * self.v_eps))
@@ -256,17 +221,8 @@ class LeineSwitch(Sticking):
         stick = smooth.hold(F_e + self.c * v, static, 0.0)
         return smooth.choose(speed <= self.eta, stick, slip)
 
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
-    ) -> tuple[Switch, ...]:
-        """Return the end of sliding, and break-away."""
-        if not self.has_mode:
-            return ()
-        return stick_and_slip(v, z[0], F_e, self.mu_s * N)
 
-
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Wojewoda(Levels, StaticLaw):
     """Hysteretic friction of Wojewoda et al.: other branches for speeding up and slowing down.
 
@@ -279,24 +235,15 @@ class Wojewoda(Levels, StaticLaw):
     or the branch of deceleration turns forward. Given the acceleration of the body that it brakes,
     it closes an algebraic loop: pass a measured or filtered one.
     Source: after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008 (abstract only).
+    Checked: of the paper only the abstract was read.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "L"),
-        smoothness="C∞",
-        confidence="rebuilt",
-        checked="of the paper only the abstract was read",
-        source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
-    )
+    facts = Facts(("D", "S", "St", "L"), "C∞", "rebuilt")
 
-    a_1: Scalar = param(100.0, unit="1/s", role="shape", doc="decay of the hysteresis", lower=0.0)
-    a_2: Scalar = param(
-        0.1, unit="m/s^2", role="shape", doc="acceleration of half the decay", lower=1e-12
-    )
+    a_1: Scalar = fields.SHAPE(100.0, unit="1/s", doc="decay of the hysteresis", lower=0.0)
+    a_2: Scalar = fields.SHAPE(0.1, unit="m/s^2", doc="acceleration of half the decay", lower=1e-12)
     v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
-    a_eps: Scalar = param(
-        1e-2, unit="m/s^2", role="width", doc="smoothing acceleration", lower=1e-12
-    )
+    a_eps: Scalar = fields.WIDTH(1e-2, unit="m/s^2", doc="smoothing acceleration")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -316,12 +263,9 @@ class Wojewoda(Levels, StaticLaw):
         raise one_sided(self, "its branches change with the sign of v dv/dt")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:
-        """Friction force [N]."""
-        speed, change = (
-            smooth.magnitude(v, smooth.CORNER * self.v_eps),
-            smooth.magnitude(dv, self.a_eps),
-        )
-        h = exp(-self.a_1 * speed / (change + self.a_2))
+        """Return the friction force [N]."""
+        speed = smooth.magnitude(v, smooth.CORNER * self.v_eps)
+        h = exp(-self.a_1 * speed / (smooth.magnitude(dv, self.a_eps) + self.a_2))
         phase = smooth.sign(v * dv, self.v_eps * self.a_eps)
         mu = self.mu_d + (self.mu_s - self.mu_d) * h * phase
         return mu * N * smooth.sign(v, self.v_eps)

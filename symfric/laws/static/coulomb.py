@@ -1,17 +1,15 @@
 """Coulomb friction with a smooth sign, viscous friction, and a table of measured coefficients."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import inf, pi
-from typing import final
 
 import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, atan, equals, erf, sqrt, tanh
-from symfric.foundation.parameters import option, param
+from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
@@ -32,8 +30,7 @@ SHAPES: dict[str, Callable[[Scalar], Scalar]] = {
 """Approximations of sign(u): odd, increasing, -1 to 1."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Coulomb(StaticLaw):
     """Smooth Coulomb friction.
 
@@ -52,14 +49,13 @@ class Coulomb(StaticLaw):
     Slope at rest mu_d N / v_eps times that of the table.
     Source: Amontons 1699, Coulomb 1785; tanh as in Project Chrono and MORe, atan in Leine's codes,
     quadratic in the incremental potential contact and TAMSI methods.
+    Checked: projectchrono/chrono ChContactSMC (tanh); rleine's stickslipsmooth.m (arctangent).
     """
 
     facts = Facts(
-        phenomena=("D",),
-        smoothness="C∞ (shape saturation C0 at |v| = v_eps, quadratic C1 at 0 and |v| = v_eps)",
-        confidence="two sources",
-        checked="projectchrono/chrono ChContactSMC (tanh); rleine's stickslipsmooth.m (arctangent)",
-        source="Amontons 1699, Coulomb 1785; regularised by tanh",
+        ("D",),
+        "C∞ (shape saturation C0 at |v| = v_eps, quadratic C1 at 0 and |v| = v_eps)",
+        "two sources",
     )
 
     mu_d: Scalar = fields.MU_D(0.1)
@@ -67,18 +63,17 @@ class Coulomb(StaticLaw):
     shape: str = option("tanh", choices=tuple(SHAPES), doc="smooth sign")
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         if equals(self.v_eps, 0.0):
             return self.mu_d * N * smooth.sign(v, 0.0)
         return self.mu_d * N * SHAPES[self.shape](v / self.v_eps)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Viscous(StaticLaw):
     """Linear viscous friction, independent of the load.
 
@@ -88,7 +83,7 @@ class Viscous(StaticLaw):
     Source: textbook; Olsson et al., Eur. J. Control 4, 1998.
     """
 
-    facts = Facts(("V",), "C∞", "textbook", "textbook", load="independent")
+    facts = Facts(("V",), "C∞", "textbook", load="independent")
 
     sigma_2: Scalar = fields.SIGMA_2(0.4)
 
@@ -97,12 +92,11 @@ class Viscous(StaticLaw):
         return self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class PowerLawViscous(StaticLaw):
     """Power-law viscous friction, independent of the load.
 
@@ -113,15 +107,15 @@ class PowerLawViscous(StaticLaw):
     Source: textbook; the general exponent as in drive and fluid-film models.
     """
 
-    facts = Facts(("V",), "C∞", "textbook", "textbook", load="independent")
+    facts = Facts(("V",), "C∞", "textbook", load="independent")
 
     sigma_2: Scalar = fields.SIGMA_2(0.4, unit="N (s/m)^d")
     d: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = fields.REST_EPS(1e-4, doc="smoothing velocity", lower=1e-12)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]; none for the linear law."""
+        """Smoothing velocity [m/s]; inf for the linear law."""
         return inf if equals(self.d, 1.0) else self.v_eps
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -129,14 +123,13 @@ class PowerLawViscous(StaticLaw):
         return self.force(speed, N)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         if equals(self.d, 1.0):
             return self.sigma_2 * v
         return self.sigma_2 * smooth.signed_power(v, self.d, self.v_eps)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Table(StaticLaw):
     """Friction coefficients measured at some speeds, interpolated without overshoot.
 
@@ -149,15 +142,10 @@ class Table(StaticLaw):
     Creeps under load.
     Source: Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980, in the form of Fritsch and Butland
     1984 (harmonic mean of slopes); tables as in Modelica's SupportFriction.
+    Checked: Fritsch and Butland 1984, as in SciPy.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C1 at the speeds of the table",
-        confidence="two sources",
-        checked="Fritsch and Butland 1984, as in SciPy",
-        source="Fritsch and Carlson 1980; Fritsch and Butland 1984",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C1 at the speeds of the table", "two sources")
 
     speeds: tuple[float, ...]
     coefficients: tuple[float, ...]
@@ -178,11 +166,11 @@ class Table(StaticLaw):
             raise ValueError(f"Table: coefficients: expected numbers >= 0, got {self.coefficients}")
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return N * self.coefficient(speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         mu = self.coefficient(smooth.magnitude(v, 0.0))
         return N * mu * smooth.sign(v, self.v_eps)
 

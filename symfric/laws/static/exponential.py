@@ -1,16 +1,13 @@
 """Laws whose friction falls exponentially from the static to the dynamic level."""
 
-from dataclasses import dataclass
-from typing import final
-
 from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields
 from symfric.laws.base.families import Curve, Fall, Levels
 from symfric.laws.base.law import Facts
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Stribeck(Levels, Curve):
     """Stribeck friction with exponent delta (Bo-Pavelescu), smooth at rest.
 
@@ -23,15 +20,10 @@ class Stribeck(Levels, Curve):
     Limits: mu_s = mu_d gives `Coulomb` + `Viscous`; at |v| = v_s the bracket is
     mu_d + (mu_s - mu_d)/e for every delta. Creeps under load like `Coulomb`.
     Source: Stribeck 1902; Hess and Soom 1990; Bo and Pavelescu, Wear 82, 1982 (exponent).
+    Checked: jchristopherson/friction (delta = 2); the Lund thesis on laminator nips (delta).
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="two sources",
-        checked="jchristopherson/friction (delta = 2); the Lund thesis on laminator nips (delta)",
-        source="Stribeck 1902; Bo and Pavelescu 1982 (exponent)",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "two sources")
 
     v_s: Scalar = fields.V_S(1e-3)
     delta: Scalar = fields.DELTA(2.0)
@@ -39,13 +31,12 @@ class Stribeck(Levels, Curve):
     sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, self.delta)
         return mu * N * s + self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Tustin(Levels, Curve):
     """Tustin friction: Coulomb, viscous and an exponential fall.
 
@@ -55,28 +46,22 @@ class Tustin(Levels, Curve):
     Limits: `Stribeck` with delta = 1; mu_s = mu_d gives Coulomb + viscous, which some papers call
     Tustin's law. Keep v_eps << v_s, as there. Creeps under load.
     Source: Tustin, J. IEE 94, 1947, in the form of Armstrong-Helouvry 1994 (neither was read).
+    Checked: MassWithStopAndFriction of the Modelica Standard Library; not the name.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="one source",
-        checked="MassWithStopAndFriction of the Modelica Standard Library; not the name",
-        source="Tustin 1947, as cited in control literature",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "one source")
 
     v_s: Scalar = fields.V_S(1e-3)
     v_eps: Scalar = fields.V_EPS(1e-4)
     sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, 1.0)
         return mu * N * s + self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Benson(Levels, Curve):
     """Benson-Hallquist exponential friction of finite-element codes.
 
@@ -85,27 +70,21 @@ class Benson(Levels, Curve):
     sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
     Limits: `Tustin` with v_s = 1/d_c and without viscous friction. Creeps under load.
     Source: Benson and Hallquist 1990 (not read), as documented in LS-DYNA (FS, FD, DC) and COMSOL.
+    Checked: documentation of LS-DYNA and of COMSOL.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C∞",
-        confidence="two sources",
-        checked="documentation of LS-DYNA and of COMSOL",
-        source="Benson and Hallquist 1990, as in LS-DYNA and COMSOL",
-    )
+    facts = Facts(("D", "S", "St"), "C∞", "two sources")
 
     d_c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
     v_eps: Scalar = fields.V_EPS(1e-4)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, 1 / self.d_c, 1.0)
         return mu * N * s
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Berger(Levels, Curve):
     """Berger friction, an interpretation: the exponential fall of his review, with a smooth sign.
 
@@ -115,27 +94,21 @@ class Berger(Levels, Curve):
     single one; this is the choice here for papers that compare "Berger's model".
     Limits: `Tustin` with v_eps = v_t, without viscous friction. Creeps under load.
     Source: interpretation of Berger, Appl. Mech. Rev. 55(6), 2002 (not read).
+    Checked: an interpretation of a review that proposes no law.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C∞",
-        confidence="rebuilt",
-        checked="an interpretation of a review that proposes no law",
-        source="after Berger 2002",
-    )
+    facts = Facts(("D", "S", "St"), "C∞", "rebuilt")
 
     v_s: Scalar = fields.V_S(1e-3)
     v_t: Scalar = fields.V_T(1e-4)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, 1.0)
         return mu * N * s
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class DuanSingh(Levels, Curve):
     """Duan-Singh friction: conditioned dry friction with a static to kinetic ratio.
 
@@ -145,27 +118,21 @@ class DuanSingh(Levels, Curve):
     Limits: mu_s = mu_d gives mu_d N tanh(sigma v); F -> mu_d N; `Andersson` with p = 1, k_t = sigma
     and v_s = 1/c. Creeps under load.
     Source: Duan and Singh 2006 (not read).
+    Checked: the expression is that of Andersson with p = 1.
     """
 
-    facts = Facts(
-        phenomena=("D", "S"),
-        smoothness="C∞",
-        confidence="unverified",
-        checked="the expression is that of Andersson with p = 1",
-        source="Duan and Singh 2006",
-    )
+    facts = Facts(("D", "S"), "C∞", "unverified")
 
     c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
     sigma: Scalar = fields.STEEPNESS(1e4, width=-1, doc="conditioning factor")
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, 1 / self.c, 1.0)
         return mu * N * s
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Andersson(Levels, Curve):
     """Andersson-Soderberg-Bjorklund friction.
 
@@ -175,15 +142,10 @@ class Andersson(Levels, Curve):
     Limits: `Stribeck` with v_eps = 1/k_t, and its original form as k_t -> inf. The peak is 0.968
     mu_s N at k_t v_s = 10, p = 2. Creeps under load.
     Source: Andersson, Soderberg, Bjorklund, Tribol. Int. 40, 2007 (not read), as in public code.
+    Checked: public MATLAB function Friction_A.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="one source",
-        checked="public MATLAB function Friction_A",
-        source="Andersson, Soderberg, Bjorklund 2007, as in public code",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "one source")
 
     v_s: Scalar = fields.V_S(1e-3)
     p: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
@@ -191,13 +153,12 @@ class Andersson(Levels, Curve):
     sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, self.p)
         return mu * N * s + self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class SteadyStateLuGre(Curve):
     """Steady-state LuGre friction with exponent delta, in newton.
 
@@ -210,16 +171,10 @@ class SteadyStateLuGre(Curve):
     Limits: `LuGre` in steady sliding; `Stribeck` with N mu = F.
     Source: A Friction Model for Laminator Nips, MSc thesis, Lund 2015, equation 4.1, tables 5.1
     and 5.2.
+    Checked: the thesis, equation 4.1; auralius/LuGre lugre.m (delta = 2).
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="two sources",
-        checked="the thesis, equation 4.1; auralius/LuGre lugre.m (delta = 2)",
-        source="A Friction Model for Laminator Nips, MSc thesis, Lund 2015; LuGre",
-        load="independent",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "two sources", load="independent")
     ordered = (("F_C", "F_S"),)
 
     F_S: Scalar = fields.LEVEL(4.4861, doc="static level")
@@ -230,7 +185,7 @@ class SteadyStateLuGre(Curve):
     v_eps: Scalar = fields.V_EPS(1e-5)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         level = self.F_C + (self.F_S - self.F_C) * fall(v, self.v_s, self.delta)
         return level * s + self.sigma_2 * v
 

@@ -1,8 +1,6 @@
 """Friction of special machines: robot joints, ropes, a quarter-car rig."""
 
-from dataclasses import dataclass
-from math import pi
-from typing import final
+from math import inf, pi
 
 from symfric.foundation.numeric import (
     Scalar,
@@ -17,14 +15,13 @@ from symfric.foundation.numeric import (
     tan,
     tanh,
 )
-from symfric.foundation.parameters import option, param
+from symfric.foundation.parameters import option, param, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import Curve, Fall
 from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Bittencourt(Curve):
     """Friction torque of a robot joint under load N at temperature T, after Bittencourt.
 
@@ -40,54 +37,28 @@ class Bittencourt(Curve):
     Limits: at fixed N and T a `Stribeck` law with two falls; not valid outside the temperatures of
     its identification. Creeps under load.
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (abstract only).
+    Checked: formula and defaults.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="unverified",
-        checked="formula and defaults",
-        source="Bittencourt and Gunnarsson 2012",
-        load="affine",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "unverified", load="affine")
 
-    T: Scalar = param(
-        30.0, unit="degC", role="temperature", doc="temperature", lower=-60.0, upper=200.0
-    )
+    T: Scalar = fields.TEMPERATURE(30.0, unit="degC", doc="temperature", lower=-60.0, upper=200.0)
     F_c0: Scalar = fields.TORQUE(0.031, doc="dynamic level without load")
     F_cl: Scalar = fields.COEFFICIENT(0.023, doc="dynamic level by load")
     F_sl: Scalar = fields.COEFFICIENT(0.126, doc="static excess by load")
-    F_s0: Scalar = param(-0.025, unit="N m", role="level", doc="static excess at 0 degC")
+    F_s0: Scalar = fields.TORQUE(-0.025, doc="static excess at 0 degC", lower=-inf)
     F_sT: Scalar = param(1.6e-3, unit="N m/K", role="level", doc="static excess by temperature")
-    v_sl: Scalar = param(
-        9.2,
-        unit="rad/s",
-        role="velocity scale",
-        doc="Stribeck velocity of the load part",
-        lower=1e-12,
+    v_sl: Scalar = fields.VELOCITY(9.2, unit="rad/s", doc="Stribeck velocity of the load part")
+    v_s0: Scalar = fields.V_S(-25.0, unit="rad/s", doc="Stribeck velocity at 0 degC", lower=-inf)
+    v_sT: Scalar = fields.V_S(
+        1.0, unit="rad/(s K)", doc="Stribeck velocity by temperature", lower=-inf
     )
-    v_s0: Scalar = param(
-        -25.0, unit="rad/s", role="velocity scale", doc="Stribeck velocity at 0 degC"
-    )
-    v_sT: Scalar = param(
-        1.0, unit="rad/(s K)", role="velocity scale", doc="Stribeck velocity by temperature"
-    )
-    F_v0: Scalar = param(
-        1.3e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, hot", lower=0.0
-    )
-    F_vT: Scalar = param(
-        1.3e-3,
-        unit="N m s/rad",
-        role="viscous",
-        doc="viscous coefficient, rise to 0 degC",
-        lower=0.0,
-    )
-    T_v: Scalar = param(
-        20.7, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
-    )
+    F_v0: Scalar = fields.DRAG(1.3e-3, doc="viscous coefficient, hot")
+    F_vT: Scalar = fields.DRAG(1.3e-3, doc="viscous coefficient, rise to 0 degC")
+    T_v: Scalar = fields.TEMPERATURE(20.7, doc="temperature scale of the viscous part", lower=1e-12)
     delta: Scalar = fields.DELTA(1.3)
     v_eps: Scalar = fields.V_EPS(0.1, unit="rad/s", lower=1e-12)
-    F_eps: Scalar = param(1e-4, unit="N m", role="width", doc="smoothing of the maximum", lower=0.0)
+    F_eps: Scalar = fields.WIDTH(1e-4, unit="N m", doc="smoothing of the maximum", lower=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -99,17 +70,15 @@ class Bittencourt(Curve):
             )
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         v_s = self.v_s0 + self.v_sT * self.T
         loaded = self.F_sl * N * fall(v, self.v_sl, self.delta)
         static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
-        level = self.F_c0 + self.F_cl * N + loaded
-        level += static * fall(v, v_s, self.delta)
+        level = self.F_c0 + self.F_cl * N + loaded + static * fall(v, v_s, self.delta)
         return level * s + (self.F_v0 + self.F_vT * exp(-self.T / self.T_v)) * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class BAM(StaticLaw):
     """Servo friction of the BAM family, models M1 to M6, torques in N m.
 
@@ -126,16 +95,10 @@ class BAM(StaticLaw):
     Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; BAM
     itself limits the torque that stops the motor within a step.
     Source: Duclusaud et al. 2025, as in their public code.
+    Checked: Rhoban/bam.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="one source",
-        checked="Rhoban/bam",
-        source="Duclusaud et al. 2025, public code",
-        load="independent",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "one source", load="independent")
 
     K_b: Scalar = fields.TORQUE(0.05, doc="dynamic level without load")
     K_s: Scalar = fields.TORQUE(0.05, doc="static excess without load")
@@ -143,17 +106,13 @@ class BAM(StaticLaw):
     K_m: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by motor torque")
     K_es: Scalar = fields.COEFFICIENT(0.05, doc="static excess by external torque")
     K_ms: Scalar = fields.COEFFICIENT(0.05, doc="static excess by motor torque")
-    Q_e: Scalar = param(
-        0.0, unit="1/(N m)", role="level", doc="excess by external torque squared", lower=0.0
-    )
-    Q_m: Scalar = param(
-        0.0, unit="1/(N m)", role="level", doc="excess by motor torque squared", lower=0.0
-    )
+    Q_e: Scalar = fields.LEVEL(0.0, unit="1/(N m)", doc="excess by external torque squared")
+    Q_m: Scalar = fields.LEVEL(0.0, unit="1/(N m)", doc="excess by motor torque squared")
     v_s: Scalar = fields.V_S(0.2, unit="rad/s")
     alpha: Scalar = fields.DELTA(1.35)
-    K_v: Scalar = fields.SIGMA_2(0.1, unit="N m s/rad")
+    K_v: Scalar = fields.DRAG(0.1)
     v_eps: Scalar = fields.V_EPS(0.01, unit="rad/s", lower=1e-12)
-    tau_eps: Scalar = param(1e-3, unit="N m", role="width", doc="smoothing torque", lower=1e-12)
+    tau_eps: Scalar = fields.WIDTH(1e-3, unit="N m", doc="smoothing torque")
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -169,47 +128,31 @@ class BAM(StaticLaw):
     def force(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
     ) -> Scalar:
-        """Friction torque [N m]."""
+        """Return the friction torque [N m]."""
         falling = smooth.stribeck(v, self.v_s, self.alpha, smooth.CORNER * self.v_eps)
         return self._level(falling, tau_m, tau_e) * smooth.sign(v, self.v_eps) + self.K_v * v
 
     def outside(
         self, speed: Scalar, N: Scalar, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
     ) -> Scalar:
-        """Sliding torque [N m] at a speed >= 0 as the widths vanish."""
+        """Return the sliding torque [N m] at a speed >= 0 for zero widths."""
         falling = smooth.fall(speed, self.v_s, self.alpha)
         return self._level(falling, tau_m, tau_e) + self.K_v * speed
 
-    def sliding(
-        self, v: Scalar, N: Scalar, side: int, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
-    ) -> Scalar:
-        """Sliding torque [N m] on one side of v = 0."""
-        return side * self.outside(side * v, N, tau_m=tau_m, tau_e=tau_e)
-
-    def static_level(
-        self, N: Scalar, side: int = 1, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
-    ) -> Scalar:
-        """The torque [N m] of break-away."""
-        return self.outside(0.0, N, tau_m=tau_m, tau_e=tau_e)
-
     def _level(self, falling: Scalar, tau_m: Scalar, tau_e: Scalar) -> Scalar:
+        """Return K [N m] by the Stribeck weight `falling` and the torques."""
         dynamic = smooth.magnitude(self.K_e * tau_e - self.K_m * tau_m, self.tau_eps)
         static = smooth.magnitude(self.K_es * tau_e - self.K_ms * tau_m, self.tau_eps)
         if not (equals(self.Q_e, 0.0) and equals(self.Q_m, 0.0)):
-            static += self._quadratic(tau_m, tau_e)
+            width = self.tau_eps * self.tau_eps
+            opposed = (1 - tanh(tau_m * tau_e / width)) / 2
+            drives = (1 + tanh((tau_m * tau_m - tau_e * tau_e) / width)) / 2
+            driven = (1 - drives) * self.Q_m * tau_m * tau_m
+            static += opposed * (drives * self.Q_e * tau_e * tau_e + driven)
         return self.K_b + dynamic + falling * (self.K_s + static)
 
-    def _quadratic(self, tau_m: Scalar, tau_e: Scalar) -> Scalar:
-        width = self.tau_eps * self.tau_eps
-        opposed = (1 - tanh(tau_m * tau_e / width)) / 2
-        drives = (1 + tanh((tau_m * tau_m - tau_e * tau_e) / width)) / 2
-        return opposed * (
-            drives * self.Q_e * tau_e * tau_e + (1 - drives) * self.Q_m * tau_m * tau_m
-        )
 
-
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Capstan(StaticLaw):
     """Capstan (belt) friction of Euler and Eytelwein.
 
@@ -222,29 +165,27 @@ class Capstan(StaticLaw):
     Source: Euler 1769, Eytelwein 1808; textbook.
     """
 
-    facts = Facts(("D",), "C∞", "textbook", "Euler 1769, Eytelwein 1808", odd=False)
+    facts = Facts(("D",), "C∞", "textbook", odd=False)
 
     mu_d: Scalar = fields.MU_D(0.1)
-    beta: Scalar = param(
-        3.141592653589793, unit="rad", role="geometry", doc="wrap angle", lower=0.0
-    )
+    beta: Scalar = fields.ANGLE(3.141592653589793, doc="wrap angle", lower=0.0)
     v_eps: Scalar = fields.V_EPS(1e-3)
 
-    def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
-        """Sliding force [N] to one side as the widths vanish."""
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Return the sliding force [N] to one side for zero widths."""
         return N * expm1(self.mu_d * self.beta * side)
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The force [N] of break-away: larger towards the tension T_1."""
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the force [N] of break-away: larger towards the tension T_1."""
         return side * self.sliding(0.0, N, side)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         return N * expm1(self.mu_d * self.beta * smooth.sign(v, self.v_eps))
 
 
 def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:
-    """Change d_theta of the strut's angle [rad], positive for a shortened spring.
+    """Return the change d_theta of the strut's angle [rad], positive for a shortened spring.
 
         sin d_theta = x_rel cos(theta) / (L_d - x_rel sin(theta))
 
@@ -254,8 +195,7 @@ def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:
     return asin(x_rel * cos(theta) / (L_d - x_rel * sin(theta)))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class QuarterCarGeneral(StaticLaw):
     """Quarter-car friction with the load of the linkage, in newton.
 
@@ -276,35 +216,28 @@ class QuarterCarGeneral(StaticLaw):
     F_brk v_eps (as printed at any speed); mu = 0 leaves the simple law beyond v_eps;
     x_rel < L_d / (2 sin(theta)).
     Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
+    Checked: the paper, corrected as said.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
-        confidence="one source",
-        checked="the paper, corrected as said",
-        source="Al-Zughaibi, quarter-car friction, corrected",
+        ("D", "S", "St", "V"),
+        "C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
+        "one source",
         odd=False,
         load="independent",
     )
 
     k_s: Scalar = fields.STIFFNESS(28900.0, doc="spring stiffness", lower=0.0)
-    b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="damper coefficient", lower=0.0)
-    theta: Scalar = param(
-        pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
-    )
-    L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
+    b_d: Scalar = fields.SIGMA_1(260.0, doc="damper coefficient")
+    theta: Scalar = fields.ANGLE(pi / 4, doc="angle of the strut", lower=0.01, upper=1.56)
+    L_d: Scalar = fields.ANGLE(0.4, unit="m", doc="length of the strut", lower=1e-12)
     F_brk: Scalar = fields.LEVEL(193.8, doc="break-away force")
     C_e: Scalar = fields.LEVEL(180.0, doc="static excess at rest")
     e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
     mu: Scalar = fields.COEFFICIENT(0.05, doc="friction coefficient of the guide")
     sigma_v: Scalar = fields.SIGMA_2(1500.0)
-    v_eps: Scalar = param(
-        1e-3, unit="m/s", role="width", width=1, doc="half width of the stick window", lower=1e-12
-    )
-    F_eps: Scalar = param(
-        1.0, unit="N", role="width", doc="rounding of the break-away and of |f_sd|", lower=1e-12
-    )
+    v_eps: Scalar = fields.BAND(1e-3, doc="half width of the stick window")
+    F_eps: Scalar = fields.F_EPS(1.0, doc="rounding of the break-away and of |f_sd|")
     form: str = option("smooth", choices=("smooth", "as_printed"), doc="corrected or as printed")
 
     @property
@@ -318,31 +251,21 @@ class QuarterCarGeneral(StaticLaw):
     def outside(
         self, speed: Scalar, N: Scalar, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
     ) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish; not of the form as printed."""
-        self._refuse_as_printed()
+        """Return the sliding force [N] at a speed >= 0 for zero widths; refuses "as_printed"."""
+        if self.form == "as_printed":
+            raise one_sided(self, "as printed, it holds any force at rest and may drive the body")
         f_sd = self.k_s * x_rel + self.b_d * v_rel
         load = sqrt(f_sd * f_sd + self.F_eps * self.F_eps)
         dry = self.C_e * smooth.fall(speed, self.e_1, 1.0)
         return dry + self._leverage(x_rel) * load + self.sigma_v * speed
 
-    def sliding(
-        self, v: Scalar, N: Scalar, side: int, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
-    ) -> Scalar:
-        """Sliding force [N] on one side of v = 0."""
-        return side * self.outside(side * v, N, x_rel=x_rel, v_rel=v_rel)
-
-    def static_level(
-        self, N: Scalar, side: int = 1, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
-    ) -> Scalar:
-        """The force [N] of break-away."""
-        self._refuse_as_printed()
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the force [N] of break-away; refuses "as_printed"."""
+        self.outside(0.0, N)
         return self.F_brk
 
-    def _refuse_as_printed(self) -> None:
-        if self.form == "as_printed":
-            raise one_sided(self, "as printed, it holds any force at rest and may drive the body")
-
     def _leverage(self, x_rel: Scalar) -> Scalar:
+        """Return the ratio of Coulomb friction and |f_sd|."""
         if equals(self.mu, 0.0):
             return 0.0
         return self.mu / tan(self.theta - tilt(x_rel, self.theta, self.L_d))
@@ -350,7 +273,7 @@ class QuarterCarGeneral(StaticLaw):
     def force(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
     ) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         f_sd = self.k_s * x_rel + self.b_d * v_rel
         leverage = self._leverage(x_rel)
         speed = smooth.magnitude(v, 0.0)
@@ -364,8 +287,7 @@ class QuarterCarGeneral(StaticLaw):
         return (1 - w) * smooth.hold(f_sd, self.F_brk, self.F_eps) + w * slip
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class QuarterCarSimple(Curve):
     """Quarter-car friction without the Coulomb term, in newton.
 
@@ -378,16 +300,10 @@ class QuarterCarSimple(Curve):
     Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
     mu = 0 holds at rest.
     Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.
+    Checked: the paper, corrected as said.
     """
 
-    facts = Facts(
-        phenomena=("S", "St", "V"),
-        smoothness="C∞",
-        confidence="one source",
-        checked="the paper, corrected as said",
-        source="Al-Zughaibi, quarter-car friction, corrected",
-        load="independent",
-    )
+    facts = Facts(("S", "St", "V"), "C∞", "one source", load="independent")
 
     C_e: Scalar = fields.LEVEL(180.0, doc="static level")
     e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
@@ -395,5 +311,5 @@ class QuarterCarSimple(Curve):
     v_eps: Scalar = fields.V_EPS(1e-3)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         return self.C_e * fall(v, self.e_1, 1.0) * s + self.sigma_v * v

@@ -1,24 +1,22 @@
 """Laws of pieces, as multibody codes compose them: ramps, steps and a fall."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from math import exp as exp_of_float
-from typing import final
 
 from symfric.foundation.numeric import Scalar, exp, tanh
-from symfric.foundation.parameters import option
+from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import Levels, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 FORMS = ("smooth", "original")
 RISE = 1 - exp_of_float(-3.0)
-"""What the rise 1 - exp(-3 |v|/v_r) has reached at v_r."""
+"""Value of the rise 1 - exp(-3 |v|/v_r) at v_r."""
 
 
-@dataclass(frozen=True, eq=False)
+@parametric
 class Rise(StaticLaw):
-    """A law that rises to mu_d N within the velocity v_r, in its smooth form as tanh(3 v / v_r)."""
+    """Law that rises to mu_d N within the velocity v_r, in its smooth form as tanh(3 v / v_r)."""
 
     mu_d: Scalar = fields.MU_D(0.1)
     v_r: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the transition")
@@ -26,31 +24,30 @@ class Rise(StaticLaw):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The velocity v_r / 3 [m/s]."""
+        """Third of the transition velocity [m/s]."""
         return self.v_r / 3
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         if self.form == "smooth":
             return self.mu_d * N * tanh(3 * (v / self.v_r))
         return self.mu_d * N * self.original(v)
 
     @abstractmethod
     def original(self, v: Scalar) -> Scalar:
-        """The original form of the force over mu_d N."""
-
-    @staticmethod
-    def rise(u: Scalar) -> Scalar:
-        """(1 - exp(-3 |u|)) sign(u), with its slope 3 at zero."""
-        return 3 * u * smooth.phi1(-3 * smooth.magnitude(u, 0.0))
+        """Return the original form of the force over mu_d N."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
+def rise(u: Scalar) -> Scalar:
+    """Return (1 - exp(-3 |u|)) sign(u), with its slope 3 at zero."""
+    return 3 * u * smooth.phi1(-3 * smooth.magnitude(u, 0.0))
+
+
+@parametric
 class Threlfall(Rise):
     """Threlfall friction.
 
@@ -62,34 +59,27 @@ class Threlfall(Rise):
     Limits: the original never reaches mu_d N, being 5 % short for ever, and jumps by
     -2.1e-4 mu_d N at v_r; the smooth form tends to mu_d N. Creeps under load.
     Source: Threlfall, Mech. Mach. Theory 13, 1978 (not read), as in public multibody code.
+    Checked: public Python code of a multibody simulation.
     """
 
-    facts = Facts(
-        phenomena=("D",),
-        smoothness="C∞ (original: jump at |v| = v_r, C1 at 0)",
-        confidence="one source",
-        checked="public Python code of a multibody simulation",
-        source="Threlfall 1978, as in public multibody code",
-    )
+    facts = Facts(("D",), "C∞ (original: jump at |v| = v_r, C1 at 0)", "one source")
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
-        reached = 1.0 if self.form == "smooth" else 0.95
-        return self.mu_d * N * reached
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
+        return self.mu_d * N * (1.0 if self.form == "smooth" else 0.95)
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The largest force [N]: the original drops by 2e-4 mu_d N behind it."""
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the largest force [N]; the original drops by 2e-4 mu_d N behind it."""
         return self.mu_d * N * (1.0 if self.form == "smooth" else RISE)
 
     def original(self, v: Scalar) -> Scalar:
-        """The original form of the force over mu_d N."""
+        """Return the original form of the force over mu_d N."""
         u = v / self.v_r
         within = smooth.magnitude(u, 0.0) <= 1
-        return smooth.choose(within, self.rise(u), 0.95 * smooth.sign(v, 0.0))
+        return smooth.choose(within, rise(u), 0.95 * smooth.sign(v, 0.0))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class ModifiedThrelfall(Rise):
     """Threlfall friction modified by Marques et al., so that it reaches the dynamic level.
 
@@ -101,23 +91,17 @@ class ModifiedThrelfall(Rise):
     `Threlfall`. The coefficient is an interpretation: with it the law is continuous; with 0.95
     instead of 1 - exp(-3) it would overshoot by 2.2e-4. Creeps under load.
     Source: Marques et al., Nonlinear Dynam. 86, 2016 (not read).
+    Checked: the coefficient is an interpretation.
     """
 
-    facts = Facts(
-        phenomena=("D",),
-        smoothness="C∞ (original: C0 at |v| = v_r, C1 at 0)",
-        confidence="unverified",
-        checked="the coefficient is an interpretation",
-        source="Marques et al. 2016",
-    )
+    facts = Facts(("D",), "C∞ (original: C0 at |v| = v_r, C1 at 0)", "unverified")
 
     def original(self, v: Scalar) -> Scalar:
-        """The original form of the force over mu_d N."""
-        return self.rise(smooth.clip(v / self.v_r, -1.0, 1.0)) / RISE
+        """Return the original form of the force over mu_d N."""
+        return rise(smooth.clip(v / self.v_r, -1.0, 1.0)) / RISE
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class BengisuAkay(Levels, StaticLaw):
     """Bengisu-Akay friction: a parabola up to the static level, then a fall.
 
@@ -128,14 +112,11 @@ class BengisuAkay(Levels, StaticLaw):
     Limits: the peak F(v_0) = mu_s N is exact; F -> mu_d N. The slope of the original jumps at v_0
     from 0 to -xi (mu_s - mu_d) N, that of the smooth form is 0 on both sides. Creeps under load.
     Source: Bengisu and Akay, J. Sound Vib. 171, 1994 (not read).
+    Checked: parabola and fall join at the static level.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C1 at 0 and |v| = v_0 (original: C0 at |v| = v_0)",
-        confidence="unverified",
-        checked="parabola and fall join at the static level",
-        source="Bengisu and Akay 1994",
+        ("D", "S", "St"), "C1 at 0 and |v| = v_0 (original: C0 at |v| = v_0)", "unverified"
     )
 
     v_0: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
@@ -143,13 +124,13 @@ class BengisuAkay(Levels, StaticLaw):
     form: str = option("smooth", choices=FORMS, doc="fall behind the peak")
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         whole = 2.0 if self.form == "smooth" else 1.0
         mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(self.xi * speed, 1.0, whole)
         return mu * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u = smooth.clip(v / self.v_0, -1.0, 1.0)
         beyond = self.xi * smooth.positive(smooth.magnitude(v, 0.0) - self.v_0, 0.0)
         fall = exp(-beyond * beyond) if self.form == "smooth" else exp(-beyond)
@@ -157,8 +138,7 @@ class BengisuAkay(Levels, StaticLaw):
         return mu * N * (u * (2 - smooth.magnitude(u, 0.0)))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class VelocityBased(TwoLevels):
     """Velocity-based friction of MSC ADAMS: a step up to the static level, a step down.
 
@@ -169,15 +149,10 @@ class VelocityBased(TwoLevels):
     Limits: F(v_s) = mu_s N and F = mu_d N from v_d on, both exactly. Slope at rest 1.5 mu_s N / v_s
     original, 1.875 mu_s N / v_s smooth. ADAMS joints take v_d = 1.5 v_s. Creeps under load.
     Source: documentation of MSC ADAMS, contact friction and STEP, two pages.
+    Checked: two pages of the documentation of MSC ADAMS.
     """
 
-    facts = Facts(
-        phenomena=("D", "S"),
-        smoothness="C2 at |v| = v_s and v_d (original: C1)",
-        confidence="two sources",
-        checked="two pages of the documentation of MSC ADAMS",
-        source="documentation of MSC ADAMS",
-    )
+    facts = Facts(("D", "S"), "C2 at |v| = v_s and v_d (original: C1)", "two sources")
     strictly_ordered = (("v_s", "v_d"),)
 
     v_s: Scalar = fields.VELOCITY(1e-3, width=1, doc="stiction transition velocity")
@@ -185,7 +160,7 @@ class VelocityBased(TwoLevels):
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u = smooth.clip(v / self.v_s, -1.0, 1.0)
         beyond = (smooth.magnitude(v, 0.0) - self.v_s) / (self.v_d - self.v_s)
         if self.form == "smooth":
@@ -195,8 +170,7 @@ class VelocityBased(TwoLevels):
         return rise * N * (self.mu_s - (self.mu_s - self.mu_d) * fall)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Ambrosio(StaticLaw):
     """Ambrosio friction: nothing below v_0, a ramp to the dynamic level at v_1.
 
@@ -207,15 +181,10 @@ class Ambrosio(StaticLaw):
     there and the linearisation at rest is singular; v_0 = 0 in the original is `Coulomb` with the
     shape saturation.
     Source: Ambrosio 2003 (not read), as in public multibody code.
+    Checked: public Python code of a multibody simulation.
     """
 
-    facts = Facts(
-        phenomena=("D",),
-        smoothness="C2 at |v| = v_0 and v_1 (original: C0)",
-        confidence="one source",
-        checked="public Python code of a multibody simulation",
-        source="Ambrosio 2003, as in public multibody code",
-    )
+    facts = Facts(("D",), "C2 at |v| = v_0 and v_1 (original: C0)", "one source")
     strictly_ordered = (("v_0", "v_1"),)
 
     mu_d: Scalar = fields.MU_D(0.1)
@@ -225,23 +194,22 @@ class Ambrosio(StaticLaw):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The width of the ramp [m/s]."""
+        """Width of the ramp [m/s]."""
         return self.v_1 - self.v_0
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         forward, backward = ((w - self.v_0) / (self.v_1 - self.v_0) for w in (v, -v))
         if self.form == "smooth":
             return self.mu_d * N * (smooth.step5(forward) - smooth.step5(backward))
         return self.mu_d * N * (smooth.clip(forward, 0.0, 1.0) - smooth.clip(backward, 0.0, 1.0))
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Hollars(TwoLevels):
     """Hollars friction, of Simbody.
 
@@ -252,14 +220,11 @@ class Hollars(TwoLevels):
     Limits: F(v_t) = mu_s N in the original, (1 - 0.19 u_eps) mu_s N here; the excess over mu_d N
     falls like 2/u^2. Slope at rest N (2 mu_s - mu_d) / v_t. Creeps under load.
     Source: Simbody, three public headers.
+    Checked: simbody/simbody HuntCrossleyForce.h.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C2 at |v| = v_t (1 -+ u_eps) (u_eps = 0: C0 at v_t)",
-        confidence="one source",
-        checked="simbody/simbody HuntCrossleyForce.h",
-        source="Simbody, HuntCrossleyForce",
+        ("D", "S", "St", "V"), "C2 at |v| = v_t (1 -+ u_eps) (u_eps = 0: C0 at v_t)", "one source"
     )
 
     v_t: Scalar = fields.V_T(1e-2)
@@ -267,18 +232,17 @@ class Hollars(TwoLevels):
     u_eps: Scalar = fields.U_EPS(0.2)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return N * (self.mu_d + self.mu_v * speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u = v / self.v_t
         mu = self.mu_d + 2 * (self.mu_s - self.mu_d) / (1 + u * u)
         return N * (smooth.hold(u, 1.0, self.u_eps) * mu + self.mu_v * v)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Exudyn(TwoLevels):
     """Regularised friction of Exudyn: a ramp up to the static level, an exponential fall.
 
@@ -290,14 +254,13 @@ class Exudyn(TwoLevels):
     Limits: F(v_reg) = mu_s N in the original, some 0.19 u_eps less here; F -> mu_d N without mu_v;
     v_reg -> 0 is `Benson`. Slope at rest mu_s N / v_reg. Creeps under load.
     Source: Exudyn, public source; its text writes the ramp without the division by v_reg.
+    Checked: jgerstmayr/EXUDYN, source of its regularised friction.
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C2 at |v| = v_reg (1 -+ u_eps) (u_eps = 0: C0 at v_reg)",
-        confidence="one source",
-        checked="jgerstmayr/EXUDYN, source of its regularised friction",
-        source="Exudyn, public source",
+        ("D", "S", "St", "V"),
+        "C2 at |v| = v_reg (1 -+ u_eps) (u_eps = 0: C0 at v_reg)",
+        "one source",
     )
 
     v_reg: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the ramp's end")
@@ -306,12 +269,12 @@ class Exudyn(TwoLevels):
     u_eps: Scalar = fields.U_EPS(0.2)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_exp, 1.0)
         return N * (mu + self.mu_v * speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u = v / self.v_reg
         ramp = smooth.hold(u, 1.0, self.u_eps)
         beyond = self.v_reg * (u - ramp)
@@ -320,8 +283,7 @@ class Exudyn(TwoLevels):
         return N * (ramp * mu + self.mu_v * beyond)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Step5(TwoLevels):
     """Quintic-step Stribeck friction, of Simbody and of the early Drake.
 
@@ -332,25 +294,20 @@ class Step5(TwoLevels):
     nothing resists slow creep and the linearisation at rest is singular. The viscous coefficient of
     Simbody is mu_v v_t.
     Source: Simbody, public source.
+    Checked: simbody/simbody CompliantContactSubsystem.cpp, function stribeck.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C2 at |v| = v_t and 3 v_t",
-        confidence="one source",
-        checked="simbody/simbody CompliantContactSubsystem.cpp, function stribeck",
-        source="Simbody, CompliantContactSubsystem",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C2 at |v| = v_t and 3 v_t", "one source")
 
     v_t: Scalar = fields.V_T(1e-3)
     mu_v: Scalar = fields.MU_V(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return N * (self.mu_d + self.mu_v * speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u, speed = v / self.v_t, smooth.magnitude(v / self.v_t, 0.0)
         inner, size = smooth.clip(u, -1.0, 1.0), smooth.clip(speed, 0.0, 1.0)
         rise = inner * inner * inner * (10 - size * (15 - 6 * size))

@@ -1,22 +1,16 @@
 """The magic formula as friction: a sine of an arctangent, and laws that tune its factors."""
 
-from dataclasses import dataclass
-from math import asin as asin_of_float
-from math import atan as atan_of_float
-from math import cos as cos_of_float
+import math
 from math import inf, pi
-from math import sin as sin_of_float
-from typing import final
 
 from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
-from symfric.foundation.parameters import param
+from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class RuiWang(StaticLaw):
     """Rui-Wang static friction, a reconstruction: the magic formula with constant level.
 
@@ -31,13 +25,7 @@ class RuiWang(StaticLaw):
     Source: reconstruction; the equation of Wang and Rui 2000 is lost and was not read.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C∞",
-        confidence="rebuilt",
-        source="after Wang and Rui 2000 (equation lost)",
-        load="independent",
-    )
+    facts = Facts(("D", "S", "St"), "C∞", "rebuilt", load="independent")
 
     D: Scalar = fields.LEVEL(1.5, doc="peak")
     C: Scalar = fields.SHAPE(1.5, doc="shape factor", lower=0.0, upper=2.0)
@@ -45,22 +33,19 @@ class RuiWang(StaticLaw):
     E: Scalar = fields.CURVATURE(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.D * sin(self.C * pi / 2)
 
-    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
-        """The peak [N]; what a curve without one tends to."""
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the peak [N], or the limit of a curve without one."""
         return self.D * sin(smooth.clip(self.C, 0.0, 1.0) * pi / 2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        y = self.B * v
-        phi = y if equals(self.E, 0.0) else (1 - self.E) * y + self.E * atan(y)
-        return self.D * sin(self.C * atan(phi))
+        """Return the friction force [N]."""
+        return magic_formula(v, self.D, self.C, self.B, self.E)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class SelfTuning(TwoLevels):
     """Self-tuning friction (Pacejka-like), reconstructed.
 
@@ -76,12 +61,7 @@ class SelfTuning(TwoLevels):
     bracket with E and the function for B are interpretations.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C∞",
-        confidence="rebuilt",
-        source="after doi 10.1177/14644193231169325 (equations reconstructed)",
-    )
+    facts = Facts(("D", "S", "St"), "C∞", "rebuilt")
 
     mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
     B: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor")
@@ -93,16 +73,14 @@ class SelfTuning(TwoLevels):
         return shape_factor(self.mu_d / self.mu_s)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        y = self.B * v
-        phi = y if equals(self.E, 0.0) else (1 - self.E) * y + self.E * atan(y)
-        return self.mu_s * N * sin(self.C * atan(phi))
+        """Return the friction force [N]."""
+        return magic_formula(v, self.mu_s * N, self.C, self.B, self.E)
 
     @classmethod
     def from_peak_velocity(
         cls, v_p: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1, E: float = 0.0
     ) -> "SelfTuning":
-        """The law whose peak mu_s N lies at the velocity `v_p` [m/s].
+        """Return the law whose peak mu_s N lies at the velocity `v_p` [m/s].
 
         Ill-posed as mu_d -> mu_s, where the peak moves to infinity.
 
@@ -118,12 +96,11 @@ class SelfTuning(TwoLevels):
     def from_slope(
         cls, k: Scalar, N: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1, E: Scalar = 0.0
     ) -> "SelfTuning":
-        """The law whose slope at rest is `k` [N s/m] under the normal force `N`; any E keeps it."""
+        """Return the law of the slope `k` [N s/m] at rest under the normal force `N`, for any E."""
         return cls(mu_s=mu_s, mu_d=mu_d, B=k / (mu_s * N * shape_factor(mu_d / mu_s)), E=E)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class BrittleSelfTuning(TwoLevels):
     """Self-tuning friction whose stiffness factor follows from load and brittleness.
 
@@ -139,10 +116,9 @@ class BrittleSelfTuning(TwoLevels):
     """
 
     facts = Facts(
-        phenomena=("D", "S", "St"),
-        smoothness="C∞",
-        confidence="rebuilt",
-        source="after doi 10.1177/14644193231169325 (equations reconstructed)",
+        ("D", "S", "St"),
+        "C∞",
+        "rebuilt",
         load="more than proportional below the peak, since B grows",
     )
     ordered = (("mu_d", "mu_s"), ("B_0", "B_max"))
@@ -151,28 +127,36 @@ class BrittleSelfTuning(TwoLevels):
     B_0: Scalar = fields.STEEPNESS(100.0, width=-1, doc="stiffness factor without load")
     B_max: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor under heavy load")
     difference_ref: Scalar = fields.SHAPE(0.05, doc="reference of mu_s - mu_d", lower=1e-12)
-    N_ref: Scalar = param(50.0, unit="N", role="load", doc="reference of the load", lower=1e-12)
+    N_ref: Scalar = fields.LOAD(50.0, doc="reference of the load", lower=1e-12)
     E: Scalar = fields.CURVATURE(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The velocity 1/B_max [m/s]."""
+        """Velocity 1/B_max [m/s]."""
         return 1 / self.B_max
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         difference = self.mu_s - self.mu_d
         B = brittleness(N, difference, self.B_0, self.B_max, self.difference_ref, self.N_ref)
-        return SelfTuning(self.mu_s, self.mu_d, B, self.E).force(v, N)
+        C = shape_factor(self.mu_d / self.mu_s)
+        return magic_formula(v, self.mu_s * N, C, B, self.E)
+
+
+def magic_formula(v: Scalar, D: Scalar, C: Scalar, B: Scalar, E: Scalar) -> Scalar:
+    """Return D sin(C atan((1 - E) y + E atan(y))) of y = B v."""
+    y = B * v
+    phi = y if equals(E, 0.0) else (1 - E) * y + E * atan(y)
+    return D * sin(C * atan(phi))
 
 
 def shape_factor(ratio: Scalar) -> Scalar:
-    """C = 2 - (2/pi) asin(mu_d / mu_s): the shape factor whose asymptote is mu_d N."""
+    """Return C = 2 - (2/pi) asin(mu_d / mu_s), the shape factor whose asymptote is mu_d N."""
     return 2 - (2 / pi) * asin(ratio)
 
 
 def _inverse_phi(target: Scalar, E: float) -> float:
-    """The y >= 0 at which (1 - E) y + E atan(y) = target, by bisection; it rises for E < 1."""
+    """Return y >= 0 with (1 - E) y + E atan(y) = target, by bisection; the left rises for E < 1."""
     if is_casadi(target, E):
         raise ValueError(
             "SelfTuning.from_peak_velocity: expected numbers for mu_s, mu_d and E, got symbols; "
@@ -183,14 +167,14 @@ def _inverse_phi(target: Scalar, E: float) -> float:
     low, high = 0.0, (float(target) + abs(E) * pi / 2) / (1 - E)
     for _ in range(80):
         y = (low + high) / 2
-        low, high = (y, high) if (1 - E) * y + E * atan_of_float(y) < target else (low, y)
+        low, high = (y, high) if (1 - E) * y + E * math.atan(y) < target else (low, y)
     return high
 
 
 def corrected_shape_factor(
     ratio: float, theta: float = pi / 2, tolerance: float = 1e-12, max_iterations: int = 200
 ) -> tuple[float, int]:
-    """The same C by the paper's kind of iterative correction, here Newton's method.
+    """Return the same C by an iterative correction as in the paper, here Newton's method.
 
     Solves sin(C theta) = mu_d / mu_s from the right end C = pi/theta, from where convergence is
     monotone. `theta` = atan(phi(B v_d)) refers the dynamic level to a finite velocity v_d.
@@ -209,7 +193,7 @@ def corrected_shape_factor(
             f"corrected_shape_factor: expected 0 <= mu_d/mu_s <= 1, got {ratio:g}; "
             "the dynamic level cannot exceed the static one"
         )
-    least = (pi - asin_of_float(ratio)) / 2
+    least = (pi - math.asin(ratio)) / 2
     if not least * (1 - 1e-15) <= theta <= pi / 2:
         raise ValueError(
             f"corrected_shape_factor: expected {least:.6g} <= theta <= pi/2 for mu_d/mu_s = "
@@ -218,14 +202,14 @@ def corrected_shape_factor(
         )
     shape, error = pi / theta, inf
     for iteration in range(max_iterations):
-        error = sin_of_float(shape * theta) - ratio
+        error = math.sin(shape * theta) - ratio
         if abs(error) < tolerance:
             return shape, iteration
-        shape -= error / (theta * cos_of_float(shape * theta))
+        shape -= error / (theta * math.cos(shape * theta))
     raise ValueError(
         f"corrected_shape_factor: expected convergence within {max_iterations} iterations, "
         f"got residual {error:.1e} at ratio {ratio:g}; use the closed form "
-        f"C = {(pi - asin_of_float(ratio)) / theta:.6g}"
+        f"C = {(pi - math.asin(ratio)) / theta:.6g}"
     )
 
 
@@ -237,7 +221,7 @@ def brittleness(
     difference_ref: Scalar = 0.05,
     N_ref: Scalar = 50.0,
 ) -> Scalar:
-    """Stiffness factor B [s/m] that grows with mu_s - mu_d and with the normal force.
+    """Return the stiffness factor B [s/m], which grows with mu_s - mu_d and the normal force.
 
         B = B_0 + (B_max - B_0) [1 - exp(-(difference/difference_ref) (N/N_ref))]
 

@@ -1,18 +1,15 @@
 """Smooth laws with a peak or a fall that is not exponential."""
 
-from dataclasses import dataclass
 from math import e, sqrt
-from typing import final
 
 from symfric.foundation.numeric import Scalar, equals, exp, tanh
-from symfric.foundation.parameters import param
+from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import Curve, Fall, Levels, TwoLevels
 from symfric.laws.base.law import Facts, StaticLaw
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class BrownMcPhee(TwoLevels):
     """Brown-McPhee friction.
 
@@ -23,28 +20,23 @@ class BrownMcPhee(TwoLevels):
     mu_d N falls like 16 (v_t/v)^3; mu_s = mu_d gives mu_d N tanh(4x). Creeps under load. Slope at
     rest N [4 mu_d + (16/9)(mu_s - mu_d)] / v_t sets the stiffness of the scene.
     Source: Brown and McPhee, ASME J. Comput. Nonlinear Dynam. 11(5), 2016, 054502.
+    Checked: public MATLAB function Friction_B and the code of a railway simulator.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="two sources",
-        checked="public MATLAB function Friction_B and the code of a railway simulator",
-        source="Brown and McPhee, J. Comput. Nonlinear Dynam. 11(5), 2016",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "two sources")
 
     v_t: Scalar = fields.V_T(1e-3)
     mu_v: Scalar = fields.SIGMA_2(0.0)
-    N_t: Scalar = param(1.0, unit="N", role="load", doc="transition normal force", lower=1e-12)
+    N_t: Scalar = fields.LOAD(1.0, doc="transition normal force", lower=1e-12)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         if equals(self.mu_v, 0.0):
             return self.mu_d * N
         return self.mu_d * N + self.mu_v * speed * tanh(4 * N / self.N_t)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         x = v / self.v_t
         bump = x / (0.25 * (x * x) + 0.75) ** 2
         dry = self.mu_d * tanh(4 * x) + (self.mu_s - self.mu_d) * bump
@@ -53,8 +45,7 @@ class BrownMcPhee(TwoLevels):
         return dry * N + self.mu_v * v * tanh(4 * N / self.N_t)
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class SimscapeBreakaway(TwoLevels):
     """Breakaway friction of Simscape's translational and rotational friction blocks.
 
@@ -65,37 +56,31 @@ class SimscapeBreakaway(TwoLevels):
     excess over mu_d N is below 1e-20. Slope at rest N [1.65 (mu_s - mu_d) + 10 mu_d] / v_brk.
     Creeps under load.
     Source: documentation of Simscape, four pages.
+    Checked: documentation of Simscape, four pages.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="two sources",
-        checked="documentation of Simscape, four pages",
-        source="documentation of Simscape",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "two sources")
 
     v_brk: Scalar = fields.VELOCITY(1e-3, width=1, doc="breakaway velocity")
     sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """A tenth of the breakaway velocity [m/s]."""
+        """Tenth of the breakaway velocity [m/s]."""
         return self.v_brk / 10
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u = v / (sqrt(2) * self.v_brk)
         peak = (sqrt(2 * e) * (self.mu_s - self.mu_d)) * u * exp(-u * u)
         return N * (peak + self.mu_d * tanh(10 * v / self.v_brk)) + self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Specker(TwoLevels):
     """Specker-Buchholz-Dietmayer friction.
 
@@ -105,15 +90,10 @@ class Specker(TwoLevels):
     Limits: F(v_sp) = mu_s N exactly; with v_t = v_sp/10 it is `SimscapeBreakaway` to 4e-9. With
     sigma_2 v_sp above the static excess the peak turns into a dip. Creeps under load.
     Source: Specker, Buchholz, Dietmayer 2014 (not read; the correction by sigma_2 is uncertain).
+    Checked: v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="unverified",
-        checked="v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain",
-        source="Specker, Buchholz, Dietmayer 2014",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "unverified")
     strictly_ordered = (("v_t", "v_sp"),)
 
     v_sp: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
@@ -122,23 +102,22 @@ class Specker(TwoLevels):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The transition velocity [m/s]."""
+        """Transition velocity [m/s]."""
         return self.v_t
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         return self.mu_d * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         u = v / self.v_sp
         peak = N * (self.mu_s - self.mu_d * tanh(self.v_sp / self.v_t)) - self.sigma_2 * self.v_sp
         dry = peak * u * exp((1 - u * u) / 2) + self.mu_d * N * tanh(v / self.v_t)
         return dry + self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class MakkarDixon(StaticLaw):
     """Makkar-Dixon-Sawyer-Hu friction: differences of hyperbolic tangents, in newton.
 
@@ -149,16 +128,10 @@ class MakkarDixon(StaticLaw):
     the default steepnesses. gamma_2 > gamma_3 makes it dissipative and the parameters unique.
     Creeps under load.
     Source: Makkar, Dixon, Sawyer, Hu 2005 (not read), as in public code.
+    Checked: public code, in which a parenthesis is misplaced.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="one source",
-        checked="public code, in which a parenthesis is misplaced",
-        source="Makkar, Dixon, Sawyer, Hu 2005, as in public code",
-        load="independent",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "one source", load="independent")
     strictly_ordered = (("gamma_3", "gamma_2"),)
 
     gamma_1: Scalar = fields.LEVEL(0.5, doc="static excess")
@@ -169,18 +142,17 @@ class MakkarDixon(StaticLaw):
     gamma_6: Scalar = fields.SIGMA_2(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         falling = 1 - tanh(self.gamma_3 * speed)
         return self.gamma_1 * falling + self.gamma_4 + self.gamma_6 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
+        """Return the friction force [N]."""
         bump = self.gamma_1 * (tanh(self.gamma_2 * v) - tanh(self.gamma_3 * v))
         return bump + self.gamma_4 * tanh(self.gamma_5 * v) + self.gamma_6 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class Lorentzian(Levels, Curve):
     """Lorentzian friction of Hess and Soom.
 
@@ -190,29 +162,23 @@ class Lorentzian(Levels, Curve):
     Limits: halfway between the levels at v = v_s; the excess over mu_d N falls like (v_s/v)^2.
     Creeps under load.
     Source: Hess and Soom, ASME J. Tribol. 112, 1990, as cited by Armstrong-Helouvry (not read).
+    Checked: g(v) of jchristopherson/friction README with alpha = 2; not the name.
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="one source",
-        checked="g(v) of jchristopherson/friction README with alpha = 2; not the name",
-        source="Hess and Soom 1990",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "one source")
 
     v_s: Scalar = fields.V_S(1e-3)
     v_eps: Scalar = fields.V_EPS(1e-4)
     sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
-        """Friction force [N] in the direction `s`."""
+        """Return the friction force [N] in the direction `s`."""
         u = v / self.v_s
         mu = self.mu_d + (self.mu_s - self.mu_d) / (1 + u * u)
         return mu * N * s + self.sigma_2 * v
 
 
-@final
-@dataclass(frozen=True, eq=False)
+@parametric
 class PoppStelter(StaticLaw):
     """Popp-Stelter friction: a hyperbolic fall and a quadratic rise.
 
@@ -224,27 +190,24 @@ class PoppStelter(StaticLaw):
     Source: Popp and Stelter, Phil. Trans. R. Soc. A 332, 1990 (not read).
     """
 
-    facts = Facts(("D", "S", "St", "V"), "C∞", "unverified", "Popp and Stelter 1990")
+    facts = Facts(("D", "S", "St", "V"), "C∞", "unverified")
 
     mu_s: Scalar = fields.MU_S(0.15)
     eta: Scalar = fields.SHAPE(0.5, doc="share that remains", lower=0.0, upper=1.0)
     d: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall")
-    kappa: Scalar = param(
-        0.0, unit="s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
-    )
+    kappa: Scalar = fields.SIGMA_2(0.0, unit="s^2/m^2", doc="quadratic coefficient")
     v_eps: Scalar = fields.V_EPS(1e-4)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
         fall = (1 - self.eta) / (1 + smooth.onward(self.d * speed)) + self.eta
         mu = self.mu_s * fall
         return N * (mu if equals(self.kappa, 0.0) else mu + self.kappa * speed * speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force [N]."""
-        fall = (1 - self.eta) / (
-            1 + self.d * smooth.magnitude(v, smooth.CORNER * self.v_eps)
-        ) + self.eta
+        """Return the friction force [N]."""
+        speed = smooth.magnitude(v, smooth.CORNER * self.v_eps)
+        fall = (1 - self.eta) / (1 + self.d * speed) + self.eta
         mu = self.mu_s * fall
         if not equals(self.kappa, 0.0):
             mu += self.kappa * v * v

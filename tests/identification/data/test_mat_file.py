@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
-from identification.data.mat_bytes import variables
+from identification.data.mat_file import variables
 
 io: Any = pytest.importorskip("scipy.io")
 T = np.arange(100) / 100

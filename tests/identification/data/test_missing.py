@@ -91,7 +91,7 @@ def test_rows_written_twice_are_left_out_and_standstill_stays(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("rows", "way_out"),
     [
-        (TWICE, r"row 4: .*missing='drop' \(--missing drop\) leaves out rows that repeat"),
+        (TWICE, r"row 4: .*missing='drop' \(--missing drop\) leaves out repeated rows"),
         (TWICE.replace("1,1,2\n1,1,2", "1,1,2\n1,2,2"), r"row 4: .*clock is too coarse, .*step="),
         (TWICE.replace("1,1,2\n1,1,2", "1,1,2\n0.5,1,2"), r"got 0.5 s after 1 s \(1 such rows\)$"),
     ],

@@ -92,9 +92,9 @@ def test_a_record_may_begin_in_motion(data: Dataset, drive: Subject) -> None:
 
 
 def test_disturbance_enters_after_the_limit(rows: LoopRows) -> None:
-    force = rows.runs[0].motion(of(TRUE, rows.names), np.zeros(2))
-    assert not isinstance(force, str)
-    u = force.inputs[:, 0]
+    found = rows.runs[0].signals(of(TRUE, rows.names), np.zeros(2))
+    assert not isinstance(found, str)
+    u = found["force"][0]
     assert np.abs(np.delete(u, 700)).max() <= 300.0 + 1e-9
     assert u[700] - u[699] == pytest.approx(90.0, abs=15.0)
 

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.filters import Filter
 from identification.residuals.evaluation import Evaluation, Residuals
-from identification.residuals.inverse import InverseDynamics
-from identification.residuals.motions import ENOUGH
+from identification.residuals.inverse import ENOUGH, InverseDynamics
 from identification.unknowns.subject import Subject, subject
 from symfric import LuGre, Stribeck, rabinowicz, simulate
 from symfric.foundation.parameters import with_values

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from identification.residuals import stepper
-from identification.residuals.open_loop import sampled_motion, why_not_sampled
+from identification.residuals.shots import sampled_motion
+from identification.residuals.stepper import why_not_sampled
 from symfric import (
     Coulomb,
     Linear,

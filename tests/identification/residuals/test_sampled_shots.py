@@ -6,8 +6,8 @@ import pytest
 
 from identification.data.dataset import Dataset
 from identification.residuals import stepper
-from identification.residuals.open_loop import means
 from identification.residuals.shooting import Shooting
+from identification.residuals.shots import means
 from identification.unknowns.subject import Subject, subject
 from symfric import Coulomb, Dahl, Linear, Stribeck, simulate
 from symfric.scenes import Drive

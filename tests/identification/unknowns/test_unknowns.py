@@ -10,7 +10,7 @@ def test_a_logarithmic_value_that_wants_to_be_nothing_is_at_its_bound() -> None:
     made = unknowns_of(both, {}, ("b", "c"))
     gone = np.array([-700.0, 0.0])
     assert made.at_bound(gone).tolist() == [True, False]
-    there = np.maximum(gone, made.floor)
+    there = np.maximum(gone, made.limits[0])
     assert made.values(there)[0] == pytest.approx(0.05e-12)
     assert np.linalg.det(made.slope(there)) > 0
     assert not made.at_bound(made.start).any()
@@ -25,7 +25,7 @@ def test_a_value_that_wants_to_be_infinite_is_at_its_bound() -> None:
     made = unknowns_of(three, {}, ("k", "mu_d", "mu_s"))
     far = np.array([700.0, 1e9, 300.0])
     assert made.at_bound(far).tolist() == [True, False, True]
-    there = np.minimum(far, made.ceiling)
+    there = np.minimum(far, made.limits[1])
     k, mu_d, mu_s = made.values(there)
     assert (k, mu_s - mu_d) == pytest.approx((2e12, 0.2e12), rel=1e-3)
     assert not made.at_bound(made.start).any()
@@ -34,7 +34,7 @@ def test_a_value_that_wants_to_be_infinite_is_at_its_bound() -> None:
 def test_a_value_goes_back_to_the_far_bound_that_its_law_has() -> None:
     v_s = Unknown("v_s", "m/s", 1e-3, lower=1e-12, upper=1e6, logarithmic=True)
     made = unknowns_of((v_s,), {}, ("v_s",))
-    low, high = made.values(made.floor)[0], made.values(made.ceiling)[0]
+    low, high = made.values(made.limits[0])[0], made.values(made.limits[1])[0]
     assert 1e-12 < low < 1.001e-12
     assert 0.999e6 < high < 1e6
 

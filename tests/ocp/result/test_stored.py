@@ -150,7 +150,7 @@ def test_file_that_names_modules_of_an_older_version_loads(
     with np.load(tmp_path / "back.npz") as held:
         arrays = dict(held)
     text = arrays["about"].tobytes().decode()
-    pairs = list(storable.MOVED.items())
+    pairs = list(storable.names()["moved"].items())
     for old, new in pairs[::-1] if oldest else pairs:
         text = text.replace(f'"{new}:', f'"{old}:')
     assert named in text

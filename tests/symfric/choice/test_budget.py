@@ -15,8 +15,8 @@ from symfric.choice.continuation import (
     LEAST,
     LEAST_WHOLE,
     ON_THE_WAY,
-    Asked,
     Budget,
+    Wanted,
     at_equal_error,
     continued,
     counted,
@@ -89,13 +89,13 @@ def test_the_search_for_events_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [counted(machine, model, 1e-6)[0] for model in models] == [70, 70 + EVENTS]
 
 
-ASKED = Asked(1e-3, 0.0)
+GOAL = Wanted(1e-3, 0.0)
 
 
 def test_the_way_to_dry_friction_leaves_a_part_of_the_budget() -> None:
     held = Written(lambda s, _: 0.9 / (1 - log(s, 4)), lambda s, _: round(4_000 / s**0.15))
     runs = budget(held)
-    found = continued(runs, TRUTH, ASKED)
+    found = continued(runs, TRUTH, GOAL)
     assert found.stopped.startswith("drier runs take more than")
     spent = sum(runs.attempts)
     assert 0 <= spent - ON_THE_WAY * runs.whole < runs.most
@@ -106,11 +106,11 @@ def test_only_a_run_of_too_many_attempts_is_made_at_a_looser_tolerance(status: S
     held = Written(lambda *_: 1e-2, lambda s, rtol: 10**9 if rtol < 5e-6 else 100, status)
     if status is Status.JAMMED:
         with pytest.raises(SolveError):
-            continued(budget(held), TRUTH, ASKED)
+            continued(budget(held), TRUTH, GOAL)
         assert held.asked == [(1.0, 1e-6)]
         return
     held.power = 0.0
-    found = continued(budget(held), TRUTH, ASKED)
+    found = continued(budget(held), TRUTH, GOAL)
     assert [level.rtol for level in found.levels] == [pytest.approx(1e-5)]
 
 
@@ -122,8 +122,8 @@ def test_the_nearest_rung_is_the_softest_of_about_the_smallest_error() -> None:
 def test_the_own_error_is_that_of_the_tolerance_that_is_taken() -> None:
     """Of a law that is 0.3 off however fine it runs, and whose integrator errs by rtol."""
     held = Written(lambda _, rtol: 0.3 + 2 * rtol, lambda *_: 100)
-    level = Smoothed(1.0, 0.3, 100, ASKED.fine)
-    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, level, whole=False)
+    level = Smoothed(1.0, 0.3, 100, GOAL.fine)
+    found = at_equal_error(budget(held), 1.0, TRUTH, GOAL, level, whole=False)
     assert found.rtol == pytest.approx(10**-3.5)
     assert found.own == pytest.approx(2 * found.rtol, rel=1e-3)
     assert found.error == pytest.approx(0.3, abs=1e-3)
@@ -133,23 +133,23 @@ def test_a_tolerance_that_keeps_the_accuracy_by_chance_is_not_taken() -> None:
     """Errors change their sign with the tolerance: at 1e-3 it is small, at half a decade not."""
     errors = {-6: 1e-4, -7: 5e-3, -8: 6e-4, -9: 2e-4}
     held = Written(lambda _, rtol: errors.get(round(2 * log10(rtol)), 0.0), lambda *_: 100)
-    level = Smoothed(1.0, 0.0, 100, ASKED.fine)
-    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, level, whole=True)
+    level = Smoothed(1.0, 0.0, 100, GOAL.fine)
+    found = at_equal_error(budget(held), 1.0, TRUTH, GOAL, level, whole=True)
     assert (found.rtol, found.error) == (pytest.approx(1e-4), pytest.approx(6e-4))
 
 
 def test_where_only_the_finest_run_keeps_the_accuracy_its_own_error_is_that_of_the_next() -> None:
     held = Written(lambda _, rtol: 1e6 * rtol, lambda *_: 100)
-    level = Smoothed(1.0, 0.0, 100, ASKED.fine)
-    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, level, whole=False)
-    assert found.rtol == ASKED.fine
+    level = Smoothed(1.0, 0.0, 100, GOAL.fine)
+    found = at_equal_error(budget(held), 1.0, TRUTH, GOAL, level, whole=False)
+    assert found.rtol == GOAL.fine
     assert found.own > 1e-3  # not zero, the difference from itself
 
 
 def test_a_fine_run_that_would_take_too_much_is_not_begun() -> None:
     held = Written(lambda _, rtol: 2 * rtol, lambda _, rtol: 10**9 if rtol < 1e-6 else 9_000)
     level = Smoothed(1.0, 1e-6, 9_000, 1e-6)
-    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, level, whole=True)
+    found = at_equal_error(budget(held), 1.0, TRUTH, GOAL, level, whole=True)
     assert all(rtol >= 1e-6 for _, rtol in held.asked)
     assert found.rtol == pytest.approx(10**-3.5)
 

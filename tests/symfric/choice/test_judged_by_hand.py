@@ -11,17 +11,16 @@ from symfric.choice import Friction
 from symfric.choice.friction import alike
 from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsage]
 from symfric.choice.nature import needed, otherwise
-from symfric.choice.ranking import INACCURATE, RANKED, REFUSED, Row, ordered
+from symfric.choice.ranking import INACCURATE, RANKED, REFUSED, Row, number, ordered, short, verdict
 from symfric.choice.smoothing import (
     MOST,
     NARROW,
     Smoothed,
     SmoothingStudy,
-    ladder,
     limit_order,
     smoothing,
+    study,
 )
-from symfric.choice.text import number, short, verdict
 from symfric.foundation.parameters import parameters
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, Gonthier, LeineSwitch, LuGre, steady_force
 
@@ -34,7 +33,7 @@ ROW = Row(
 def test_two_runs_in_a_row_must_keep_the_error() -> None:
     """One that keeps it by chance, as where errors change their sign, is not enough."""
     errors = {1.0: 0.1, 0.25: 1e-4, 0.0625: 0.05, 0.0625 / 4: 1e-3, 0.0625 / 16: 1e-4}
-    found = ladder(lambda s: Smoothed(s, errors[s], 1), 2e-3, 2e-3, 1.0, (ValueError,))
+    found = study(lambda s: Smoothed(s, errors[s], 1), 2e-3, 2e-3, 1.0, (ValueError,))
     assert [level.s for level in found.levels] == [*errors]
     assert found.softest(2e-3) is not None
     assert found.levels[-2].s <= (found.softest(2e-3) or 0.0) < 0.0625
@@ -49,10 +48,10 @@ def test_between_two_rungs_the_error_is_a_power_of_the_smoothing() -> None:
 
 def test_errors_that_stay_the_same_are_followed_by_leaps() -> None:
     """A law whose widths are far above the speeds of a machine looks settled, and is not."""
-    found = ladder(lambda s: Smoothed(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    found = study(lambda s: Smoothed(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert found.stopped == ""
     assert found.levels[4].s == found.levels[3].s / 4**4
-    later = ladder(lambda s: Smoothed(s, min(0.4, 1e9 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    later = study(lambda s: Smoothed(s, min(0.4, 1e9 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert later.stopped == ""
 
 
@@ -69,17 +68,17 @@ def near(limit: float, order: float, wide: float = 0.0) -> Callable[[float], Smo
 def test_another_motion_is_said_of_a_limit_with_its_order_alone() -> None:
     """Of runs that converge, narrower than the speeds of a machine, to what is off."""
     for order in (0.5, 1.0, 2.0):
-        found = ladder(near(0.2, order), 1e-3, 1e-3, 1.0, (ValueError,))
+        found = study(near(0.2, order), 1e-3, 1e-3, 1.0, (ValueError,))
         assert found.stopped == f"it tends to another motion, with order {order:g}"
-    bristles = ladder(near(0.2, 0.5), 1e-3, 1e-3, 0.5, (ValueError,))
+    bristles = study(near(0.2, 0.5), 1e-3, 1e-3, 0.5, (ValueError,))
     assert found.levels[-1].s < NARROW
     assert bristles.levels[-1].s < NARROW**2
-    still = ladder(lambda s: Smoothed(s, 0.4, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    still = study(lambda s: Smoothed(s, 0.4, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert still.stopped.startswith("its error still changes")
     assert (still.decided, found.decided) == (False, True)
-    later = ladder(near(0.0, 1.0, wide=1e-8), 1e-3, 1e-3, 0.5, (ValueError,))
+    later = study(near(0.0, 1.0, wide=1e-8), 1e-3, 1e-3, 0.5, (ValueError,))
     assert later.stopped == ""  # by then its velocities are 1e-4 of what they were
-    first = ladder(near(0.0, 1.0, wide=1e-4), 1e-3, 1e-3, 1.0, (ValueError,))
+    first = study(near(0.0, 1.0, wide=1e-4), 1e-3, 1e-3, 1.0, (ValueError,))
     assert (first.stopped, first.softest(1e-3) is not None) == ("", True)
 
 
@@ -99,7 +98,7 @@ def test_no_limit_is_shown_by_neighbours_nor_by_runs_that_do_not_converge() -> N
 
 
 def test_a_law_of_which_nothing_is_scaled_is_run_once() -> None:
-    found = ladder(near(0.2, 1.0), 1e-3, 1e-3, 0.0, (ValueError,))
+    found = study(near(0.2, 1.0), 1e-3, 1e-3, 0.0, (ValueError,))
     assert (len(found.levels), found.stopped) == (1, "nothing of it is scaled")
 
 
@@ -111,7 +110,7 @@ def test_every_width_of_a_bristle_is_scaled() -> None:
 
 def test_errors_that_follow_a_power_are_followed_in_strides() -> None:
     """0.5 s^(1/2) is 1e-3 at s = 4e-6: seven runs, where four times each would take eleven."""
-    found = ladder(lambda s: Smoothed(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    found = study(lambda s: Smoothed(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert len(found.levels) == 7
     assert [level.s for level in found.levels[:4]] == pytest.approx([1, 1 / 4, 1 / 16, 1 / 1024])
     assert found.softest(1e-3) == pytest.approx(4e-6)
@@ -123,13 +122,13 @@ def test_where_a_drier_run_fails_shorter_steps_are_tried() -> None:
             raise ValueError("too dry")
         return Smoothed(s, s, 1)
 
-    found = ladder(run, 1e-3, 1e-3, 1.0, (ValueError,))
+    found = study(run, 1e-3, 1e-3, 1.0, (ValueError,))
     assert [level.s for level in found.levels] == [1.0, 0.25, 0.125]
     assert found.stopped == "too dry"
 
 
 def test_an_error_that_falls_too_slowly_is_not_followed_for_ever() -> None:
-    found = ladder(lambda s: Smoothed(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    found = study(lambda s: Smoothed(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert len(found.levels) == MOST + 1
     assert found.stopped.startswith("its error still changes")
 

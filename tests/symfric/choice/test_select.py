@@ -16,7 +16,7 @@ from symfric import Model, Variable, simulate, with_values
 from symfric.choice import Choice, Friction, select
 from symfric.choice.continuation import RUN
 from symfric.choice.nature import forms
-from symfric.choice.text import lines
+from symfric.choice.ranking import lines
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
 from symfric.scenes import Drive, Rabinowicz
 from symfric.scenes.base import contact

@@ -1,98 +1,89 @@
-"""The command line as a whole: exit statuses, one sentence an error, nothing else on stdout."""
+"""The command line as a whole: help, exit statuses, completions, tables."""
 
+import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
-import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from errno import ENOSPC
+from math import inf, nan
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-import symfric
-from symfric.cli import main
+import symfric as package
+from symfric.cli import completions, main, output
+from symfric.cli.app import (
+    COMMANDS,
+    Commands,
+    arguments,
+    forms,
+    is_option,
+    prose_and_examples,
+    sentence,
+)
+from symfric.laws import ALL_LAWS
+from symfric.scenes import ALL_SCENES
 
-BAD = {
-    "no scene": ("run", "run: expected SCENE, got none; see symfric run -h"),
-    "no law": ("run rabinowicz", "run: expected --law NAME[,NAME], got none"),
-    "unknown command": ("runn", "did you mean run?"),
-    "unknown option": ("run rabinowicz --law lugre --lawx 1", "got --lawx; did you mean --law"),
-    "option without value": ("run rabinowicz --law", "--law: expected a value, got none"),
-    "value without option": ("run drive --law lugre --set m=1 k=2", "got k=2; repeat the option"),
-    "value of a flag": ("gallery --quick=1", "--quick: expected no value, got one"),
-    "two scenes": ("run drive nip --law lugre", "expected no other argument, got nip"),
-    "word as number": ("run drive --law lugre --rtol x", "run: --rtol: expected a number, got 'x'"),
-    "half a sample": ("run drive --law lugre --samples 1.5", "expected a whole number, got '1.5'"),
-    "no such option": ("--foo", "--foo"),
-    "unknown scene": ("run rabinowitz --law lugre", "did you mean rabinowicz"),
-    "unknown law": ("run rabinowicz --law lugr", "did you mean lugre"),
-    "empty term": ("run rabinowicz --law coulomb+", "empty term"),
-    "unknown parameter": ("run rabinowicz --law lugre --set mu=1", "did you mean mu_s"),
-    "no number": ("run rabinowicz --law lugre --set mu_s=abc", "mu_s: expected a finite number"),
-    "no equals": ("run rabinowicz --law lugre --set mu_s", "NAME=VALUE"),
-    "twice": ("run rabinowicz --law lugre --set m=1 --set m=2", "m twice"),
-    "out of bounds": ("run rabinowicz --law lugre --set mu_s=-1", "0 <= mu_s"),
-    "no duration": ("run rabinowicz --law lugre --t-end soon", "--t-end"),
-    "NaN duration": ("run rabinowicz --law lugre --t-end nan", "t_end"),
-    "negative duration": ("run rabinowicz --law lugre --t-end -1", "t_end > t_start"),
-    "tolerance": ("run rabinowicz --law lugre --rtol 1", "rtol"),
-    "backend": ("run rabinowicz --law lugre --backend vn", "did you mean vm"),
-    "peer": ("run rabinowicz --law lugre --peer sundails", "did you mean sundials"),
-    "peer's method": ("run rabinowicz --law lugre --peer ggl --method radau5", "no --method"),
-    "method": ("run rabinowicz --law lugre --method rodas5", "did you mean rodas5p"),
-    "unknown state": ("run rabinowicz --law lugre --x0 q=1", "x0"),
-    "infinite state": ("run rabinowicz --law lugre --x0 x=inf", "--x0 x: expected a finite"),
-    "unknown input": ("run drive --law lugre --input frc=1", "did you mean force"),
-    "NaN input": ("run drive --law lugre --input force=nan", "finite number"),
-    "missing input": ("run drive --law lugre --input force=none.csv:f", "none.csv"),
-    "law twice": ("run drive --law lugre --law lugre", "every law once"),
-    "law twice in one": ("report drive --law lugre,dahl,lugre", "every law once"),
-    "candidate twice": ("select drive --law lugre,lugre", "every law once"),
-    "two laws, one file": ("run drive --law lugre --law dahl --json -", "expected one --law"),
-    "folder as file": ("run drive --law lugre --out .", "got a folder"),
-    "unwritable": ("run drive --law lugre --out /dev/null/x.csv", "got the file"),
-    "picture format": ("run drive --law lugre --plot x.foo", "ending in .png"),
-    "laws: unknown": ("laws lugr", "did you mean lugre"),
-    "laws: scene parameter": ("laws lugre --set k=1", "--set of law lugre"),
-    "laws: set without name": ("laws --set mu_d=1", "name of a law"),
-    "laws: normal force": ("laws lugre --plot x.png --normal-force nan", "--normal-force"),
-    "identify: no data": ("identify --law stribeck", "DATA"),
-    "identify: missing file": ("identify none.csv --law stribeck", "none.csv"),
-    "codegen: no folder": ("codegen --law lugre", "--out"),
-    "codegen: unknown type": ("codegen --law lugre --out c --real half", "double, float, both"),
-    "codegen: file as folder": ("codegen --law lugre --out /dev/null", "got the file"),
-    "codegen: compiler": ("codegen --law lugre --out c --compiler none", "'none'"),
-    "demo: no data": ("demo --data none", "none"),
+EVERY: dict[str, Any] = {
+    name: Commands(name="symfric").get_command(None, name) for name in COMMANDS
 }
+OF_ITS_OWN = {"--out", "--free", "--data"}
+"""A folder, a page or a unit; what stays open in C or is fitted; a folder or a record."""
+START = "import sys; from symfric.cli import main; sys.exit(main())"
 
 
-@pytest.fixture(autouse=True)
-def inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_fits_80_columns_with_examples_that_the_command_takes(name: str, symfric) -> None:
+    shown = symfric(f"{name} -h").out
+    assert symfric(f"{name} --help").out == shown
+    assert "<" not in shown  # a type of Python in the place of a word
+    words = [f"symfric {name} [OPTIONS]"]
+    for argument in arguments(EVERY[name]):
+        text = argument.metavar + "..." * (argument.nargs == -1)
+        words.append(text if argument.required else f"[{text}]")
+        assert f"\nArguments:\n  {words[-1]}  " in shown
+    assert shown.startswith(f"Usage: {' '.join(words)}\n")
+    examples = prose_and_examples(EVERY[name].help)[1]
+    shown = shown.partition("Examples:\n")[2].replace("\\\n", " ")
+    assert [" ".join(line.split()) for line in shown.splitlines()] == examples != []
+    for line in examples:
+        assert line.startswith(f"symfric {name}")
+        EVERY[name].make_context(name, shlex.split(line)[2:])
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_sentence_and_status_2(
-    case: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    line, hint = BAD[case]
-    assert main(line.split()) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("symfric: ")
-    assert err.count("\n") == 1
-    assert hint in err
+def test_an_option_has_one_form_in_all_commands_and_all_texts_are_used() -> None:
+    texts, used = forms(), set[str]()
+    found = defaultdict[str, set[str]](set)
+    for name, command in EVERY.items():
+        own = {p.name for p in command.params} - {"help"}
+        assert own >= texts.get(name.replace("-", "_"), {}).keys()
+        used |= own
+        for option in filter(is_option, command.params):
+            assert option.is_flag or option.metavar, (name, option.opts)
+            assert option.help.endswith("."), (name, option.opts)
+            found[option.opts[0]].add(option.metavar or "")
+    assert used >= texts["all"].keys()
+    assert found.pop("--law") == {"NAME", "NAME[,NAME]"}  # one, or several
+    assert {name for name, metavars in found.items() if len(metavars) > 1} <= OF_ITS_OWN
 
 
-def test_bad_input_leaves_no_files_behind(tmp_path: Path) -> None:
-    files = ["--out", "x.csv", "--plot", "x.png", "--json", "x.json"]
-    assert main(["run", "drive", "--law", "lugr", *files]) == 2
-    assert list(tmp_path.iterdir()) == []
+def test_an_example_breaks_before_an_option(symfric) -> None:
+    assert "\\\n      --" in symfric("select -h").out.partition("Examples:\n")[2]
 
 
-def test_an_operating_system_error_names_the_file(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "drive", "--law", "lugre", "--input", "force=none.csv:f"]) == 2
-    assert "'none.csv': expected a file, got nothing there" in capsys.readouterr().err
+def test_without_a_command_the_help_lists_them_uncut(symfric) -> None:
+    shown = symfric("").out
+    assert symfric("--help").out == shown
+    table = shown.partition("Commands:")[2]
+    assert all(f"\n  {name} " in table for name in COMMANDS)
+    assert "..." not in table
+    assert symfric("--version").out == f"symfric {package.__version__}\n"
 
 
 def test_debug_shows_where_an_error_comes_from(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,9 +92,20 @@ def test_debug_shows_where_an_error_comes_from(monkeypatch: pytest.MonkeyPatch) 
         main(["laws", "lugr"])
 
 
+def run(code: str, *words: str) -> subprocess.CompletedProcess[str]:
+    root = Path(package.__file__).parents[1]
+    return subprocess.run(
+        [sys.executable, "-c", code, *words],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )
+
+
 @pytest.mark.parametrize(("module", "line"), [("typer", "--help"), ("casadi", "laws")])
 def test_an_interrupt_while_something_is_imported_is_one_sentence(module: str, line: str) -> None:
-    """Ctrl-C in the first second printed a traceback."""
     stopped = (
         "import sys\n"
         "class Interrupt:\n"
@@ -113,95 +115,136 @@ def test_an_interrupt_while_something_is_imported_is_one_sentence(module: str, l
         "from symfric.__main__ import main\n"
         "sys.exit(main())\n"
     )
-    root = Path(symfric.__file__).parents[1]
-    done = subprocess.run(
-        [sys.executable, "-c", stopped, line],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"PYTHONPATH": str(root)},
-    )
+    done = run(stopped, line)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "symfric: interrupted\n")
 
 
-def test_no_summary_of_a_command_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
-    """At 80 columns `codegen`, `bench` and others ended in dots."""
-    assert main(["--help"]) == 0
-    shown = capsys.readouterr().out
-    assert "codegen" in shown
-    assert "..." not in shown.partition("Commands:")[2]
-
-
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"symfric {symfric.__version__}\n"
-
-
-def test_without_a_command_the_help_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([]) == 0
-    out = capsys.readouterr().out
-    assert all(name in out for name in ("laws", "run", "identify", "codegen", "demo"))
-
-
-START = "import sys; from symfric.cli import main; sys.exit(main())"
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """The installed command, as users run it."""
-    return subprocess.run(
-        [sys.executable, "-c", START, *arguments],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        check=False,
-    )
-
-
-def test_as_a_process_bad_input_ends_with_status_2_and_no_traceback() -> None:
-    done = run("run", "rabinowicz", "--law", "lugr")
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-
-
 def test_as_a_process_a_warning_is_one_line_and_json_stays_pure() -> None:
-    done = run("run", "drive", "--law", "viscous", "--t-end", "1", "--rtol", "1e-3", "--json", "-")
+    line = "run drive --law viscous --t-end 1 --rtol 1e-3 --backend vm --json -"
+    done = run(START, *line.split())
     assert done.returncode == 0
-    assert done.stdout.startswith("{\n")
-    assert done.stdout.endswith("}\n")
+    assert json.loads(done.stdout)["status"] == "SUCCESS"
     assert done.stderr.startswith("symfric: warning: simulate: rtol = 0.001")
     assert done.stderr.count("\n") == 1
 
 
 def test_a_defect_is_one_line_too() -> None:
-    code = "import sys, symfric.cli.app as app; app._prepare_process(); raise RuntimeError('a\\nb')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    code = "import symfric.cli.app as app; app.prepare_process(False); raise RuntimeError('a\\nb')"
+    done = run(code)
     assert done.returncode == 1
     assert done.stderr.startswith("symfric: internal error, RuntimeError: a b;")
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-def test_an_interrupt_ends_with_status_130_and_keeps_what_there_is(tmp_path: Path) -> None:
-    loaded = (
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # if ignored
-        "import symfric.cli.run, symfric.integrator.simulate; print('ready', flush=True)"
-    )
-    code = START.replace("sys.exit", f"{loaded}; sys.exit")
-    line = "run rabinowicz --law lugre --t-end 1e7 --backend vm --out part.csv --json part.json"
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, *line.split()],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
-    time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "Interrupted by the user" in err
-    assert "Traceback" not in err
-    assert '"status": "INTERRUPTED"' in (tmp_path / "part.json").read_text()
-    assert (tmp_path / "part.csv").stat().st_size > 0
+def test_an_interrupt_ends_with_status_130_and_keeps_the_results_so_far(
+    symfric, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def progress(_: str) -> Iterator[Callable[[float], None]]:
+        yield lambda fraction: signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(output, "progress", progress)
+    line = "run rabinowicz --law lugre --t-end 1e4 --backend vm --out part.csv --json part.json"
+    said = symfric(line, 130)
+    assert "Interrupted by the user" in said.err
+    assert "INTERRUPTED: see the last line" in said.out
+    assert '"status": "INTERRUPTED"' in Path("part.json").read_text()
+    assert Path("part.csv").stat().st_size > 0
+
+
+COMPLETED = {
+    "symfric ru": ["run"],
+    "symfric run rabin": ["rabinowicz"],
+    "symfric run drive --law lugre_n": ["lugre_normalised"],
+    "symfric run drive --law coulomb+visc": ["coulomb+viscous"],
+    "symfric run drive --law lagged(stri": ["lagged(stribeck"],
+    "symfric run rabinowicz --law dahl --set v_b": ["v_belt="],
+    "symfric laws gms --set fo": ["form="],
+    "symfric laws lugre --figure hyst": ["hysteresis"],
+    "symfric laws lugre --compare random_": ["random_bristles"],
+    "symfric identify a.csv --law dahl,gm": ["dahl,gms"],
+    "symfric identify a.csv --law dahl,coulomb+visc": ["dahl,coulomb+viscous"],
+    "symfric run rabinowicz --law dahl --preset jing": ["jing_mi_table_3"],
+    "symfric run pendulum_box --law dahl --law-of hi": ["hinge="],
+    "symfric run pendulum_box --law dahl --law-of hinge=gm": ["hinge=gms"],
+    "symfric ocp swing_up_of_nothing": [],
+    "symfric ocp out_": ["out_and_back"],
+    "symfric bench iv": ["ivp"],
+    "symfric select drive --need stiction,strib": ["stiction,stribeck"],
+    "symfric gallery self": ["self_tuning/"],
+    "symfric gallery no": [],
+}
+
+
+@pytest.mark.parametrize("words", COMPLETED)
+def test_words_are_completed(
+    words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_SYMFRIC_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    with pytest.raises(SystemExit, match="0"):  # the shell is answered at once
+        main([])
+    assert capsys.readouterr().out.split() == COMPLETED[words]
+
+
+def test_all_names_are_offered() -> None:
+    assert completions.laws("") == [*ALL_LAWS]
+    assert completions.scenes("") == [*ALL_SCENES]
+    assert "self_tuning/fig_07" in completions.plates("self_tuning/fig_0")
+
+
+def test_tables_align_numbers_and_stay_within_80_columns(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    output.show_table(["name", "value", "note"], [("a", 1.0, "long " * 40), ("b", 123456.0, "")])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[2].index("1") + 1 == lines[-1].index("123456") + 6
+    output.show_table(["v [m/s]"], [("[bold]x",)], title="t [s]")  # brackets are no markup
+    output.show("friction [N]")
+    out = capsys.readouterr().out
+    assert all(text in out for text in ("v [m/s]", "[bold]x", "t [s]", "friction [N]"))
+
+
+def test_without_a_terminal_no_word_is_cut_and_every_row_is_a_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    words = " ".join(f"word{k}" for k in range(40))
+    output.show_table(["name", "time per call [us]", "note"], [("a", nan, words), ("b", 2.0, "")])
+    head, rule, *rows = capsys.readouterr().out.splitlines()
+    assert "time per call [us]" in head
+    assert len(rule) > 200
+    assert [row.split()[:2] for row in rows] == [["a", "-"], ["b", "2"]]
+    assert words in rows[0]
+    assert not rows[1].endswith(" ")
+
+
+def test_columns_share_a_narrow_terminal() -> None:
+    rows = [["task", "time per call [us]"], ["words of several lengths", "1.5"]]
+    assert output.column_widths(rows, 80) == [24, 18]
+    assert output.column_widths(rows, 25) == [13, 9]
+    assert output.column_widths(rows, 5) == [7, 4]
+
+
+def test_json_docstrings_and_notes(capsys: pytest.CaptureFixture[str]) -> None:
+    output.emit_json({"a": [inf, nan, 1.5], "b": {"c": -inf}}, "-")
+    assert json.loads(capsys.readouterr().out) == {"a": [None, None, 1.5], "b": {"c": None}}
+    output.show_doc("Name.\n\n    F = a\n      + b\n\nOne\nsentence.\nLimits: none.\nSource: me.")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:5] == ["Name.", "", "    F = a", "      + b", ""]
+    assert lines[5:8] == ["One sentence.", "Limits: none.", "Source: me."]
+    output.say_written("a.csv", None, "-")
+    with output.progress("work") as tell:  # silent without a terminal
+        tell("name", 0.5)
+    assert capsys.readouterr().err == "wrote a.csv\n"
+
+
+def test_errors_of_the_system_are_sentences() -> None:
+    for file, place in (("run.npz",), " for 'run.npz'"), ((), ""):
+        told = sentence(OSError(ENOSPC, "No space left on device", *file))
+        assert told.startswith(f"expected free disk space, got none{place}; free some")
+    assert sentence(OSError(13, "Permission denied", "x.csv")) == "'x.csv': Permission denied"
+    assert "a task that fits into memory" in sentence(MemoryError())

@@ -1,213 +1,231 @@
-"""`symfric codegen`."""
+"""`symfric codegen` and `export-fmu`: laws, plants, robots, compensators, fits."""
 
+import ctypes
 import json
-import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
 
+import numpy as np
 import pytest
+from backends import needs_compiler
+from fits import make
 from robots import SMALL
 
-from symfric.cli import main
-from symfric.cli.codegen import bits, compared, show_verification
+from identification import Fit, InverseDynamics, synthetic_drive_data
+from identification.result.fitted import Fitted
+from symfric import Coulomb, Sum, Viscous
+from symfric.cli import codegen as command
+from symfric.cli.codegen import compared, show_verification
+from symfric.codegen import Block
 from symfric.codegen.verification import Check, Verification
+from symfric.embedded import Measured
 
-compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+pytestmark = needs_compiler
 
 
-@compiled
-def test_files_are_written_and_proved_equal(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["codegen", "--law", "lugre", "--out", str(tmp_path / "c"), "--json", "-"]) == 0
-    result = json.loads(capsys.readouterr().out)
-    names = {Path(file).name for file in result["files"]}
-    assert names == {path.name for path in (tmp_path / "c").iterdir()}
-    assert {"lugre_f64.c", "lugre_f64.h", "lugre_f32.c", "lugre_f32.h"} < names
+def described(name: str, folder: str = "c") -> dict[str, Any]:
+    return json.loads(Path(folder, f"{name}_manifest.json").read_text())
+
+
+def names(of: list[dict[str, Any]]) -> list[str]:
+    return [one["name"] for one in of]
+
+
+def test_files_are_written_and_verified(symfric) -> None:
+    said = symfric("codegen --law lugre --out c --step-size 0.002 --set mu_s=0.2 --json r.json")
+    head, *lines, last = said.err.splitlines()
+    result = json.loads(Path("r.json").read_text())
+    written = {path.name for path in Path("c").iterdir()}
+    assert {Path(file).name for file in result["files"]} == written
+    assert head == f"wrote {len(written)} files into c:"
+    assert set(" ".join(lines).split()) == written
+    assert max(map(len, lines)) <= 80
+    assert last == "wrote r.json"
+    assert {"lugre_f64.c", "lugre_f64.h", "lugre_f32.c", "lugre_f32.h"} < written
     double, single = result["verification"]["checks"]
     assert (double["real"], double["ulp"], double["warnings"]) == ("double", 0, [])
-    assert single["real"] == "float"
+    assert (single["real"], result["law"]) == ("float", "lugre")
     assert result["verification"]["ok"]
+    assert "lugre: verified" in said.out
+    assert "bit for bit equal" in said.out
+    assert "within rounding" in said.out
+    assert described("lugre")["constants"]["h"] == 0.002
+    assert "default 0.2" in Path("c/lugre_f64.h").read_text()
 
 
-@compiled
-def test_the_table_shows_every_type(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_parameters_are_variable_unless_folded(symfric) -> None:
+    line = "codegen --law dahl --out c --set sigma_0=12345 --real double --no-kit --free mu_d"
+    symfric(f"{line} --step-size 1")
+    assert names(described("dahl")["parameters"]) == ["mu_d"]
+    assert described("dahl")["constants"]["sigma_0"] == 12345.0
+    line = "codegen --law coulomb --fold --real float --no-guards --no-kit --name stage --out d"
+    symfric(line)
+    written = {path.name for path in Path("d").iterdir()}
+    assert written == {"stage_f32.c", "stage_f32.h", "stage_manifest.json"}
+    assert "status" not in Path("d/stage_f32.h").read_text()
+    assert described("stage", "d")["parameters"] == []
+    symfric("codegen --law gms --set form=event --out e --real double --no-kit")
+    assert "mode" in Path("e/gms_f64.h").read_text()
+    symfric("codegen --law stribeck --turning --out e --real double --no-kit")
+    assert "rad/s" in Path("e/stribeck_f64.h").read_text()
+
+
+def test_a_scene_becomes_a_plant(symfric) -> None:
+    line = "codegen --scene rabinowicz --law lugre --set k=3 --out c --free mu_s --no-kit"
+    result = json.loads(symfric(f"{line} --step-size 1e-3 --method backward_euler --json -").out)
+    manifest = result["manifest"]
+    assert names(manifest["states"]) == ["x", "v", "z"]
+    assert names(manifest["parameters"]) == ["mu_s"]
+    assert (manifest["constants"]["k"], manifest["constants"]["h"]) == (3.0, 1e-3)
+    (check,) = result["verification"]["checks"]
+    assert (check["real"], check["ulp"]) == ("double", 0)
+    assert "backward Euler" in Path("c/rabinowicz_f64.h").read_text()
+    line = "codegen --scene drive --law stribeck --set turning=true --set m=2 --no-kit --out c"
+    symfric(line)
+    assert "moving mass [kg m^2]" in Path("c/drive_f64.h").read_text()
+    assert names(described("drive")["parameters"])[:3] == ["m", "N", "offset"]
+    symfric(f"{line} --fold --step-size 1e-3")
+    assert described("drive")["parameters"] == []
+    assert described("drive")["constants"]["m"] == 2
+
+
+def test_a_step_that_is_too_long_is_refused_with_one_that_is_not(symfric) -> None:
+    line = "codegen --scene rabinowicz --law lugre --method dopri5 --no-kit --out c --step-size"
+    status = json.loads(symfric(f"{line} 0.05 --json -", 1).out)["verification"]["status"]
+    assert "steps of 0.05 s it runs away, in CasADi as in C: that step is too long, 0.0" in status
+    symfric(f"{line} {status.rsplit(', ', 1)[1].split()[0]}")
+
+
+def test_robots_become_plants_and_inverse_dynamics(symfric) -> None:
+    Path("small.urdf").write_text(SMALL)
+    symfric("codegen --scene small.urdf --law lugre --no-kit --out c --step-size 0.001")
+    assert "tau_hinge" in Path("c/small_f64.h").read_text()
+    line = "codegen small.urdf --inverse-dynamics --no-kit --out c --json -"
+    result = json.loads(symfric(f"{line} --payload arm").out)
+    assert result["law"] == "small"
+    manifest = result["manifest"]
+    assert names(manifest["inputs"]) == ["q_1", "qd_1", "qdd_1"]
+    found = names(manifest["parameters"])
+    assert found[0] == "payload_m"
+    assert {"payload_c_3", "payload_J_6", "N_1", "sigma_2_1"} < set(found)
+    assert "float small_f32" in Path("c/small_f32.h").read_text()
+    assert json.loads(symfric(f"{line} --fold").out)["manifest"]["parameters"] == []
+    line = "codegen --scene pendulum --law coulomb --set mu_d=0.3 --inverse-dynamics --out c"
+    result = json.loads(symfric(f"{line} --real double --no-kit --json -").out)
+    held = {p["name"]: p["default"] for p in result["manifest"]["parameters"]}
+    assert 0.3 in held.values()
+    assert result["law"] == "coulomb"
+
+
+def test_a_law_becomes_a_compensator_with_its_settings(symfric) -> None:
+    line = "codegen --law lugre --compensator --out c --real double --no-kit --set mu_d=0.12"
+    line += " --compensation v_blend=0.02 --compensation error_gain=20"
+    line += " --compensation scales=coulomb:0.9 --compensation without=stribeck,viscous"
+    symfric(line)
+    manifest = described("friction_compensator")
+    starts = {p["name"]: p["default"] for p in manifest["parameters"]}
+    assert starts["mu_d"] == 0.12
+    assert (starts["v_blend"], starts["k_error"], starts["scale_coulomb"]) == (0.02, 20.0, 0.9)
+    assert "scale_stribeck" not in starts
+    assert names(manifest["inputs"]) == ["v_ref", "e", "v", "enable"]
+    line = "codegen --law stribeck --compensator --fold --out c --real double --no-kit"
+    symfric(f"{line} --step-size 1e-3")
+    assert described("friction_compensator")["parameters"] == []
+    assert described("friction_compensator")["constants"]["v_blend"] == 0.01
+
+
+def test_a_compensator_of_a_fit_has_the_load_and_offset_of_its_drive(symfric) -> None:
+    data = synthetic_drive_data(Sum((Coulomb(20.0), Viscous(160.0))), speeds=(0.05, 0.1))
+    fit = Fit(InverseDynamics(), "coulomb+viscous", data, starts=1).solve(throw=False)
+    fit.to_json("fit.json")
+    symfric("codegen fit.json --compensator --out c --no-kit --real double")
+    starts = {p["name"]: p["default"] for p in described("friction_compensator")["parameters"]}
+    assert fit.drive is not None
+    assert starts["N"] == fit.drive.N
+    assert starts["offset"] == pytest.approx(fit.drive.offset) == pytest.approx(-3.0, abs=0.2)
+    assert starts["mu_d"] == pytest.approx(20.0, rel=0.02)
+
+
+def test_the_c_of_a_fit_gives_the_numbers_of_its_law(symfric) -> None:
+    make(records=1, starts=1, n=800).to_json("fit.json")
+    line = "codegen fit.json --out c --real double --no-kit"
+    assert "mu_s, mu_d: fitted as forces under a load of 1 N" in symfric(line).err
+    build = ["gcc", "-shared", "-fPIC", "-O2", "c/stribeck_f64.c", "-o", "law.so", "-lm"]
+    subprocess.run(build, check=True)
+    library = ctypes.CDLL(str(Path("law.so").resolve()))
+    force = library.stribeck_f64
+    force.restype, force.argtypes = ctypes.c_double, [ctypes.c_double] * 2 + [ctypes.c_void_p]
+    defaults = ctypes.addressof(ctypes.c_char.in_dll(library, "stribeck_f64_default"))
+    law = Fitted.from_json("fit.json").law
+    assert law is not None
+    v = np.concatenate([-np.geomspace(1e-7, 0.2, 50), [0.0], np.geomspace(1e-7, 0.2, 50)])
+    in_c = [force(x, 1.0, defaults) for x in v.tolist()]
+    np.testing.assert_allclose(in_c, np.asarray(law.force(v, 1.0)), rtol=1e-13, atol=1e-15)
+    assert abs(in_c[-1]) > 20
+    symfric("codegen fit.json --scene drive --set m=3 --set N=1 --out c --step-size 1e-3 --no-kit")
+    manifest = described("drive")
+    values = {p["name"]: p["default"] for p in manifest["parameters"]} | manifest["constants"]
+    assert (values["m"], values["mu_s"]) == (3.0, Fitted.from_json("fit.json").values["mu_s"])
+    changed = json.loads(Path("fit.json").read_text(encoding="utf-8"))
+    for status, noted in {"SOLVED": False, "DOUBTFUL": True}.items():
+        Path("f.json").write_text(json.dumps(changed | {"status": status}), encoding="utf-8")
+        err = symfric("codegen f.json --real double --no-kit --out d").err
+        assert ("f.json: status of the fit DOUBTFUL" in err) is noted
+
+
+def test_without_a_compiler_the_files_are_written_unverified(
+    symfric, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    line = f"codegen --law coulomb+viscous --out {tmp_path} --real double --name stage"
-    assert main(line.split()) == 0
-    out, err = capsys.readouterr()
-    assert max(map(len, err.splitlines()[1:])) <= 80
-    assert "stage: verified" in out
-    assert "bit for bit equal" in out
-    assert "float " not in out
-    assert max(map(len, out.splitlines())) <= 80
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    assert "no C compiler found" in symfric("codegen --law viscous --out c --no-kit", 1).out
+    assert Path("c/viscous_f64.c").is_file()
 
 
-@compiled
-def test_a_law_with_forms_has_the_one_that_is_set(tmp_path: Path) -> None:
-    line = f"codegen --law gms --set form=event --set mu_s=0.2 --out {tmp_path} --real double"
-    assert main(line.split()) == 0
-    header = (tmp_path / "gms_f64.h").read_text()
-    assert "default 0.2" in header
+def test_sizes_are_measured_on_cores(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measure(block: Block, real: str, core: str, **_: object) -> Measured:
+        if core == "m3":
+            return Measured(block.name, real, core, status="no QEMU")
+        return Measured(
+            block.name, real, core, average=12.4, maximum=15.0, text=88.0, stack=16.0, finite=True
+        )
+
+    monkeypatch.setattr(command, "measure", measure)
+    line = "codegen --law coulomb --real float --no-kit --out c --core m4f --core m3"
+    said = symfric(f"{line} --json r.json").out
+    rows = {row.split()[1]: row.split()[2:] for row in said.splitlines() if row[:5] == "float"}
+    assert rows["m4f"] == ["88", "16", "12", "15"]
+    assert rows["m3"] == ["-"] * 4
+    assert "m3: no QEMU" in said
+    assert [m["core"] for m in json.loads(Path("r.json").read_text())["cores"]] == ["m4f", "m3"]
 
 
-def test_a_float_that_differs_is_not_called_within_rounding() -> None:
+def test_the_table_shows_comparisons_and_ties(capsys: pytest.CaptureFixture[str]) -> None:
     alike = Check("float", 1, (), None, 1e-7, (), worst="F", rounding=1e-7)
     assert compared(alike) == "within rounding"
     assert compared(replace(alike, error=1e-2)) == "differs"
     assert compared(replace(alike, ulp=0, error=0.0)) == "bit for bit equal"
-
-
-def test_set_parameters_and_a_fixed_step_become_constants(tmp_path: Path) -> None:
-    line = f"codegen --law dahl --out {tmp_path} --set sigma_0=12345 --step-size 0.002"
-    assert main(f"{line} --free mu_d --real double".split()) == 0
-    manifest = json.loads((tmp_path / "dahl_manifest.json").read_text())
-    assert [p["name"] for p in manifest["parameters"]] == ["mu_d"]
-    assert manifest["constants"]["sigma_0"] == 12345.0
-
-
-def test_without_a_compiler_the_files_are_written_and_the_status_says_not_verified(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.delenv("CC", raising=False)
-    assert main(["codegen", "--law", "viscous", "--out", str(tmp_path / "c")]) == 1
-    assert "no C compiler found" in capsys.readouterr().out
-    assert (tmp_path / "c" / "viscous_f64.c").is_file()
-
-
-@pytest.mark.parametrize(
-    ("ulp", "words"), [(None, "within rounding"), (0, "bit for bit equal"), (3, "3 ulp apart")]
-)
-def test_distance_in_words(ulp: int | None, words: str) -> None:
-    assert bits(ulp) == words
-
-
-@compiled
-def test_what_a_plant_is_made_of_is_set_beside_its_numbers(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    line = f"codegen --scene drive --law stribeck --no-kit --out {tmp_path} --set m=2"
-    assert main([*line.split(), "--set", "turning=true"]) == 0
-    assert "moving mass [kg m^2]" in (tmp_path / "drive_f64.h").read_text()
-    assert main([*line.split(), "--set", "turning=yes"]) == 2
-    assert "--set turning: expected one of true, false" in capsys.readouterr().err
-
-
-def test_scene_becomes_a_plant(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = f"codegen --scene rabinowicz --law lugre --set k=3 --out {tmp_path} --free mu_s"
-    assert main(f"{line} --step-size 1e-3 --method backward_euler --json -".split()) == 0
-    result = json.loads(capsys.readouterr().out)
-    manifest = result["manifest"]
-    assert [state["name"] for state in manifest["states"]] == ["x", "v", "z"]
-    assert [p["name"] for p in manifest["parameters"]] == ["mu_s"]
-    assert (manifest["constants"]["k"], manifest["constants"]["h"]) == (3.0, 1e-3)
-    (check,) = result["verification"]["checks"]
-    assert (check["real"], check["ulp"]) == ("double", 0)
-    assert "backward Euler" in (tmp_path / "rabinowicz_f64.h").read_text()
-
-
-def test_all_parameters_of_a_plant_are_variable_by_default_and_none_when_folded(
-    tmp_path: Path,
-) -> None:
-    line = f"codegen --scene drive --law brown_mcphee --no-kit --out {tmp_path} --step-size 1e-3"
-    assert main(line.split()) == 0
-    manifest = json.loads((tmp_path / "drive_manifest.json").read_text())
-    assert [p["name"] for p in manifest["parameters"]] == [
-        "m",
-        "N",
-        "offset",
-        "mu_s",
-        "mu_d",
-        "v_t",
-    ]
-    assert manifest["constants"] == {"mu_v": 0.0, "h": 1e-3}
-    assert main([*line.split(), "--fold"]) == 0
-    manifest = json.loads((tmp_path / "drive_manifest.json").read_text())
-    assert manifest["parameters"] == []
-    assert manifest["constants"]["m"] == 0.8
-
-
-def test_guards_and_kit_are_left_out_on_request(tmp_path: Path) -> None:
-    line = f"codegen --law coulomb --real float --no-guards --no-kit --out {tmp_path}"
-    assert main(line.split()) == 0
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"coulomb_f32.c", "coulomb_f32.h", "coulomb_manifest.json"}
-    assert "status" not in (tmp_path / "coulomb_f32.h").read_text()
-
-
-@pytest.mark.parametrize(
-    ("options", "messages"),
-    [
-        (
-            "--law lugre --method rodas3 --payload tool",
-            ["--method: expected", "--payload: expected"],
-        ),
-        ("--law lugre --fold --free mu_s", ["--free, --fold: expected one of them, got both"]),
-        ("--law coulomb --step-size 1e-3", ["--step-size: expected", "got a law without states"]),
-        ("--law coulomb --step-size 1e-3 --method rodas3", ["--step-size: ", "--method: "]),
-        ("--law random_bristles --fold --turning", ["--fold: ", "--turning: ", "a population"]),
-        ("--law lugre --scene drive --turning", ["--turning: ", "got --scene, which defines"]),
-        ("--law lugre --core m9", ["--core: expected one of m0plus, m3, m4f, m7, got m9"]),
-        ("robot.urdf --inverse-dynamics --free a --fold", ["--free: ", "--fold: ", "one of them"]),
-    ],
-)
-def test_options_that_do_not_apply_are_refused_all_at_once(
-    options: str, messages: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(f"codegen {options} --out {tmp_path / 'c'}".split()) == 2
-    error = capsys.readouterr().err
-    assert all(message in error for message in messages)
-    assert error.count("\n") == 1
-    assert not (tmp_path / "c").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--method rodas3", "--method: expected with --scene only"),
-        ("--scene belt", "--scene: expected one of rabinowicz, drive"),
-        ("--scene drive --method euler", "expected one of auto, rodas5p"),
-        ("--scene drive --set v_belt=1", "v_belt"),
-    ],
-)
-def test_bad_plants_are_refused_in_one_sentence(
-    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(f"codegen --law lugre --out {tmp_path} {options}".split()) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert "Traceback" not in error
-
-
-def test_robot_of_a_file_is_a_plant(tmp_path: Path) -> None:
-    path = tmp_path / "small.urdf"
-    path.write_text(SMALL)
-    line = f"codegen --scene {path} --law lugre --out {tmp_path} --step-size 0.001"
-    assert main(line.split()) == 0
-    assert "tau_hinge" in (tmp_path / "small_f64.h").read_text()
-
-
-@compiled
-def test_a_step_that_is_too_long_is_named_with_one_that_is_not(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    line = f"codegen --scene rabinowicz --law lugre --method dopri5 --out {tmp_path}"
-    assert main(f"{line} --step-size 0.05 --json -".split()) == 1
-    status = json.loads(capsys.readouterr().out)["verification"]["status"]
-    assert "steps of 0.05 s it runs away, in CasADi as in C: that step is too long, 0.0" in status
-    shorter = status.rsplit(", ", 1)[1].split()[0]
-    assert main(f"{line} --step-size {shorter}".split()) == 0
-
-
-def test_ties_are_told_where_there_are_some(capsys):
-    checks = (
-        Check("double", 28000, (), 0, 0.0, ()),
-        Check("float", 28000, (), None, 0.0, (), ties=3),
-    )
+    assert compared(replace(alike, ulp=3, error=0.0)) == "3 ulp apart"
+    double = Check("double", 28000, (), 0, 0.0, ())
+    checks = double, Check("float", 28000, (), None, 0.0, (), ties=3)
     show_verification(Verification("springs", "verified", "gcc", checks))
     said = " ".join(capsys.readouterr().out.split())
     assert said.count("rounding decides") == 1
     assert "float: in 3 of 28000 steps rounding decides a mode, in CasADi as in C" in said
+
+
+def test_a_scene_or_a_model_of_a_file_becomes_a_unit(symfric, mine) -> None:
+    line = "export-fmu drive --law brown_mcphee --set m=2 --free m --fmi 2 --out drive.fmu --json -"
+    result = json.loads(symfric(line).out)
+    assert (result["fmi"], result["file"]) == (2, "drive.fmu")
+    tunable = {n for n, v in result["variables"].items() if v["causality"] == "parameter"}
+    assert tunable == {"m", "rtol"}
+    assert {"modelDescription.xml", "sources/all.c"} <= set(ZipFile("drive.fmu").namelist())
+    Path("drive.fmu").unlink()
+    said = symfric("export-fmu mine.py --set m=3")
+    assert "FMI 3.0 co-simulation" in said.out
+    assert said.err == "wrote drive.fmu\n"
+    assert Path("drive.fmu").is_file()

@@ -10,196 +10,128 @@ import pytest
 from identification.data.dataset import Dataset
 from identification.data.synthetic import synthetic_drive_data
 from identification.result.fitted import Fitted
-from symfric import Coulomb, Sum, Viscous
-from symfric.cli import main
+from identification.unknowns.spec import above, linear, log, tied
+from symfric import Coulomb, SolveError, Sum, Viscous
+from symfric.cli.identify import free_in, refuse
 
 TRUTH = {"m": 40.0, "offset": 2.0, "mu_d": 15.0, "sigma_2": 80.0}
+LINE = "identify one.csv --law coulomb+viscous --starts 1"
 
 
-def record(seed: int) -> Dataset:
+@pytest.fixture(scope="session")
+def made() -> list[Dataset]:
     law = Sum((Coulomb(mu_d=TRUTH["mu_d"], v_eps=1e-4), Viscous(sigma_2=TRUTH["sigma_2"])))
-    speeds = (0.02, 0.1)
-    return synthetic_drive_data(law, m=TRUTH["m"], offset=TRUTH["offset"], speeds=speeds, seed=seed)
+    how: dict[str, Any] = {"m": TRUTH["m"], "offset": TRUTH["offset"], "speeds": (0.02, 0.1)}
+    return [synthetic_drive_data(law, **how, seed=seed) for seed in (1, 2)]
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("records")
-    for k, name in enumerate(("one", "two"), start=1):
-        record(k).to_csv(path / f"{name}.csv")
-    points(path / "points.csv")
-    return path
-
-
-def points(path: Path) -> None:
-    """A friction curve in mm/s and kN, headed by names that nobody knows."""
+@pytest.fixture(autouse=True)
+def records(made: list[Dataset], symfric) -> None:
+    """Two records, and a friction curve in mm/s and kN under other names."""
+    for name, record in zip(("one", "two"), made, strict=True):
+        record.to_csv(f"{name}.csv")
     rng = np.random.default_rng(0)
     v = np.concatenate([-np.geomspace(1, 200, 30), np.geomspace(1, 200, 30)])
     F = 3.0 + np.sign(v) * 15.0 + 0.08 * v + 0.1 * rng.standard_normal(v.size)
     lines = [f"{a},{b / 1e3}" for a, b in zip(v.tolist(), F.tolist(), strict=True)]
-    path.write_text("\n".join(["speed,load", *lines]) + "\n")
+    Path("points.csv").write_text("\n".join(["speed,load", *lines]) + "\n")
 
 
-def found(
-    folder: Path, capsys: pytest.CaptureFixture[str], law: str, *arguments: str
-) -> dict[str, Any]:
-    assert main(["identify", str(folder / "one.csv"), "--law", law, *arguments, "--json", "-"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    return json.loads(out)
-
-
-def test_empty_cells_and_a_pause_are_read_on_request(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = (folder / "one.csv").read_text().splitlines()
+def test_empty_cells_and_a_pause_are_read_on_request(symfric) -> None:
+    rows = Path("one.csv").read_text().splitlines()
     rows[50] = rows[50].split(",")[0] + ",,"
     half = len(rows) // 2
     del rows[half : half + 30]
-    (tmp_path / "one.csv").write_text("\n".join(rows) + "\n")
-    assert main(["identify", str(tmp_path / "one.csv"), "--law", "coulomb+viscous"]) == 2
-    assert "--missing drop" in capsys.readouterr().err
-    result = found(tmp_path, capsys, "coulomb+viscous", "--missing", "drop", "--resample")
-    assert len(result["records"]) == 2
+    Path("one.csv").write_text("\n".join(rows) + "\n")
+    assert "--missing drop" in symfric(LINE, 2).err
+    assert len(symfric(f"{LINE} --missing drop --resample --json -").json["records"]) == 2
 
 
-def test_json_holds_the_true_values_inside_their_intervals(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    result = found(folder, capsys, "coulomb+viscous", "--validate", str(folder / "two.csv"))
-    assert result["law"] == "coulomb+viscous"
+def test_the_true_values_are_inside_their_intervals_and_files_are_written(symfric) -> None:
+    files = "--html r.html --plot r.png --json r.json"
+    said = symfric(f"{LINE} --validate two.csv --profile mu_d {files}")
+    result = json.loads(Path("r.json").read_text())
     for name, value in TRUTH.items():
         estimate = result["parameters"][name]
-        assert estimate["standard_error"] > 0
-        assert abs(estimate["value"] - value) < 4 * estimate["standard_error"]
+        assert 0 < abs(estimate["value"] - value) < 4 * estimate["standard_error"]
     assert result["parameters"]["sigma_2"]["unit"] == "N s/m"
     assert list(result["errors"]) == ["one.csv"]
     assert result["validation"]["two.csv"]["force"]["relative"] < 5.0
-
-
-def test_several_records_are_fitted_together_and_parameters_can_be_held(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    both = [str(folder / "two.csv"), "--fix", "offset=1.5", "--starts", "1"]
-    result = found(folder, capsys, "coulomb+viscous", *both)
-    assert result["parameters"]["offset"]["value"] == 1.5
-    assert result["parameters"]["offset"]["fixed"]
-    assert list(result["errors"]) == ["one.csv", "two.csv"]
-    assert result["validation"] is None
-
-
-def test_points_of_a_curve_with_columns_and_units_of_the_call(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    line = [
-        "identify", str(folder / "points.csv"), "--law", "coulomb+viscous", "--kind", "points",
-        "--column", "v=speed", "--column", "F=load", "--unit", "v=mm/s", "--unit", "F=kN",
-        "--free", "offset", "--json", "-",
-    ]  # fmt: skip
-    assert main(line) == 0
-    parameters = json.loads(capsys.readouterr().out)["parameters"]
-    assert parameters["mu_d"]["value"] == pytest.approx(15.0, abs=0.1)
-    assert parameters["sigma_2"]["value"] == pytest.approx(80.0, abs=1.0)
-    assert parameters["offset"]["value"] == pytest.approx(3.0, abs=0.1)
-
-
-def test_the_text_fits_80_columns_and_files_are_written(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    page, picture, numbers = (tmp_path / f"r.{kind}" for kind in ("html", "png", "json"))
-    line = ["--law", "coulomb+viscous", "--html", str(page), "--plot", str(picture)]
-    line += ["--json", str(numbers), "--profile", "mu_d"]
-    assert main(["identify", str(folder / "one.csv"), *line]) == 0
-    out, err = capsys.readouterr()
-    assert max(map(len, out.splitlines())) <= 80
-    assert out.startswith("coulomb+viscous fitted by InverseDynamics(): ")
-    assert "mu_d: 1" in out.splitlines()[-1]
-    assert err == f"wrote {page}, {picture}, {numbers}\n"
-    assert "<h1>coulomb+viscous</h1>" in page.read_text()
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    back = Fitted.from_json(numbers)
-    assert str(back) in out
-    assert json.loads(numbers.read_text())["profiles"][0]["name"] == "mu_d"
+    assert said.out.startswith("coulomb+viscous fitted by InverseDynamics(): ")
+    assert "mu_d: 1" in said.out.splitlines()[-1]
+    assert said.err == "wrote r.html, r.png, r.json\n"
+    assert "<h1>coulomb+viscous</h1>" in Path("r.html").read_text()
+    assert Path("r.png").read_bytes().startswith(b"\x89PNG")
+    back = Fitted.from_json("r.json")
+    assert str(back) in said.out
+    assert result["profiles"][0]["name"] == "mu_d"
     assert back.drive is not None
     assert float(back.drive.m) == back.values["m"]
 
 
-def test_several_laws_are_ranked_and_the_best_one_is_told(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    line = [
-        "identify",
-        str(folder / "one.csv"),
-        "--law",
-        "viscous,coulomb+viscous",
-        "--starts",
-        "1",
-    ]
-    line += ["--validate", str(folder / "two.csv"), "--html", str(tmp_path / "r.html")]
-    assert main([*line, "--json", str(tmp_path / "r.json")]) == 0
-    out, _ = capsys.readouterr()
-    assert max(map(len, out.splitlines())) <= 80
+def test_records_are_fitted_together_and_parameters_can_be_held(symfric) -> None:
+    result = symfric(f"{LINE} two.csv --fix offset=1.5 --json -").json
+    offset = result["parameters"]["offset"]
+    assert (offset["value"], offset["fixed"]) == (1.5, True)
+    assert list(result["errors"]) == ["one.csv", "two.csv"]
+    assert result["validation"] is None
+
+
+def test_points_of_a_curve_with_columns_and_units_of_the_call(symfric) -> None:
+    line = "identify points.csv --law coulomb+viscous --kind points --free offset --json -"
+    named = symfric(f"{line} --column v=speed --column F=load --unit v=mm/s --unit F=kN").json
+    for columns in ("--column v,F --unit 'mm/s, kN'",):
+        assert symfric(f"{line} {columns}").json["parameters"] == named["parameters"]
+    values = {name: p["value"] for name, p in named["parameters"].items()}
+    for name, value in {"mu_d": 15.0, "sigma_2": 80.0, "offset": 3.0}.items():
+        assert values[name] == pytest.approx(value, abs=1.0 if name == "sigma_2" else 0.1)
+
+
+def test_several_laws_are_ranked_and_the_best_one_is_shown(symfric) -> None:
+    line = "identify one.csv --law viscous,coulomb+viscous --starts 1 --validate two.csv"
+    out = symfric(f"{line} --html r.html --json r.json").out
     assert [row.split()[0] for row in out.splitlines()[2:4]] == ["coulomb+viscous", "viscous"]
     assert "coulomb+viscous fitted by" in out
-    assert "Ranking of laws" in (tmp_path / "r.html").read_text()
-    stored = json.loads((tmp_path / "r.json").read_text())
+    assert "Ranking of laws" in Path("r.html").read_text()
+    stored = json.loads(Path("r.json").read_text())
     assert [row["law"] for row in stored["ranking"]["rows"]] == ["coulomb+viscous", "viscous"]
-    assert Fitted.from_json(tmp_path / "r.json").name == "coulomb+viscous"
+    assert Fitted.from_json("r.json").name == "coulomb+viscous"
 
 
-def test_no_physics_is_an_error_and_everything_is_written_all_the_same(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    good = record(1)[0]
+def test_an_implausible_fit_is_an_error_and_everything_is_written(symfric, made) -> None:
+    good = made[0][0]
     flipped = Dataset.of(t=good.time, x=good["x"], force=-good["force"], name="flipped")
-    flipped.to_csv(tmp_path / "flipped.csv")
-    page = tmp_path / "r.html"
-    line = ["identify", str(tmp_path / "flipped.csv"), "--law", "coulomb+viscous"]
-    assert main([*line, "--html", str(page)]) == 1
-    out, err = capsys.readouterr()
-    assert out.startswith("coulomb+viscous fitted by InverseDynamics(): IMPLAUSIBLE")
-    assert err.splitlines()[-1].startswith("symfric: identify coulomb+viscous: implausible: ")
-    assert 'class="verdict bad"' in page.read_text()
-
-
-def test_where_nothing_can_be_fitted_the_data_are_the_reason(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    good = record(1)[0]
+    flipped.to_csv("one.csv")
+    said = symfric(f"{LINE} --html r.html", 1)
+    assert said.out.startswith("coulomb+viscous fitted by InverseDynamics(): IMPLAUSIBLE")
+    reason = said.err.splitlines()[-1]
+    assert reason.startswith("symfric: identify coulomb+viscous: implausible: ")
+    assert 'class="verdict bad"' in Path("r.html").read_text()
     swapped = Dataset.of(t=good.time, x=1e-3 * good["force"], force=1e3 * good["x"], name="swapped")
-    swapped.to_csv(tmp_path / "swapped.csv")
-    line = ["identify", str(tmp_path / "swapped.csv"), "--law", "coulomb+viscous"]
-    assert main([*line, "--json", str(tmp_path / "fit.json")]) != 0
-    out, err = capsys.readouterr()
-    assert "columns are exchanged" in " ".join((out + err).split())
-    assert err.splitlines()[-1].startswith("symfric: ")
+    swapped.to_csv("one.csv")
+    said = symfric(f"{LINE} --json fit.json", 1)
+    assert "columns are exchanged" in " ".join((said.out + said.err).split())
+    assert said.err.splitlines()[-1].startswith("symfric: ")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--law", "coulomb", "--fix", "mu=1"], "mu_d"),
-        (["--law", "coulomb", "--column", "y=z"], "z"),
-        (["--law", "coulomb", "--column", "y=z", "--column", "t,x"], "got both"),
-        (["--law", "coulomb,coulomb"], "every law once"),
-        (["--law", "coulomb", "--kind", "points2"], "--kind"),
-        (["--law", "coulomb", "--windows", "2"], "--kind shooting only"),
-        (["--law", "coulomb", "--free", "mu_d=log(1)"], "log(lower, upper)"),
-        (["--law", "coulomb", "--free", "mu_d=around(1)"], "expected one of log"),
-        (["--law", "coulomb", "--free", "mu_d=2:1"], "lower < upper"),
-        (["--law", "coulomb", "--kind", "points", "--free", "offset=1"], "--free offset"),
-        (["--law", "coulomb", "--loss", "cube"], "loss"),
-        (["--law", "coulomb", "--starts", "0"], "starts"),
-        (["--law", "coulomb", "--workers", "0"], "--workers"),
-        (["--law", "coulomb", "--noise", "x=1"], "force"),
-        (["--law", "coulomb", "--profile", "v_eps"], "profile"),
-    ],
-)
-def test_bad_requests_are_one_sentence(
-    folder: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["identify", str(folder / "one.csv"), *arguments]) == 2
-    out, err = capsys.readouterr()
-    assert message in err
-    assert err.count("\n") == 1
-    assert out == ""
+def test_failed_validation_and_profiles_are_errors(symfric, made) -> None:
+    good = made[0][0]
+    Dataset.of(t=good.time, x=-good["x"], force=good["force"], name="bad").to_csv("bad.csv")
+    said = symfric(f"{LINE} --validate bad.csv", 1)
+    assert "fitted by" in said.out
+    assert "--validate: " in said.err
+    fit = Fitted.from_json(Path(symfric(f"{LINE} --json f.json").err.split()[-1]))
+    refuse(fit, None, ())
+    with pytest.raises(SolveError, match="no profile; no data"):
+        refuse(fit, None, ["no profile", "no data"])
+
+
+def test_free_parameters_have_the_specifications_of_python() -> None:
+    texts = ["a", "b=1.5", "c=0:2", "d=:2", "e=-1:", "f=log(1,2)", "g=linear(0, 2, 1)",
+             "h=above(a)", "i=tied(a, 1.2)", "x0=rest", "dead_time=0:1e-3"]  # fmt: skip
+    inf = float("inf")
+    assert free_in(texts) == {
+        "a": None, "b": 1.5, "c": (0, 2), "d": (-inf, 2), "e": (-1, inf), "f": log(1, 2),
+        "g": linear(0, 2, 1), "h": above("a"), "i": tied("a", 1.2), "x0": "rest",
+        "dead_time": (0, 1e-3),
+    }  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 
 from symfric import Dahl, LuGre, law_from_text
 from symfric.figures import break_away
-from symfric.figures.data import scales
+from symfric.figures.motion import scales
 
 
 def test_break_away_of_lugre_falls_with_the_rate_as_computed_independently() -> None:

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 
 from symfric import LuGre, simulate
-from symfric.figures.motion import fine, prescribed, pushed, slide, through
+from symfric.figures.motion import fine, prescribed, pushed, slides, through
 from symfric.laws import Karnopp
 
 
 @pytest.mark.parametrize("pace", [1.0, 5.0])
 def test_the_contact_passes_every_turning_point(pace: float) -> None:
     points = (0.0, 2e-5, -1e-5, 3e-5)
-    model = prescribed(LuGre(), 1.0, through(points, 0.5))
-    curve = slide(model, LuGre(), "", np.linspace(0.0, 1.5 / pace, 4), pace)
+    curve = slides(LuGre(), 1.0, through(points, 0.5))("", np.linspace(0.0, 1.5 / pace, 4), pace)
     assert curve["x"] == pytest.approx(points, abs=1e-10)
     assert curve["v"] == pytest.approx(np.zeros(4), abs=1e-10)
 

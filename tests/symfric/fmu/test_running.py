@@ -6,6 +6,7 @@ from backends import needs_compiler
 
 from symfric import BrownMcPhee
 from symfric.bench import codegen_runs
+from symfric.bench.report import GOALS, Report
 from symfric.fmu import export_fmu
 from symfric.fmu.export import running
 from symfric.scenes import ALL_SCENES, Drive
@@ -38,12 +39,13 @@ def test_sources_alone_cannot_be_run(tmp_path, monkeypatch):
 def test_the_table_has_a_row_for_what_simulate_finishes_and_goals_are_met(monkeypatch):
     monkeypatch.setattr(codegen_runs, "QUICK", ("drive",))
     monkeypatch.setattr(ALL_SCENES["drive"], "t_end", 0.5)
-    section = codegen_runs.units(quick=True)
-    assert len(section.rows) == len(codegen_runs.LAWS)
-    assert all(goal.met for goal in section.goals)
-    assert all(row[-2] < 0.1 for row in section.rows)  # attempts of a tiny communication step
+    measured = Report().collect({"fmu": lambda: codegen_runs.units(quick=True)}).tables
+    assert len(measured[codegen_runs.UNITS]) == len(codegen_runs.LAWS)
+    assert all(goal["met"] == "yes" for goal in measured[GOALS])
+    tiny = f"attempts per step of {codegen_runs.TINY:g} s"
+    assert all(row[tiny] < 0.1 for row in measured[codegen_runs.UNITS])
 
 
 def test_without_a_compiler_there_are_no_rows(monkeypatch):
     monkeypatch.setattr(codegen_runs, "find_compiler", lambda: None)
-    assert "no C compiler" in codegen_runs.units(quick=True).notes[0]
+    assert "no C compiler" in next(codegen_runs.units(quick=True))

@@ -22,9 +22,6 @@ SELECTION, TUNING = "symfric/gallery/selection/", "symfric/gallery/self_tuning/"
 
 TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("symfric/gallery/selection/tables.py", "PRINTED", ("selection/fig_02", "selection/fig_07")),
-    ("symfric/scenes/jing_mi.py", "BELT", BELT),
-    ("symfric/scenes/jing_mi.py", "BOX", BOX),
-    ("symfric/scenes/jing_mi.py", "HINGE", BOX),
     (SELECTION + "box.py", "M_BOX", ("selection/fig_06", "selection/fig_08")),
     (SELECTION + "box.py", "FLOOR", ("selection/fig_06", "selection/fig_08")),
     (SELECTION + "belt.py", "M", BELT),
@@ -32,7 +29,6 @@ TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         ("symfric/gallery/generalized_maxwell_slip/laws.py", name, GMS)
         for name in ("F_S", "SIGMA_0", "DELTA_L", "ELEMENTS", "LIFE", "PERIOD")
     ),
-    *(("symfric/scenes/rigs.py", name, GMS) for name in ("_CURVE", "_BRISTLE", "_LEVELS")),
     ("symfric/gallery/quarter_car_friction/rig.py", "M_B", CAR),
     ("symfric/gallery/quarter_car_friction/rig.py", "THETA", CAR),
     ("symfric/gallery/quarter_car_friction/rig.py", "RESIDUAL", CAR),
@@ -63,7 +59,7 @@ LAWS = {
     "static/applied_force": ("Karnopp Awrejcewicz", BELT),
     "static/smooth_peak": ("BrownMcPhee", FOUR),
     "static/self_tuning": ("SelfTuning BrittleSelfTuning", ("self_tuning/fig_07", "self_tuning")),
-    "static/quarter_car": ("QuarterCarGeneral QuarterCarSimple", CAR),
+    "static/machines": ("QuarterCarGeneral QuarterCarSimple", CAR),
     "static/exponential": ("SteadyStateLuGre", NIPS),
     "dynamic/dahl": ("Dahl", GMS + BELT),
     "dynamic/lugre": ("LuGre ElastoPlastic", GMS + BELT),

@@ -36,16 +36,16 @@ def power_of(
     m = chain(reverse)
     made = m.prepare(formulation=formulation)
     q, qd = (made.q0, made.qd0) if formulation == "absolute" else state(made)
-    kin, joints = made.eq.kin, {j.name: j for j in m.joints}
+    kin = made.eq.kin
     total = ca.SX(0)
-    for load in force.loads(kin, joints):
+    for load in force.loads(kin):
         if isinstance(load, Load):
             total += load.power(kin)
         else:
             assert isinstance(load, Axial)
             total += load.value * kin.rate(load.joint, load.direction)
-    energy = force.energy(kin, joints)
-    turns = kin.turns.found if kin.turns else ()
+    energy = force.energy(kin)
+    turns = kin.turns.values() if kin.turns else ()
     rate = ca.jtimes(energy, kin.q, kin.qd)
     rate += sum(ca.jtimes(energy, turn.angle.symbol, turn.rate) for turn in turns)
     both = ca.substitute(
@@ -72,9 +72,8 @@ def test_both_formulations_see_the_same_power(name: str) -> None:
 def power_at_start(force: Force) -> float:
     m = chain()
     made = m.prepare()
-    joints = {j.name: j for j in m.joints}
     total = ca.SX(0)
-    for load in force.loads(made.eq.kin, joints):
+    for load in force.loads(made.eq.kin):
         if isinstance(load, Load):
             total += load.power(made.eq.kin)
         else:
@@ -109,7 +108,7 @@ def test_absent_terms_cost_nothing() -> None:
         m = chain(gravity=0.0)
         made = m.prepare()
         topology = made.eq.kin.topology
-        eq = equations(topology, m.joints, [force], [], made.eq.q, made.eq.qd, made.eq.kin.t)
+        eq = equations(topology, [force], [], made.eq.q, made.eq.qd, made.eq.kin.t)
         return ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance]).n_instructions()
 
     linear, spring, damped = (

@@ -19,7 +19,7 @@ from symfric.multibody import (
     Prismatic,
     Revolute,
 )
-from symfric.multibody.checks import following
+from symfric.multibody.start import following
 
 LAW = BrownMcPhee()
 

@@ -15,7 +15,6 @@ from symfric.multibody.spatial import (
     rotation_y,
     rotation_z,
     skew,
-    turned,
 )
 
 
@@ -77,14 +76,6 @@ def test_rates_of_euler_parameters_give_both_angular_velocities() -> None:
     R = full(rotation(p))
     assert full(skew(2 * euler_e(p) @ pd)) @ R == pytest.approx(R_dot)
     assert R @ full(skew(2 * euler_g(p) @ pd)) == pytest.approx(R_dot)
-
-
-def test_b_is_the_derivative_of_a_turned_vector() -> None:
-    p, a = ca.SX.sym("p", 4), ca.SX(np.random.default_rng(2).normal(size=3))
-    values = np.random.default_rng(3).normal(size=4)  # also off the unit sphere
-    both = [turned(p, a), ca.jacobian(rotation(p) @ a, p)]
-    ours, expected = ca.Function("B", [p], both).call([values])
-    assert ours.full() == pytest.approx(expected.full())
 
 
 def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:

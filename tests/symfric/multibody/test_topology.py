@@ -64,7 +64,7 @@ def test_what_hangs_on_a_rod_alone_is_left_out() -> None:
 
 def test_absolute_coordinates_cut_every_joint() -> None:
     joints = Revolute("1", GROUND, "a"), Revolute("2", "a", "b")
-    topology = absolute(BODIES, joints, ["a", "b"])
+    topology = absolute(BODIES, joints, {"a": (), "b": ()})
     assert topology.n == 14
     assert [j.name for j in topology.loops] == ["1", "2"]
     assert [link.rows for link in topology.links] == [slice(0, 7), slice(7, 14)]

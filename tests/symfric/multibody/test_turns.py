@@ -6,7 +6,7 @@ import pytest
 
 from symfric import simulate
 from symfric.multibody import JointSpringDamper, Mechanism, Revolute, UserForce, functions
-from symfric.multibody.kinematics import Moved, Turns
+from symfric.multibody.kinematics import constant_slopes
 
 
 def drill(loop: bool, start: float, stiffness: float = 473.0) -> Mechanism:
@@ -97,9 +97,6 @@ def test_a_string_starts_as_wound_up_as_the_joints_of_its_loop_are(formulation: 
 
 
 def test_in_space_the_start_of_a_joint_says_which_of_the_turns_is_meant() -> None:
-    moved = Moved(*(ca.SX.sym(name, 2) for name in ("q", "qd", "start")))
-    assert moved.turned(ca.dot(ca.DM([2.0, -1.0]), moved.qd)) is not None
-    assert moved.turned(moved.q[0] * moved.qd[1]) is None
-    turns, angle = Turns(), ca.SX(0.5)
-    turns(Revolute("a", "ground", "b", start=12.0), "turn", angle, moved.q[0] * moved.qd[1], moved)
-    assert float(turns.found[0].angle.start) == pytest.approx(0.5 + 4 * np.pi)
+    q, qd = ca.SX.sym("q", 2), ca.SX.sym("qd", 2)
+    assert str(constant_slopes(ca.dot(ca.DM([2.0, -1.0]), qd), qd)) == "[[2, -1]]"
+    assert constant_slopes(q[0] * qd[1], qd) is None

@@ -19,7 +19,7 @@ from symfric import (
     parameters,
     rabinowicz,
 )
-from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene, friction_states
+from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene
 from symfric.scenes.rigs import ANY
 
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
@@ -101,15 +101,6 @@ def test_what_is_not_a_law_is_refused(kind: type[Scene], law: object, got: str) 
 def test_bad_parameters_are_refused_by_name(call: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()  # type: ignore[operator]
-
-
-def test_friction_states_start_in_steady_sliding_at_the_given_velocity() -> None:
-    v = ca.SX.sym("v")
-    (bristle,), column = friction_states(LuGre(v_eps=0.0), v, 5.0)
-    assert (bristle.name, bristle.unit) == ("z", "m")
-    assert column.shape == (1, 1)
-    start = ca.Function("start", [v], [bristle.start])
-    assert float(start(-0.3)) == pytest.approx(-0.5 / 1e5)
 
 
 @each_scene

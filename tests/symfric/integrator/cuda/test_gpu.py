@@ -11,7 +11,8 @@ import pytest
 from device_cases import CASES
 
 from symfric import BrownMcPhee, LuGre, rabinowicz, simulate_many
-from symfric.bench.ensemble import measure_cuda, on_graphics_processor
+from symfric.bench.ensemble import cuda
+from symfric.bench.report import Report
 from symfric.cli.campaigns import show
 from symfric.integrator.cuda.device import CupyDevice, DeviceError
 
@@ -56,8 +57,9 @@ def test_single_precision_meets_its_tolerance(law: object) -> None:
 
 @pytest.mark.slow
 def test_a_million_members(capsys: pytest.CaptureFixture[str]) -> None:
-    rows = measure_cuda()
+    measured = Report().collect({"cuda": cuda})
     with capsys.disabled():
-        show(on_graphics_processor(rows))
-    for row in rows:
-        assert row.difference < (1e-4 if row.real == "double" else 1e-2)
+        show(measured.shown())
+    for row in measured.tables["Ensembles on a graphics processor and on all cores"]:
+        limit = 1e-4 if row["type"] == "double" else 1e-2
+        assert row["relative difference at the end"] < limit

@@ -26,7 +26,7 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.integrator.derivatives import together as module
+from symfric.integrator.derivatives import saltation as module
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import seeds
 from symfric.integrator.equations.inputs import input_data
@@ -158,7 +158,7 @@ def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
 def test_many_events_at_once_are_those_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     names = [v.name for v in CASES["gms_drive"][0].p]
     together = run_of("gms_drive", {}, sensitivities=names)
-    monkeypatch.setattr(module, "_is_usual", lambda *_: False)  # pyright: ignore[reportUnknownLambdaType]
+    monkeypatch.setattr(module, "_is_single", lambda *_: False)  # pyright: ignore[reportUnknownLambdaType]
     alone = run_of("gms_drive", {}, sensitivities=names)
     for name in names:
         assert together.sensitivities[name]["x"] == pytest.approx(

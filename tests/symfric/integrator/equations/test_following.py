@@ -10,10 +10,10 @@ from backends import needs_compiler
 from closed_forms import assemble
 from numpy.typing import NDArray
 
-import symfric.integrator.equations.following as module
+import symfric.integrator.equations.blocks as module
 from symfric import BrownMcPhee, Model, Variable, Viscous
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.following import Following, following
+from symfric.integrator.equations.blocks import Following, following
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.system import System
 from symfric.scenes import Pendulum, PendulumBox, SliderCrank

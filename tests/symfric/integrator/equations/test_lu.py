@@ -33,7 +33,7 @@ def solver(values: Array, safe: tuple[int, ...] = ()) -> tuple[SymbolicLU, ca.Fu
     A, b = symbols(values), ca.SX.sym("b", values.shape[0])
     lu = factorise(A, [safe])
     factor = ca.Function("factor", [A], [lu.packed])
-    solve = ca.Function("solve", [lu.packed_symbol, b], [lu.solve(b)])
+    solve = ca.Function("solve", [lu.symbols, b], [lu.solve(b)])
     return lu, ca.Function("both", [A, b], [solve(factor(A), b)])
 
 
@@ -126,7 +126,7 @@ def test_sign_is_that_of_the_determinant(n: int, density: float, seed: int) -> N
     values = random_sparse(n, density, seed)
     A = symbols(values)
     lu = factorise(A)
-    sign = ca.Function("sign", [A], [ca.substitute(lu.sign(), lu.packed_symbol, lu.packed)])
+    sign = ca.Function("sign", [A], [ca.substitute(lu.sign(), lu.symbols, lu.packed)])
     assert float(sign(sparse(values))) == np.sign(np.linalg.det(values))
 
 
@@ -160,7 +160,7 @@ def test_singular_numbers_give_infinity_not_a_wrong_answer() -> None:
 def test_pivots_of_all_rows_multiply_to_the_determinant(seed: int) -> None:
     values = random_sparse(7, 0.4, seed)
     lu = factorise(A := symbols(values))
-    pivots = ca.substitute(lu.pivots(range(7)), lu.packed_symbol, lu.packed)
+    pivots = ca.substitute(lu.pivots(range(7)), lu.symbols, lu.packed)
     found = ca.Function("pivots", [A], [pivots])(sparse(values)).full()
     assert abs(np.prod(found)) == pytest.approx(abs(np.linalg.det(values)))
     assert lu.pivots([]).shape == (0, 1)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, Model, SolveError, Status, Variable, drive, simulate, simulate_many
-from symfric.integrator.equations.expressions import DEPTH, changes, levels, onsets, pace
+from symfric.integrator.equations.expressions import DEPTH, changes, levels, pieces
 from symfric.laws import Karnopp
 
 Function = Callable[[ca.SX], ca.SX]
@@ -24,7 +24,7 @@ def pulse(width: float) -> Function:
 
 def times(function: Function, t_end: float = 10.0) -> NDArray[np.float64]:
     t = ca.SX.sym("t")
-    return np.array(onsets(ca.SX.serialize(ca.SX(function(t))), 0.0, t_end))
+    return np.array(pieces(ca.SX.serialize(ca.SX(function(t))), 0.0, t_end).onsets)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_pulse_too_short_for_the_grid_is_hit_where_it_is_named() -> None:
 def test_pace_is_that_of_the_quickest_hundredth() -> None:
     def of(function: Function) -> float:
         t = ca.SX.sym("t")
-        return pace(ca.SX.serialize(ca.SX(function(t))), 0.0, 10.0)
+        return pieces(ca.SX.serialize(ca.SX(function(t))), 0.0, 10.0).pace
 
     for period in (0.1, 1.0, 7.0):
         assert period / 110 < of(lambda t, T=period: 3 * ca.sin(2 * pi * t / T)) < period / 40

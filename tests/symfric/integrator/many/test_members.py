@@ -17,7 +17,7 @@ from symfric.integrator.many.members import (
     many_source,
 )
 from symfric.integrator.methods.tableaux import RODAS5P
-from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
 

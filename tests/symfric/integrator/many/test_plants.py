@@ -17,7 +17,7 @@ MEMBERS = 11
 
 def batch(model: Model, dt: float, members: int = MEMBERS) -> Plant:
     plant = stepper(model, dt, batch=members, backend="compiled")
-    assert ("lanes" in vars(plant._integrator)) or members < LEAST_PLANTS
+    assert ("lanes" in plant._integrator.memory) or members < LEAST_PLANTS
     return plant
 
 

@@ -6,13 +6,13 @@ import pytest
 from closed_forms import assemble
 
 from symfric import LuGre, Model, Variable, rabinowicz
-from symfric.integrator.methods.explicit import SMALL, phi1_phi2
+from symfric.integrator.methods.explicit import SMALL, exp_phi1_phi2
 from symfric.integrator.methods.tableaux import EXPONENTIAL
 from symfric.integrator.step.attempt import build_fixed
 
 x = ca.SX.sym("x")
-VALUES = ca.Function("values", [x], phi1_phi2(x))
-SLOPES = ca.Function("slopes", [x], [ca.jacobian(phi, x) for phi in phi1_phi2(x)])
+VALUES = ca.Function("values", [x], exp_phi1_phi2(x)[1:])
+SLOPES = ca.Function("slopes", [x], [ca.jacobian(phi, x) for phi in exp_phi1_phi2(x)[1:]])
 NODES, WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(40))
 S = NODES + 0.5
 

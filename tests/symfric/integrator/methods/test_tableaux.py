@@ -67,8 +67,8 @@ def classical(method: Method) -> tuple[Array, Array, Array]:
     if not isinstance(method, Rosenbrock):
         assert isinstance(method, Explicit | Radau)
         return method.A, method.A, np.eye(method.A.shape[0])
-    G = np.linalg.inv(np.eye(method.stages) / method.gamma - method.C)
-    return method.A @ G, (method.A + np.eye(method.stages)) @ G, G
+    G = np.linalg.inv(np.eye(len(method.A)) / method.gamma - method.C)
+    return method.A @ G, (method.A + np.eye(len(method.A))) @ G, G
 
 
 def defect(method: Method, weights: Array, tree: Tree, theta: float = 1.0) -> float:
@@ -116,13 +116,13 @@ def test_rooted_trees_are_complete() -> None:
 def test_coefficients_have_one_shape_and_lower_triangles(name: str) -> None:
     method = METHODS[name]
     assert isinstance(method, Rosenbrock | Explicit)
-    shape = (method.stages, method.stages)
+    shape = (len(method.A), len(method.A))
     assert method.A.shape == shape
     assert not np.triu(method.A).any()
     if isinstance(method, Rosenbrock):
         assert method.C.shape == shape
         assert not np.triu(method.C).any()
-    assert method.H.shape[1] == method.stages
+    assert method.H.shape[1] == len(method.A)
 
 
 @each_method

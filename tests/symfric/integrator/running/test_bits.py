@@ -117,7 +117,7 @@ def test_engines_may_change_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
     def by_turns(self: Integrator, _: str, __: float) -> object:
         nonlocal asked
         asked += 1
-        return self.compiled() if asked % 2 else self.vm()
+        return self.compiled if asked % 2 else self.vm
 
     plain = {case: of_case(case, "vm") for case in ("events", "samples")}
     monkeypatch.setattr(Integrator, "choose", by_turns)
@@ -195,13 +195,13 @@ def test_every_law_gives_the_same_bits_by_both_engines() -> None:
 def test_only_a_far_jump_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of two jumps: the compiled loop comes back for the far one alone."""
     searched = list[float]()
-    search = _March.make_consistent
+    search = _March._make_consistent  # pyright: ignore[reportPrivateUsage]
 
     def counted(self: _March, moved: bool = False) -> None:
         searched.append(self.t)
         search(self, moved)
 
-    monkeypatch.setattr(_March, "make_consistent", counted)
+    monkeypatch.setattr(_March, "_make_consistent", counted)
     _, t_end, arguments = CASES["held cubic"]
     simulate(cubic(), t_end, backend="compiled", **arguments)
     assert searched == [1.0]

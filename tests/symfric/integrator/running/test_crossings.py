@@ -11,10 +11,8 @@ from hybrid import ball
 from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
-from symfric.integrator.running.engine import CompiledEngine
+from symfric.integrator.running.engine import CompiledEngine, loop_source
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import loop_source
-from symfric.integrator.running.record import Jumps
 from symfric.integrator.running.run import Tolerances, integrate
 
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
@@ -40,7 +38,7 @@ def test_each_jump_is_kept_with_the_values_on_both_sides(backend: str) -> None:
     run, _ = integrate(
         integrator, inputs, np.array([0.0, 2.0]), np.zeros(0), allowed, backend, None
     )
-    dense, jumps = run.dense, Jumps.joined(run.jumps)
+    dense, (jumps,) = run.dense, run.jumps
     assert jumps.which.tolist() == [[True, True, False], [False, False, True]]
     assert jumps.t == pytest.approx([1, 1], abs=1e-9)
     assert jumps.before == pytest.approx(np.array([[1, 2], [2, -1]]), abs=1e-9)

@@ -1,5 +1,7 @@
 """Dense output: pieces between steps, cut at events, joined."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hybrid import ball
@@ -7,8 +9,7 @@ from numpy.typing import NDArray
 
 from symfric import LuGre, rabinowicz, simulate
 from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.loop import width
-from symfric.integrator.running.record import Dense, hermite, join, pieces_of
+from symfric.integrator.running.record import Dense, hermite
 from symfric.integrator.step.layout import Record
 
 Array = NDArray[np.float64]
@@ -63,9 +64,8 @@ def test_piece_is_a_polynomial_one_degree_above_its_rows(rows: int, degree: int)
 def test_step_cut_at_an_event_keeps_its_polynomial(rows: int, theta: float) -> None:
     whole = pieces(rows, 1)
     at = Record(2, rows)
-    assert at.width == width(2, rows)
     row = np.concatenate([whole.t0, whole.t1, whole.y0[0], whole.y1[0], whole.D.ravel()])
-    cut = pieces_of(cutting(at)(theta, row).full().T, 2)
+    cut = Dense.of(cutting(at)(theta, row).full().T, 2)
     assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0], [theta])
     times = np.linspace(0, theta, 101)
     assert cut(times) == pytest.approx(whole(times), abs=1e-12)
@@ -73,7 +73,9 @@ def test_step_cut_at_an_event_keeps_its_polynomial(rows: int, theta: float) -> N
 
 def test_value_at_a_jump_is_that_after_it() -> None:
     first, second = pieces(1, 1, 1), pieces(1, 1, 1)
-    both = join([first, Dense(second.t0 + 1, second.t1 + 1, second.y0, second.y1, second.D)])
+    both = Dense.of(
+        np.vstack([first.rows, replace(second, t0=second.t0 + 1, t1=second.t1 + 1).rows]), 1
+    )
     assert both(np.array([1.0]))[0, 0] == second.y0[0, 0]
     assert both(np.array([np.nextafter(1.0, 0)]))[0, 0] == pytest.approx(first.y1[0, 0])
     assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
@@ -82,13 +84,10 @@ def test_value_at_a_jump_is_that_after_it() -> None:
 @pytest.mark.parametrize("count", [0, 1, 4])
 @pytest.mark.parametrize("rows", [0, 2, 3])
 def test_records_are_taken_apart(count: int, rows: int) -> None:
-    records = RNG.normal(size=(count, width(3, rows)))
-    dense = pieces_of(records, 3)
+    records = RNG.normal(size=(count, Record(3, rows).width))
+    dense = Dense.of(records, 3)
     assert dense.D.shape == (count, rows, 3)
-    again = np.hstack(
-        [dense.t0[:, None], dense.t1[:, None], dense.y0, dense.y1, dense.D.reshape(count, rows * 3)]
-    )
-    np.testing.assert_array_equal(again, records)
+    np.testing.assert_array_equal(dense.rows, records)
 
 
 @pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])

@@ -78,7 +78,7 @@ def swinging(v_eps: float, amplitude: float = 0.5) -> Model:
 
 def test_it_is_seen_where_the_load_varies_and_no_drop_of_it_is_taken_for_it() -> None:
     (held,) = places(swinging(1e-15))
-    assert not held.fixed
+    assert held.screen is None
     assert quiet(swinging(1e-15), 4.0).doubts == ""
     with pytest.warns(OverloadWarning, match="contact 'pad'"):
         simulate(swinging(1e-3), 4.0)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
-from symfric.integrator.running.engine import CompiledEngine, Engine, Stop, VmEngine
-from symfric.integrator.running.loop import Work, c_source, width
+from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
+from symfric.integrator.running.events import Stop
 from symfric.integrator.step.attempt import build_step
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]
 ROWS = RODAS5P.H.shape[0]
@@ -27,7 +27,7 @@ each_engine = pytest.mark.parametrize(
 
 def engine(kind: str, model: Model, method: str = "rodas5p") -> Engine:
     step, rows = build_step(assemble(model), ADAPTIVE[method]), ADAPTIVE[method].H.shape[0]
-    return CompiledEngine.of(step, rows) if kind == "compiled" else VmEngine.of(step)
+    return CompiledEngine(loop_source(step, rows)) if kind == "compiled" else VmEngine(step)
 
 
 def run(
@@ -88,7 +88,7 @@ def test_both_engines_give_the_same_bits(method: str, case: str) -> None:
     if case == "dae" and not ADAPTIVE[method].dae:
         pytest.skip("an explicit method")
     vm, compiled = (trace(engine(kind, CASES[case][0], method), case, method) for kind in KINDS)
-    assert vm[0].shape[1] == width(vm[1].size, ADAPTIVE[method].H.shape[0])
+    assert vm[0].shape[1] == Record(vm[1].size, ADAPTIVE[method].H.shape[0]).width
     for one, other in zip(vm, compiled, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -185,7 +185,7 @@ def test_threads_get_what_one_after_the_other_gets(kind: str) -> None:
 def test_source_of_a_model_does_not_change_when_it_is_built_again() -> None:
     """Its hash is the name in the cache."""
     one, other = (
-        c_source(build_step(assemble(rabinowicz(LuGre())), RODAS5P), ROWS) for _ in range(2)
+        loop_source(build_step(assemble(rabinowicz(LuGre())), RODAS5P), ROWS) for _ in range(2)
     )
     assert one == other
 
@@ -195,7 +195,7 @@ def test_source_of_a_model_does_not_change_when_it_is_built_again() -> None:
 def test_graph_of_blocks_compiles_to_the_same_steps(case: str) -> None:
     system = assemble(CASES[case][0])
     flat, blocks = (
-        trace(CompiledEngine.of(build_step(system, RODAS5P, kind), ROWS), case)
+        trace(CompiledEngine(loop_source(build_step(system, RODAS5P, kind), ROWS)), case)
         for kind in (ca.SX, ca.MX)
     )
     agree(flat, blocks)

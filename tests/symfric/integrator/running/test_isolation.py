@@ -13,7 +13,7 @@ from symfric import Event, ExactCoulomb, Model, Variable, rabinowicz, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.crossings import STRAIGHT
-from symfric.integrator.running.events import Change, Happened, Search
+from symfric.integrator.running.events import Change, Search, Stop
 from symfric.integrator.running.integrator import Integrator
 
 x, c, w = Variable("x", "1"), Variable("c", "1"), Variable("w", "1")
@@ -53,7 +53,7 @@ def test_the_virtual_machine_searches_only_where_an_event_is_possible(
 ) -> None:
     searched = list[bool]()
 
-    def search(of: Search, *step: Any) -> tuple[Change, Happened]:
+    def search(of: Search, *step: Any) -> tuple[Change, Stop | None]:
         change, asked = whole(of, *step)
         searched.append(change is Change.CUT)
         return change, asked

@@ -75,7 +75,7 @@ def test_a_long_run_keeps_no_steps_and_gives_the_same(
 
     def counted(self: Run, piece: Any) -> None:
         keep(self, piece)
-        kept.append(self.kept)
+        kept.append(sum(map(len, self.kept)))
 
     monkeypatch.setattr(Run, "keep", counted)
     monkeypatch.setattr(module, "MOST_BYTES", 200)

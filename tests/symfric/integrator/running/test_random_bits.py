@@ -9,7 +9,7 @@ import pytest
 from backends import needs_compiler
 from numpy.typing import NDArray
 
-import symfric.integrator.running.loop as loop
+import symfric.integrator.running.engine as loop
 import symfric.integrator.running.run as running
 from symfric import (
     BrownMcPhee,

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from oracles import stribeck_curve
 from rigs import prescribed_motion
 
-from symfric import Law, LuGre, Model, Output, Variable, simulate
+from symfric import Law, LuGre, Model, Variable, contact, simulate
 from symfric.laws import ElastoPlastic
-from symfric.scenes import friction_states
 
 N = 7.848
 LEVEL, STATIC = 0.1 * N, 0.15 * N
@@ -58,10 +57,9 @@ def vibrated(law: Law) -> Model:
     held, shaken = 0.5 * LEVEL, 0.3 * LEVEL * ca.sin(20 * ca.pi * t)
     late = ca.if_else(t < 2, held, held + shaken)
     pull = ca.if_else(t < 1, rising, ca.if_else(t < 1.05, 1.05 * STATIC, late))
-    states, z = friction_states(law, 0.0, N)
-    F = law.force(v.symbol, N, z)
-    ode = ca.vertcat(v.symbol, (pull - F) / 0.8, law.rate(v.symbol, N, z))
-    return Model("shaken", x=(x, v, *states), ode=ode, outputs={"friction": Output(F, "N")}, t=t)
+    slip = contact("guide", law, v, N)
+    rates = ca.vertcat(v.symbol, (pull - slip.force) / 0.8)
+    return Model("shaken", x=(x, v), ode=rates, contacts=(slip,), t=t)
 
 
 def drift(law: Law) -> np.ndarray:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from robots import SMALL
 
-from symfric.multibody.urdf_file import carried, holding, merged, parse
+from symfric.multibody.urdf import carried, holding, merged
+from symfric.multibody.urdf_file import parse
 
 TIP = '<joint name="tip" type="{}"><parent link="arm"/><child link="hand"/></joint>{}</robot>'
 HAND = '<link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from robots import SMALL
 
-from symfric.multibody.urdf_file import parse
-from symfric.multibody.urdf_notes import rotation
+from symfric.multibody.urdf_file import parse, rotation
 
 LINK = (
     '<link name="tip"><inertial><mass value="1"/>'

@@ -1,6 +1,6 @@
 """Doubts are problems for a strict reader only."""
 
-from symfric.multibody.urdf_notes import Notes
+from symfric.multibody.urdf_file import Notes
 
 
 def test_a_strict_reader_takes_doubts_for_problems() -> None:

@@ -1,0 +1,95 @@
+"""Instructions and memory of generated C on Cortex-M cores under QEMU."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import final
+
+from symfric.bench.report import Found, Progress, Report
+from symfric.codegen import Block, generate, inverse_dynamics_block, law_block, plant_block
+from symfric.embedded import CORES, Absent, Tools, find_tools, measure, wrong_on_target
+from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
+from symfric.laws.dynamic.maxwell_slip import Element
+from symfric.scenes import Arm, rabinowicz
+
+TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
+"""Ten elements with a tenth of the friction each and stiffnesses over three decades."""
+TARGETS = (*((core, "float") for core in CORES), ("m7", "double"))
+"""Cores and floating point types; double is used only on a core with an FPU for it."""
+TITLE = (
+    "gcc -O2 under QEMU, float: instructions per step, memory, and largest difference from "
+    "CasADi relative to the peak"
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Block with its goals on a Cortex-M4F in float.
+
+    Attributes:
+        name: name in the table.
+        make: function that builds the block.
+        goals: field of `Measured` -> largest value without guards; "guarded": largest average
+            with guards.
+    """
+
+    name: str
+    make: Callable[[], Block]
+    goals: Mapping[str, float]
+
+
+def _belt(method: str, name: str) -> Block:
+    return plant_block(rabinowicz(BrownMcPhee()), h=1e-4, method=method, name=name)
+
+
+CASES = (
+    Case("Brown-McPhee", lambda: law_block(BrownMcPhee()), {"average": 75}),
+    Case("LuGre", lambda: law_block(LuGre()), {"average": 165, "guarded": 210}),
+    Case("GMS(10)", lambda: law_block(GMS(elements=TEN, form="event"), name="gms10"),
+         {"average": 550, "text": 800, "stack": 100}),
+    Case("Maxwell(4)", lambda: law_block(MaxwellSlip(form="event"), name="maxwell4"),
+         {"average": 180}),
+    Case("velocity based", lambda: law_block(VelocityBased()), {"average": 50}),
+    Case("belt, Euler", lambda: _belt("backward_euler", "belt_euler"), {"average": 325}),
+    Case("belt, rodas3", lambda: _belt("rodas3", "belt_rodas3"), {}),
+    Case("arm, 6 axes", lambda: inverse_dynamics_block(Arm(BrownMcPhee()).mechanism()),
+         {"average": 1850}),
+)  # fmt: skip
+"""Laws, Rabinowicz's stick-slip test as a plant, and an arm with joint friction."""
+
+
+def bench(quick: bool = False, progress: Progress = None) -> Report:
+    """Measure and test every block on every core; `quick`: on the M4F alone."""
+    tools = find_tools()
+    if isinstance(tools, Absent):
+        return Report(notes=[f"embedded: skipped, {tools.advice}"])
+    targets = [("m4f", "float")] if quick else TARGETS
+    tasks = {case.name: partial(_rows, case, targets, tools) for case in CASES}
+    return Report().collect(tasks, progress)
+
+
+def _rows(case: Case, targets: Sequence[tuple[str, str]], tools: Tools) -> Iterator[Found]:
+    block = case.make()
+    with TemporaryDirectory(prefix="symfric-") as folder:
+        kit = generate(block, Path(folder), real=tuple(dict.fromkeys(real for _, real in targets)))
+        for core, real in targets:
+            wrong = wrong_on_target(kit, real, core, tools=tools)
+            m = measure(block, real, core, tools=tools)
+            yield TITLE, {
+                "block": m.block, "core": core.replace("plus", "+") + " f64" * (real == "double"),
+                "average instructions": whole(m.average), "most instructions": whole(m.maximum),
+                "code [B]": whole(m.text), "library [B]": whole(m.library),
+                "data [B]": whole(m.data), "stack [B]": whole(m.stack), "relative error": m.error,
+                "numbers equal to those on the host [%]": 100 * m.equal,
+                "unit test": "ok" if wrong == 0 else f"{wrong} wrong",
+                "status": m.status if m.finite else "not finite",
+            }  # fmt: skip
+
+
+def whole(value: float) -> float:
+    """Round to an integer; NaN stays."""
+    return round(value) if isfinite(value) else value

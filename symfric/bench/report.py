@@ -1,0 +1,326 @@
+"""Results of a benchmark: rows of tables that are printed, stored and drawn; goals; timing."""
+
+import os
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain
+from math import inf, isfinite, log10
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, TypeVar, final
+
+from symfric.foundation.files import write_table
+from symfric.foundation.programs import find_compiler, no_compiler
+from symfric.integrator.compiled.compiler import FLAGS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+T = TypeVar("T")
+Cell = str | float
+"""Value of a cell: a text, or a number (NaN if not measured)."""
+Row = Mapping[str, Cell]
+"""Column title with its unit -> value, at full precision."""
+Found = tuple[str, Row] | str
+"""Row with the title of its table, or a note."""
+Progress = Callable[[str, float], None] | None
+"""Function called with the name of the current item and the fraction done."""
+Draw = Callable[[Sequence[Row]], "Figure"]
+DIGITS = 3
+"""Significant digits of printed numbers that are not integers."""
+
+
+class Table(NamedTuple):
+    """Table to print."""
+
+    title: str
+    head: list[str]
+    rows: list[list[Cell]]
+
+
+@final
+@dataclass(eq=False)
+class Report:
+    """Results of a benchmark.
+
+    Attributes:
+        draw: title of a table, and the function that draws its rows; None without a picture.
+        tables: title -> rows. Rows of one table may lack columns.
+        notes: sentences, for example about tools that are not installed.
+    """
+
+    draw: tuple[str, Draw] | None = None
+    tables: dict[str, list[Row]] = field(default_factory=dict[str, list[Row]])
+    notes: list[str] = field(default_factory=list[str])
+
+    def add(self, found: Iterable[Found]) -> None:
+        """Append rows and notes."""
+        for item in found:
+            if isinstance(item, str):
+                self.notes.append(item)
+            else:
+                self.tables.setdefault(item[0], []).append(item[1])
+
+    def collect(
+        self, tasks: Mapping[str, Callable[[], Iterable[Found]]], progress: Progress = None
+    ) -> Self:
+        """Run tasks and append what they yield; Ctrl-C ends the loop and keeps the rows so far.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C before the first row.
+        """
+        try:
+            for k, (name, task) in enumerate(tasks.items()):
+                if progress is not None:
+                    progress(name, k / len(tasks))
+                self.add(task())
+        except KeyboardInterrupt:
+            if not self.tables:
+                raise
+            self.notes.append("Interrupted: the other measurements were not made.")
+        return self
+
+    def shown(self) -> Iterator[Table | str]:
+        """Yield the tables and sentences to print, with numbers rounded to 3 digits."""
+        for title, rows in self.tables.items():
+            head = list(dict.fromkeys(chain.from_iterable(rows)))
+            yield Table(title, head, [[_short(row.get(c, "")) for c in head] for row in rows])
+        yield from self.notes
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return rows by table, and notes."""
+        return {"tables": self.tables, "notes": self.notes}
+
+    def write_csv(self, path: str | Path) -> None:
+        """Write the rows of the first table, one per line."""
+        rows = next(iter(self.tables.values()), [])
+        head = list(dict.fromkeys(chain.from_iterable(rows)))
+        write_table(path, head, ([row.get(c, "") for c in head] for row in rows))
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Draw the result; save the picture if `path` is given.
+
+        Raises:
+            ValueError: a benchmark without a picture.
+        """
+        from symfric.foundation.panels import save  # noqa: PLC0415  (matplotlib is slow to import)
+
+        if self.draw is None:
+            raise ValueError("plot: expected a benchmark with a picture, got one of tables only")
+        title, draw = self.draw
+        return save(draw(self.tables.get(title, [])), path)
+
+
+def _short(cell: Cell) -> Cell:
+    """Round a number to significant digits; integers and NaN stay."""
+    return float(f"{cell:.{DIGITS}g}") if isinstance(cell, float) else cell
+
+
+# ---- goals ----
+
+GOALS = "Measured numbers and their goals"
+
+
+def goal(
+    quantity: str,
+    measured: float,
+    limit: float,
+    side: Literal["<=", ">="] = "<=",
+    seconds: float = 0.0,
+    note: str = "",
+) -> tuple[str, Row]:
+    """Return a number with its goal as a row of the table of goals; NaN never meets a goal.
+
+    Args:
+        quantity: measured quantity, with its unit.
+        measured, limit: measured number, and the number to be reached.
+        side: side of the goal on which it is met.
+        seconds: processor time of the measurement [s].
+        note: remark for the reader, for example that data are absent.
+    """
+    met = measured <= limit if side == "<=" else measured >= limit
+    return GOALS, {
+        "quantity": quantity, "measured": measured, "goal": f"{side} {limit:g}",
+        "met": "yes" if met else "no", "processor time [s]": seconds, "note": note,
+    }  # fmt: skip
+
+
+def decades(row: Row) -> float:
+    """Return the decades by which a number misses its goal; NaN if either is not positive."""
+    side, limit = str(row["goal"]).split()
+    value, wanted = float(row["measured"]), float(limit)
+    if not (value > 0 and wanted > 0):
+        return float("nan")
+    return (1.0 if side == "<=" else -1.0) * log10(value / wanted)
+
+
+def plot_goals(rows: Iterable[Row]) -> "Figure":
+    """Draw a bar for each goal: decades by which it is missed; left of zero it is met."""
+    from symfric.foundation.panels import panels  # noqa: PLC0415  (matplotlib is slow to import)
+    from symfric.foundation.style import colour  # noqa: PLC0415  (likewise)
+
+    known = [(row, miss) for row in rows if (miss := decades(row)) == miss]
+    figure, (axis,) = panels(1, 8.0, 0.5 + 0.25 * len(known))
+    for row, miss in known:
+        met = row["met"] == "yes"
+        axis.barh(str(row["quantity"]), miss, color=colour(2 if met else 1), hatch="/" * (not met))
+    axis.axvline(0.0, color="0.3", linewidth=0.8)
+    axis.invert_yaxis()
+    axis.set_xlabel("decades beyond the goal")
+    axis.tick_params(axis="y", labelsize="small")
+    return figure
+
+
+# ---- curves ----
+
+ABREAST = 5
+"""Most panels in a row."""
+LEAST = 1e-14
+"""Smallest value that is drawn."""
+
+
+def curves(panel: str, lines: Sequence[str], x: str, *ys: str) -> Draw:
+    """Return a function that draws columns of rows over another one, with logarithmic axes.
+
+    Args:
+        panel: column whose values have a panel each.
+        lines: columns whose values have a curve each.
+        x: column of the abscissae; decreasing ones run to the right.
+        ys: columns of the ordinates; each has its own panels.
+    """
+    return partial(_draw_curves, panel, lines, x, ys)
+
+
+def _draw_curves(
+    panel: str, lines: Sequence[str], x: str, ys: Sequence[str], rows: Sequence[Row]
+) -> "Figure":
+    from symfric.foundation.panels import grid  # noqa: PLC0415  (matplotlib is slow to import)
+    from symfric.foundation.style import COLOURS, MARKERS, colour  # noqa: PLC0415  (likewise)
+
+    def label(row: Row) -> str:
+        return ", ".join(c if isinstance(c := row[k], str) else f"{k} = {c:g}" for k in lines)
+
+    cases, labels = (list(dict.fromkeys(map(f, rows))) for f in (lambda r: r[panel], label))
+    points: dict[tuple[str, Cell, str], list[tuple[float, float]]] = {}
+    for y in ys:
+        for row in rows:
+            at, value = float(row[x]), float(row.get(y, "nan"))
+            if isfinite(at) and isfinite(value):
+                points.setdefault((y, row[panel], label(row)), []).append((at, max(value, LEAST)))
+    tiles = [(y, case) for y in ys for case in cases if any(key[:2] == (y, case) for key in points)]
+    columns = min(len(tiles), ABREAST) or 1
+    height = -(-len(tiles) // columns) or 1
+    figure, grid_axes = grid(height, columns, 1.4 + 2.4 * max(columns, 3), 1.6 + 2.8 * height)
+    axes = list(chain(*grid_axes))
+    for axis, (y, case) in zip(axes, tiles, strict=False):
+        for k, name in enumerate(labels):
+            line = points.get((y, case, name), [])
+            bold = name.startswith("symfric")
+            axis.loglog(
+                [a for a, _ in line], [b for _, b in line], label=name, color=colour(k),
+                marker=MARKERS[k % len(MARKERS)], markersize=4,
+                linestyle="-" if bold else "--", linewidth=2.0 if bold else 1.0,
+                markerfacecolor="none" if k // len(COLOURS) % 2 else None,
+            )  # fmt: skip
+            if len(line) > 1 and line[0][0] > line[-1][0] and not axis.xaxis_inverted():
+                axis.invert_xaxis()
+        axis.set_title(str(case).replace("_", " "), fontsize="small")
+        axis.set_xlabel(x)
+        axis.set_ylabel(y)
+        axis.tick_params(labelsize="small")
+        axis.xaxis.set_minor_formatter("")
+    for axis in axes[len(tiles) :]:
+        axis.set_axis_off()
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4,
+        fontsize="small",
+    )  # fmt: skip
+    return figure
+
+
+# ---- timing ----
+
+FASTEST = (*(f for f in FLAGS if f != "-ffp-contract=off"), "-freciprocal-math")
+"""Compiler flags for other tools, which may round differently from CasADi's virtual machine."""
+
+
+def backend() -> str:
+    """Return "compiled", or "vm" without a C compiler."""
+    return "compiled" if find_compiler() else "vm"
+
+
+@contextmanager
+def unwarned() -> Generator[None]:
+    """Suppress warnings: loose tolerances are measured on purpose."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def best_time(
+    call: Callable[[], T],
+    budget: float = 0.05,
+    most: int = 30,
+    clock: Callable[[], float] = perf_counter,
+) -> tuple[float, T]:
+    """Return the shortest time [s] of `call` over repeats within `budget` seconds, and its result.
+
+    The shortest time is the cost of the code; longer ones include other load of the machine. For
+    calls without threads, processor time (`time.process_time`) is the better clock.
+    """
+    best, spent, result = inf, 0.0, None
+    for _ in range(most):
+        begin = clock()
+        result = call()
+        elapsed = clock() - begin
+        best, spent = min(best, elapsed), spent + elapsed
+        if spent > budget:
+            break
+    return best, result  # pyright: ignore[reportReturnType]  (called at least once)
+
+
+def timed(call: Callable[[], T]) -> tuple[float, T]:
+    """Return the processor time [s] of one call, and its result."""
+    return best_time(call, most=1, clock=process_time)
+
+
+def interleaved(
+    calls: Mapping[str, Callable[[], object]], rounds: int = 7, budget: float = 0.0
+) -> dict[str, float]:
+    """Return the shortest processor time [s] of each of the `calls`, which take turns.
+
+    A temporary load of the machine affects all of them equally, so that ratios hold.
+
+    Args:
+        calls: functions by name; the first call of each is not measured.
+        rounds: least number of measurements of each.
+        budget: total time [s] up to which further rounds are made.
+    """
+    best = dict.fromkeys(calls, inf)
+    for call in calls.values():
+        call()
+    began, made = perf_counter(), 0
+    while made < rounds or perf_counter() - began < budget:
+        for name, call in calls.items():
+            best[name] = min(best[name], timed(call)[0])
+        made += 1
+    return best
+
+
+def compile_time(source: str, target: str | os.PathLike[str] = os.devnull) -> float:
+    """Return the processor time [s] of the C compiler on `source`, with the fastest flags.
+
+    Raises:
+        CompileError: no compiler.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise no_compiler()
+    before = os.times()
+    compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
+    after = os.times()
+    user = after.children_user - before.children_user
+    return user + after.children_system - before.children_system

@@ -1,0 +1,344 @@
+"""Published problems, mechanisms, regularisation and jitter: errors have known limits."""
+
+from dataclasses import replace
+from math import atan2, hypot, isnan, pi
+
+import numpy as np
+import pytest
+from backends import needs_compiler
+
+from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, Viscous, parameters, simulate
+from symfric.bench import ivp, jitter, mechanisms, regularisation
+from symfric.bench.ivp import DIGITS, DRIFT, correct_digits
+from symfric.bench.ivp_mechanisms import ANDREWS, JOINT, PROBLEMS
+from symfric.bench.ivp_problems import Problem, hires
+from symfric.bench.mechanisms import CHAINS, chain, chains, count, exponent
+from symfric.bench.regularisation import CASES, last_cycle, peak
+from symfric.bench.report import Row
+from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.equations.system import system
+from symfric.scenes import Rabinowicz, SliderCrank
+
+# ---- initial-value problems ----
+
+LATE = {("ring modulator", "rodas5p"): 4}
+"""Fewer digits than required at rtol 1e-6: fast oscillations add up their phases."""
+MOST_STEPS = {
+    "HIRES": 250, "Robertson": 350, "van der Pol": 800, "Oregonator": 1100,
+    "Chemical Akzo Nobel": 130, "transistor amplifier": 4500, "Pleiades": 330,
+    "Andrews' squeezer": 400, "Andrews' squeezer, absolute coordinates": 1000, "car axis": 1100,
+}  # fmt: skip
+"""The squeezer in joint coordinates is a case of `multibody/test_iftomm.py`."""
+
+
+def reached(problem: Problem, method: str, rtol: float, engine: str | None = None) -> Row:
+    """A measurement with at least the required digits."""
+    title, row = next(ivp.measure(problem, problem.model(), method, rtol, engine))
+    assert title == DIGITS
+    required = problem.digits[rtol]
+    required = LATE.get((problem.name, method), required) if rtol == 1e-6 else required
+    assert row["correct digits"] >= required > 0, row
+    assert row["relative error"] == pytest.approx(10 ** -row["correct digits"])
+    assert 0.001 < row["time per run [ms]"] < 1e5
+    return row
+
+
+def test_published_digits_are_reached_at_the_default_tolerance() -> None:
+    """Andrews' squeezer was called singular, the amplifier discontinuous."""
+    for problem in PROBLEMS:
+        if problem.name in MOST_STEPS and "absolute" not in problem.name:
+            row = reached(problem, "rodas5p", 1e-6, "vm")
+            assert row["steps"] <= MOST_STEPS[problem.name], row
+
+
+def test_published_digits_are_reached_at_a_tight_tolerance() -> None:
+    """Robertson's reactions to 1e11 stopped at rtol <= 1e-8."""
+    for name in ("HIRES", "Robertson", "Chemical Akzo Nobel"):
+        reached(next(p for p in PROBLEMS if p.name == name), "rodas5p", 1e-10, "vm")
+
+
+@pytest.mark.slow
+def test_published_digits_are_reached_by_all_methods() -> None:
+    for problem in PROBLEMS:
+        for method in ivp.METHODS:
+            for rtol in (1e-6,) if method in problem.laborious else (1e-6, 1e-10):
+                reached(problem, method, rtol)
+
+
+def test_drift_of_constraints_shrinks_with_the_tolerance() -> None:
+    model = ANDREWS.model()
+    rows = [dict(ivp.measure(ANDREWS, model, "rodas5p", rtol, "vm")) for rtol in (1e-6, 1e-8)]
+    loose, tight = (row[DRIFT]["largest constraint violation"] for row in rows)
+    assert 0.0 < tight < 1e-2 * loose < 1e-7
+
+
+def test_digits_are_those_of_the_worst_signal() -> None:
+    run = simulate(hires(), 1.0, backend="vm", samples=2)
+    end = run.final
+    other = Problem("off", hires, 1.0, {"y1": end["y1"], "y2": end["y2"] * (1 + 1e-4)})
+    digits, worst = correct_digits(other, run)
+    assert (round(digits, 3), worst) == (4.0, "y2")
+    assert 15 < correct_digits(Problem("same", hires, 1.0, {"y1": end["y1"]}), run)[0] < 16
+
+
+def test_a_failure_is_noted_with_its_reason() -> None:
+    y = Variable("y1", "1", start=1.0)
+    model = Model("grow", x=(y,), ode=y.symbol**2)
+    problem = Problem("late", lambda: model, 1e3, {"y1": 1.0})
+    (_, row), note = ivp.measure(problem, model, "rodas5p", 1e-6, "vm")
+    assert isnan(row["correct digits"])
+    assert "late, rodas5p: not run" in note and "grows without bound" in note
+
+
+def test_every_tolerance_and_method_has_a_row() -> None:
+    made = ivp.bench(quick=True, problems=PROBLEMS[:1])
+    assert [(r["problem"], r["method"], r["rtol"]) for r in made.tables[DIGITS]] == [
+        ("HIRES", "rodas5p", 1e-6), ("HIRES", "radau5", 1e-6),
+    ]  # fmt: skip
+    assert "Test Set" in made.notes[0]
+    laborious = replace(PROBLEMS[0], laborious=("radau5",))
+    rows = [row for title, row in ivp._rows(laborious, quick=False) if title == DIGITS]
+    assert [row["rtol"] for row in rows] == [1e-6, 1e-8, 1e-10, 1e-6]
+    assert len({p.name for p in PROBLEMS}) == len(PROBLEMS) == 11
+    assert JOINT.drift == ("constraint_position",)
+    assert all({*p.reference} <= {*p.model().signals} for p in PROBLEMS if "joint" not in p.name)
+
+
+# ---- mechanisms ----
+
+FOUR = ("frictionless", "constant normal", "reactions in one", "reactions in all")
+ABSOLUTE = pytest.param("absolute", marks=pytest.mark.slow)
+INSTRUCTIONS = ("instructions, accelerations", "instructions, step", "nonzeros of the Jacobian")
+SIZES = {
+    "joint": [(8, 2), (8, 2), (8, 3), (8, 5)],
+    "absolute": [(56, 26), (56, 26), (56, 27), (56, 30)],
+}
+"""Two multipliers of the rods, in absolute coordinates those of all joints; slider 4 carries its
+weight only, which is no unknown if its joint is in the tree."""
+
+
+@pytest.mark.parametrize("coordinates", ["joint", ABSOLUTE])
+def test_every_kind_of_friction_has_its_unknowns_and_its_cost(coordinates: str) -> None:
+    rows = [count("four_mass", variant, coordinates) for variant in FOUR]
+    assert [(r["states"], r["algebraic variables"]) for r in rows] == SIZES[coordinates]
+    none, constant, one, every = rows
+    for column in INSTRUCTIONS:
+        assert none[column] < constant[column] < every[column], column
+        assert none[column] < one[column] < every[column], column
+    assert every["instructions, step"] < 2 * none["instructions, step"]
+
+
+def test_a_planar_mechanism_needs_fewer_instructions() -> None:
+    planar, spatial = (count("double_pendulum", v, "joint") for v in ("planar", "spatial"))
+    assert planar["states"] == spatial["states"]
+    assert planar[INSTRUCTIONS[0]] < spatial[INSTRUCTIONS[0]]
+    assert planar[INSTRUCTIONS[1]] < 0.9 * spatial[INSTRUCTIONS[1]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", FOUR)
+def test_joint_coordinates_need_a_fraction_of_absolute_ones(variant: str) -> None:
+    few, many = (count("four_mass", variant, c) for c in mechanisms.BOTH)
+    assert many["states"] == 7 * few["states"]
+    assert many[INSTRUCTIONS[0]] > 10 * few[INSTRUCTIONS[0]]
+    assert many[INSTRUCTIONS[1]] > 15 * few[INSTRUCTIONS[1]]
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_compilation_is_measured() -> None:
+    small, large = (row for _, row in mechanisms.compilation(("joint",)))
+    assert (small["mechanism"], large["mechanism"]) == ("slider_crank", "four_mass")
+    assert all(0 < row[c] < 60 for row in (small, large) for c in row if "time" in c)
+    assert small["lines of C"] < large["lines of C"] < 20_000
+
+
+def test_chains_are_measured_up_to_the_budget() -> None:
+    (_, short), (_, long), note = chains(chain, (2, 4))
+    assert (short["links"], long["links"]) == (2, 4)
+    assert 0 < short["instructions"] < long["instructions"]
+    assert all(0.1 < row["time per step [us]"] < 1e5 for row in (short, long))
+    assert all(0 < row["build time [s]"] < 60 for row in (short, long))
+    assert "instructions 1." in note
+    assert [row["links"] for title, row in chains(chain, (1, 2, 3), budget=0.0)] == [1]
+
+
+@pytest.mark.parametrize("power", [1.0, 1.3, 2.0])
+def test_the_exponent_is_that_of_a_power_law(power: float) -> None:
+    rows = [{"links": n, "y": 1e-6 * n**power, "z": 100} for n in (8, 16, 32)]
+    short = {"links": 2, "y": 1.0, "z": 1.0}
+    assert exponent([short, *rows], "y") == pytest.approx(power)
+    assert exponent(rows, "z") == pytest.approx(0.0, abs=1e-12)
+    assert exponent([short, {"links": 4, "y": 2**power}], "y") == pytest.approx(power)
+    assert CHAINS
+
+
+def test_a_chain_keeps_its_energy_or_loses_it_to_friction() -> None:
+    free = simulate(chain(3), 0.5, rtol=1e-9)["energy"]
+    rough = simulate(chain(3, BrownMcPhee()), 0.5, rtol=1e-7)["energy"]
+    assert abs(free - free[0]).max() < 1e-6
+    assert rough[-1] < rough[0] - 1e-2
+
+
+def test_reference_values_are_met_to_their_digits() -> None:
+    rows = [row for _, row in mechanisms.facts()]
+    assert len(rows) == 34
+    for row in rows:
+        assert 0 < abs(row["difference"]) < row["accuracy of the reference"], row
+
+
+@pytest.mark.parametrize("coordinates", ["joint", ABSOLUTE])
+def test_constraints_are_kept_on_three_levels(coordinates: str) -> None:
+    for _, row in mechanisms.norms((coordinates,)):
+        assert 0 < row["positions [m]"] < 1e-11
+        assert 1e-18 < row["velocities, relative"] < 1e-13
+        assert 1e-18 < row["accelerations, relative"] < 1e-13
+
+
+@pytest.mark.parametrize("t_end", [1.0, pytest.param(100.0, marks=pytest.mark.slow)])
+def test_energy_of_frictionless_mechanisms_is_constant(t_end: float) -> None:
+    for _, row in mechanisms.drifts(t_end):
+        assert 0 < row["relative change of energy"] < 1e-8 * t_end, row
+
+
+# ---- regularisation ----
+
+BELT, CRANK = CASES[0], CASES[-1]
+FACTORS = (1e-2, 0.0, 1e-3, 0.0, 1e-4)
+
+
+@pytest.fixture(scope="module")
+def measured() -> dict[str, list[Row]]:
+    """The belt against dry friction and against its own limit, and the crank."""
+    own = replace(BELT, name="own", exact=None, cycle=False)
+    found: dict[str, list[Row]] = {}
+    for cases, rtols in (((BELT, own), (1e-8,)), ((CRANK,), (1e-6, 1e-8))):
+        made = regularisation.bench(True, cases, FACTORS, rtols)
+        for row in made.tables[regularisation.TITLE]:
+            found.setdefault(str(row["case"]), []).append(row)
+    return found
+
+
+def cycle(reach: float) -> tuple[float, float]:
+    """Period and amplitude of a block that breaks away `reach` beyond where dry sliding rests it.
+
+    Stick 2 reach / v_b; slip an arc of a harmonic oscillation about mu_d N / k.
+    """
+    scene = Rabinowicz(BELT.law)
+    omega = (scene.k / scene.m) ** 0.5
+    arc = 2 * pi - 2 * atan2(reach * omega, scene.v_belt)
+    return 2 * reach / scene.v_belt + arc / omega, 2 * hypot(reach, scene.v_belt / omega)
+
+
+def test_the_cycle_of_dry_friction_is_that_of_the_closed_form() -> None:
+    scene = Rabinowicz(ExactCoulomb(mu_s=0.15, mu_d=0.1))
+    run = simulate(scene.model(), 20.0)
+    assert last_cycle(run) == pytest.approx(cycle(0.05 * scene.m * scene.g / scene.k), 1e-6)
+    assert last_cycle(simulate(scene.model(), 1.0)).size == 0
+
+
+def test_break_away_is_late_by_the_passage_of_a_fold(measured: dict[str, list[Row]]) -> None:
+    """Riccati's m v_t w' = k v_b t + N c w^2 blows up at the first zero of the Airy function.
+
+    Near its peak the law is N (mu_s - c w^2), w = v/v_t - 1, c = 3/4 (mu_s - mu_d). The spring is
+    stretched further by v_b T until then: order 2/3.
+    """
+    law = BELT.law
+    assert isinstance(law, BrownMcPhee)
+    scene = Rabinowicz(law)
+    m, k, v_b, N = scene.m, scene.k, scene.v_belt, scene.m * scene.g
+    c = 0.75 * (law.mu_s - law.mu_d)
+    dry = (peak(law) - law.mu_d) * N / k
+    rows = measured[BELT.name]
+    for row, off in zip(rows, (0.25, 0.1, 0.05), strict=True):
+        late = 2.33810741 * ((m * row["value"]) ** 2 / (k * v_b * N * c)) ** (1 / 3)
+        pairs = zip(cycle(dry + v_b * late), cycle(dry), strict=True)
+        expected = max(a / b - 1 for a, b in pairs)
+        assert row["error of the last cycle"] == pytest.approx(expected, rel=off)
+    assert isnan(rows[0]["order"])
+    assert rows[-1]["order"] == pytest.approx(2 / 3, abs=0.02)
+    assert rows[0]["parameter"] == "v_t [m/s]"
+
+
+def test_an_extrapolated_reference_states_its_own_error(measured: dict[str, list[Row]]) -> None:
+    """Against exact dry friction: differences of the errors are those of the reference."""
+    for a, b in zip(measured[BELT.name], measured["own"], strict=True):
+        difference = abs(a["error"] - b["error"])
+        assert difference == pytest.approx(b["error of the reference"], rel=0.3)
+        assert isnan(b["error of the last cycle"])
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [
+        ("pendulum_box brown_mcphee", 1.0),
+        pytest.param("pendulum_box lugre_normalised", 0.5, marks=pytest.mark.slow),
+        pytest.param("four_mass coulomb", 0.9, marks=pytest.mark.slow),
+        pytest.param("rabinowicz lugre", 0.57, marks=pytest.mark.slow),
+    ],
+)
+def test_laws_tend_to_friction_without_regularisation(name: str, order: float) -> None:
+    """Creep is of order v_t (with tanh times a logarithm), bristles turn in sigma_0^(-1/2)."""
+    (case,) = (c for c in CASES if c.name == name)
+    made = regularisation.bench(True, (case,), (1e-4, 0.0, 1e-5), (1e-8,))
+    _, last = made.tables[regularisation.TITLE]
+    assert "compared with ExactCoulomb" in made.notes[0]
+    assert last["order"] == pytest.approx(order, abs=0.03)
+    assert last["error"] < 1e-3
+
+
+def test_without_creep_the_error_of_the_integrator_remains(measured: dict[str, list[Row]]) -> None:
+    """A crank that slides until it stops: order 3, and a floor that follows rtol."""
+    rows = measured[CRANK.name]
+    loose, tight = ([r for r in rows if r["rtol"] == rtol] for rtol in (1e-6, 1e-8))
+    assert loose[2]["error"] == pytest.approx(loose[1]["error"], rel=0.1)
+    assert loose[2]["error"] > 100 * tight[2]["error"]
+    assert [r["steps"] for r in loose] == sorted((r["steps"] for r in loose), reverse=True)
+    assert all(0.01 < r["time per run [ms]"] < 1e4 for r in rows)
+
+
+def test_the_peak_of_the_law_is_below_its_static_level() -> None:
+    law = BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=1e-3)
+    assert 0.9993 * 0.15 < peak(law) < 0.15
+    assert parameters(law)["mu_s"].value == 0.15
+
+
+# ---- jitter ----
+
+
+@pytest.mark.parametrize(
+    ("a", "expected"), [([1.0, 1.0], 0.0), ([0.0, 2.0, -1.0], 5.0), ([0.0, np.inf], np.nan)]
+)
+def test_variation_sums_all_ups_and_downs(a: list[float], expected: float) -> None:
+    assert jitter.variation(np.array(a)) == pytest.approx(expected, nan_ok=True)
+
+
+def test_fine_fixed_steps_agree_with_error_control() -> None:
+    made = jitter.bench(scales=(0.02,), fixed_ms=(2.0, 0.5), rtol=1e-7, t_end=1.0)
+    rows = made.tables[jitter.TITLE]
+    ways = ["rtol = 1e-07", "RK4, h = 2 ms", "RK4, h = 0.5 ms", "Rodas5P, h = 1 ms"]
+    assert [(r["law"], r["step control"]) for r in rows] == [
+        (law, way) for law in jitter.LAWS for way in ways
+    ]
+    for row in rows:
+        exact = next(r for r in rows if r["law"] == row["law"])
+        for slider in jitter.SLIDERS:
+            assert row[slider] == pytest.approx(exact[slider], rel=0.02)
+            assert row[slider] > 1
+
+
+def test_classical_runge_kutta_has_order_4_on_the_constraints() -> None:
+    model = SliderCrank(Viscous(sigma_2=0.0)).model()
+    whole = system(model, input_data(model, None, 0.0, 0.05))
+    step, exact = jitter.runge_kutta_4(whole), simulate(model, 0.05, rtol=1e-12, t_eval=[0.05])
+    assert whole.manifold is not None
+    errors: list[float] = []
+    for steps in (50, 100):
+        y = np.concatenate([model.initial_state(), np.zeros(whole.n - whole.nx)])
+        y = refinement(whole)(y, 0).full()
+        for _ in range(steps):
+            y = step(y, 0.05 / steps, 0).full()
+        errors.append(abs(float(y[0, 0]) - exact["crank"][0]))
+        assert np.abs(whole.manifold.defect(y, 0).full()).max() < 1e-11
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.4)

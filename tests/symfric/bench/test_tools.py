@@ -1,0 +1,308 @@
+"""Optimal control, other tools, identification and generated code: judges know known answers."""
+
+from collections import Counter
+from dataclasses import replace
+from itertools import islice
+from math import isnan, nan
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from cortex import on_target
+
+from identification import Dataset, synthetic_drive_data
+from ocp import solve
+from ocp.problems import READY, out_and_back
+from symfric import Coulomb, Sum, Viscous, drive, law_from_text, with_values
+from symfric.bench import codegen, codegen_runs, embedded, identification, ocp
+from symfric.bench import identification_measured as measured
+from symfric.bench.codegen_runs import PROVEN, compensation, plants, trials
+from symfric.bench.identification import files, outcome
+from symfric.bench.identification_files import campaign
+from symfric.bench.identification_memory import ranked
+from symfric.bench.identification_repeats import coloured, far
+from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
+from symfric.bench.ocp import NEAR, attempt_of, landed, starts_of
+from symfric.bench.ocp_contenders import Attempt, opti, straight
+from symfric.bench.ocp_costs import controllers, program_sizes
+from symfric.bench.report import GOALS, Row
+from symfric.codegen import law_block
+from symfric.embedded import Absent
+from symfric.integrator import Hold, flow, simulate
+from symfric.laws import BrownMcPhee, Dahl
+
+# ---- optimal control ----
+
+
+def test_opti_solves_the_smooth_problem_and_misses_the_sharp_one() -> None:
+    """The cost is that of three transcriptions: 68.118 on 100 intervals."""
+    found = opti(out_and_back(v_t=0.1), 100)
+    assert found.cost == pytest.approx(68.118, abs=1e-3)
+    assert found.durations == (1.0, 1.0)
+    assert landed(out_and_back(v_t=0.1), found) < 0.02
+    assert landed(out_and_back(), found) > 0.05
+
+
+def test_a_force_below_break_away_misses_by_the_way() -> None:
+    """5 N does not break away: the mass is 1 m from its goal."""
+    held = ({"force": np.full(4, 5.0)}, {"force": np.full(4, 5.0)})
+    still = Attempt(0.0, 0, "", 0.0, (1.0, 1.0), held)
+    assert landed(out_and_back(), still, exact=True) == pytest.approx(10.0)  # of 0.1 m nominal
+    assert landed(out_and_back(), still) == pytest.approx(10.0, rel=1e-3)
+
+
+def test_starts_are_the_default_and_others() -> None:
+    first, second = list(starts_of(out_and_back(), 2, NEAR))
+    assert first.keys() == {"x", "v", "force"}
+    assert first["x"][[0, 100, -1]] == pytest.approx([0.0, 1.0, 0.0], abs=0.02)
+    assert np.abs(second["x"] - first["x"]).max() > 0.01
+    line = straight(out_and_back().spans[0])
+    assert line(0.25) == pytest.approx([0.25, 1.0])
+
+
+def test_an_attempt_holds_the_controls_of_each_phase() -> None:
+    problem = out_and_back(v_t=0.1)
+    found = solve(problem, friction="smooth", intervals=10, throw=False)
+    attempt = attempt_of(found, 0.0)
+    assert attempt.durations == (1.0, 1.0)
+    assert attempt.meshes is not None
+    assert sum(mesh.size for mesh in attempt.meshes) == found.t_control.size
+    assert [float(mesh[0]) for mesh in attempt.meshes] == [0.0, 0.0]
+    assert landed(problem, attempt) < 1e-4
+    ready = replace(READY["out_and_back"], optimum=found.cost, friction=False)
+    held = tuple({name: 0 * u for name, u in c.items()} for c in attempt.controls)
+    wrong = replace(attempt, cost=0.5 * found.cost, controls=held)
+    _, row = ocp._row(ready, problem, "x", "near", [attempt, wrong, attempt])
+    assert row["starts"] == "3 near"
+    assert row["reported as solved [%]"] == pytest.approx(100.0)
+    assert row["verified [%]"] == row["best cost reached [%]"]
+    assert row["cost above the best [%]"] == 0.0
+
+
+def test_medians_count_failed_simulations_as_far_off() -> None:
+    assert ocp._middle([nan, 1.0, 2.0]) == 2.0
+    assert isnan(ocp._middle([nan, nan]))
+
+
+@pytest.mark.slow
+def test_a_problem_without_friction_is_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ocp, "INTERVALS", 50)
+    ours, other = ocp.bench(quick=True, cases=["bryson_denham"]).tables[ocp.TITLE]
+    assert (ours["solver"], other["solver"]) == ("symfric", "Opti")
+    assert ours["starts"] == "3 near"
+    assert ours["verified [%]"] == ours["best cost reached [%]"] == 100.0
+
+
+def test_programs_grow_with_their_intervals() -> None:
+    rows = program_sizes(quick=True)
+    (_, small), (_, large) = next(rows), next(rows)
+    assert large["nonzeros"] == pytest.approx(4 * small["nonzeros"], rel=0.01)
+    assert isnan(small["growth exponent"])
+    assert 0.3 < large["growth exponent"] < 2
+    assert 0 < small["Jacobian [ms]"] < 100
+
+
+@pytest.mark.slow
+def test_the_controller_reaches_its_goal_on_every_plant() -> None:
+    for _, row in controllers(quick=True):
+        assert row["cycles"] == 100
+        assert row["unreported failures"] == 0
+        assert row["distance from the goal [mm]"] < 1.0, row
+
+
+# ---- other tools ----
+
+FREE = drive(Viscous(sigma_2=0.0), m=1.0, N=10.0)
+"""A mass of 1 kg without friction."""
+
+
+def test_the_miss_is_the_remaining_distance_and_speed() -> None:
+    there_and_back = np.repeat([4 * GOAL, -4 * GOAL], N // 2)
+    assert missed(FREE, there_and_back) < 1e-9
+    assert missed(FREE, np.zeros(N)) == pytest.approx(GOAL)
+    assert missed(FREE, np.full(N, 2 * GOAL)) == pytest.approx(2 * GOAL)  # there, at 0.2 m/s
+    h, knock = T / N, np.eye(N)[0]  # a force in the first interval only: x = h (T - h/2) F
+    force = knock * GOAL / (h * (T - h / 2))
+    assert missed(FREE, force) == pytest.approx(GOAL / (T - h / 2))
+    away = replace(FREE, x=tuple(replace(v, start=0.5) for v in FREE.x))
+    assert missed(away, np.zeros(N)) == pytest.approx(GOAL)  # a move starts at rest at 0
+
+
+def test_the_route_of_flow_ends_at_the_end_of_flow() -> None:
+    """Collocation ends near it."""
+    model = drive(BrownMcPhee(v_t=0.05), m=1.0, N=10.0)
+    advance = flow(model, steps=STEPS)
+    left = dict[str, float]()
+    for route in ("flow", "collocation"):
+        controls, status, _ = ROUTES["opti", route](model, np.array([GOAL / 2, GOAL]))
+        assert status == "Solve_Succeeded"
+        x = ca.DM.zeros(2)
+        for u in controls.tolist():
+            x = advance(x, u, [], T / N)
+        left[route] = float(np.abs(x.full().ravel() - [GOAL, 0.0]).max())
+    assert left["flow"] < 1e-8 < left["collocation"] < 1e-2
+
+
+def test_a_tool_that_fails_has_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise RuntimeError("no  such\nthing")
+
+    monkeypatch.setitem(ROUTES, ("opti", "flow"), fails)
+    row = move("opti", "flow", "brown_mcphee")
+    assert isnan(row["cost J [N^2 s]"]) and isnan(row["miss [m]"])
+    assert (row["status"], row["iterations"]) == ("no such thing", 0)
+
+
+# ---- identification ----
+
+
+def goals(rows: object) -> dict[str, Row]:
+    return {row["quantity"]: row for title, row in rows if title == GOALS}  # type: ignore[union-attr]
+
+
+def test_without_data_the_rows_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("EMPS", "FRANKA"):
+        monkeypatch.setattr(measured, name, tmp_path)
+    made = identification.bench(quick=True, cases=("emps", "laws", "franka"))
+    rows = made.tables[GOALS]
+    assert Counter(row["case"] for row in rows) == {"emps": 3, "laws": 1, "franka": 4}
+    for row in rows:
+        assert isnan(row["measured"]) and row["met"] == "no" and "absent" in row["note"]
+    with pytest.raises(ValueError, match="cases"):
+        identification.bench(cases=("nonsense",))
+
+
+def test_a_free_run_of_the_true_drive_leaves_the_noise() -> None:
+    model = drive(Sum((Coulomb(20.0), Viscous(200.0))), m=95.0, N=1.0)
+    t = np.arange(800) * 1e-3
+    force = 60 * np.sin(8 * t)
+    x = simulate(model, t[-1], u={"force": Hold(t, force)}, t_eval=t, rtol=1e-8)["x"]
+    x = x + 1e-6 * np.random.default_rng(0).standard_normal(t.size)
+    (record,) = Dataset.of(t=t, x=x, force=force, units={"x": "m", "force": "N"}, name="true")
+    assert measured.free_run(model, record) < 5e-6
+    wrong = drive(Sum((Coulomb(20.0), Viscous(250.0))), m=95.0, N=1.0)
+    assert measured.free_run(wrong, record) > 1e-5
+
+
+def test_coloured_noise_and_distant_starts() -> None:
+    noise = coloured(np.random.default_rng(1), 20_000, 0.9)
+    assert np.var(noise) == pytest.approx(1 / (1 - 0.81), rel=0.15)
+    assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.9, abs=0.02)
+    start = far({"m": 2.0, "k": 5.0}, 4.0, 0)
+    assert all(0.25 < start[n] / x < 4 for n, x in (("m", 2.0), ("k", 5.0)))
+
+
+def test_some_files_end_as_they_should() -> None:
+    expected = {
+        "plain": "right", "MATLAB struct": "right", "MATLAB, cut off": "refused",
+        "empty cell": "refused",
+    }  # fmt: skip
+    chosen = {f.name: f for f in islice(campaign(), 32) if f.name in expected}
+    assert {name: outcome(file).kind for name, file in chosen.items()} == expected
+
+
+@pytest.mark.slow
+def test_the_campaign_has_a_hundred_different_files() -> None:
+    every = list(campaign())
+    assert len({f.name for f in every}) == len({f.content for f in every}) == len(every) >= 100
+    assert {f.truth for f in every} == {"good", "bad", "hidden"}
+
+
+@pytest.mark.slow
+def test_no_damaged_file_is_fitted_without_a_warning() -> None:
+    assert all(row["met"] == "yes" for row in goals(files()).values())
+
+
+@pytest.mark.slow
+def test_lugre_is_flagged_on_data_of_gms_and_ranked_below_it() -> None:
+    found = ranked()
+    assert [row.law for row in found.rows] == ["gms", "lugre"]
+    assert found["lugre"].status == "DOUBTFUL"
+    assert 3 * found["gms"].validation < found["lugre"].validation
+
+
+@pytest.mark.slow
+def test_a_law_with_two_directions_is_chosen_for_data_with_two() -> None:
+    two = measured.DIRECTIONS[1]
+    sides = {"mu_d_pos": 20.0, "mu_d_neg": 24.0, "sigma_2_pos": 160.0, "sigma_2_neg": 240.0}
+    law = with_values(law_from_text(two), sides | {"v_eps_pos": 1e-3, "v_eps_neg": 1e-3})
+    data = synthetic_drive_data(law, speeds=(0.01, 0.05, 0.1), dwell=0.3)
+    assert measured.closed_loop(data).law == two
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not measured.EMPS.is_dir(), reason="needs EMPS in ../shared/data/EMPS")
+def test_the_measured_drive_reaches_the_goals_of_the_closed_loop() -> None:
+    rows = goals(measured.emps(quick=True))
+    assert rows["closed loop x [%]"]["met"] == "yes"
+    assert rows["closed loop force [%]"]["met"] == "yes"
+    assert rows["open loop, round windows [mm]"]["measured"] < 6.5
+    assert rows["open loop [mm]"]["measured"] < 9.0
+    assert "asymmetric" in rows["open loop [mm]"]["note"]
+
+
+# ---- generated code ----
+
+
+@on_target
+@pytest.mark.heavy
+def test_cores_are_measured_and_compared_with_the_c_of_casadi(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for module in (codegen, embedded):
+        monkeypatch.setattr(module, "CASES", embedded.CASES[:1])
+    (_, row), goal = codegen.cores(quick=False)
+    own, guarded, casadi, best = (row[c] for c in row if "average" in c)
+    assert own < best < casadi
+    assert own < guarded
+    assert goal[1]["met"] == "yes"
+    rows = embedded.bench().tables[embedded.TITLE]
+    assert len(rows) == len(embedded.TARGETS)
+    assert {(r["unit test"], r["status"]) for r in rows} == {("ok", "measured")}
+    assert max(r["relative error"] for r in rows) < 1e-6
+
+
+def test_absent_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (codegen, embedded):
+        monkeypatch.setattr(module, "find_tools", lambda: Absent(("qemu-system-arm",)))
+        monkeypatch.setattr("symfric.foundation.programs.find_compiler", lambda: None)
+    monkeypatch.setattr(codegen, "find_compiler", lambda: None)
+    monkeypatch.setattr(codegen_runs, "find_compiler", lambda: None)
+    made = codegen.bench(quick=True, sections=("cores", "fuzz", "fmu"))
+    assert not made.tables
+    assert ["apt-get" in made.notes[0], *("no C compiler" in n for n in made.notes[1:])] == [
+        True
+    ] * 3
+    assert "apt-get" in embedded.bench().notes[0]
+    with pytest.raises(ValueError, match="sections"):
+        codegen.bench(sections=("nonsense",))
+    assert isnan(embedded.whole(nan)) and embedded.whole(2.7) == 3
+
+
+@pytest.mark.heavy
+def test_fuzzing_has_a_row_for_every_type(
+    monkeypatch: pytest.MonkeyPatch, compiler: object
+) -> None:
+    monkeypatch.setattr(codegen, "_blocks", lambda _: [(law_block(Dahl()), 2000)])
+    made = codegen.bench(quick=True, sections=("fuzz",))
+    rows = made.tables[codegen.FUZZ]
+    assert [row["type"] for row in rows] == ["f64", "f32"]
+    assert all(row["valid steps"] + row["repaired steps"] == 2000 for row in rows)
+    assert [row["met"] for row in made.tables[GOALS]] == ["yes"]
+
+
+@pytest.mark.heavy
+def test_compensators_meet_their_goals(monkeypatch: pytest.MonkeyPatch) -> None:
+    (bristles, law), *_ = plants(quick=True).items()
+    first = trials()[0]
+    cases = {case: first.cases[case] for case in (PROVEN, "levels x 0.5")}
+    monkeypatch.setattr(codegen_runs, "plants", lambda quick: {bristles: law})
+    monkeypatch.setattr(codegen_runs, "trials", lambda: [replace(first, cases=cases)])
+    monkeypatch.setattr(codegen_runs, "_cost", lambda: "")
+    made = codegen.bench(quick=True, sections=("compensation",))
+    rows = made.tables[codegen_runs.LOOPS]
+    assert [row["case"] for row in rows] == ["without", PROVEN, "levels x 0.5"]
+    assert rows[0][bristles].startswith("1 / 1")
+    assert [row["met"] for row in made.tables[GOALS]] == ["yes", "yes"]
+    assert callable(compensation)

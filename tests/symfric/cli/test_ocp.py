@@ -1,0 +1,67 @@
+"""`symfric ocp`: ready problems and those of a user's file."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from ocp import Legendre, Radau, Shooting, load
+from ocp.problems import READY
+from symfric.cli import ocp as command
+from symfric.cli.ocp import scheme_of
+
+
+def test_ready_problems_are_listed(symfric) -> None:
+    out = symfric("ocp").out
+    assert all(name in out for name in READY)
+
+
+def test_a_problem_of_a_file_is_solved_and_written(symfric, mine) -> None:
+    """A mass of 1 kg over 1 m from rest to rest in T: J = 12 / T^3."""
+    line = "ocp mine.py --set T=2 --intervals 10"
+    said = symfric(f"{line} --csv a.csv --save a.npz --plot a.png --json a.json")
+    assert said.err == "wrote a.csv, a.npz, a.png, a.json\n"
+    assert "verified" in said.out
+    assert "yes" in said.out
+    assert "difference" not in said.out
+    found = json.loads(Path("a.json").read_text())
+    assert found["cost"] == pytest.approx(12 / 8, rel=1e-3)
+    assert found["verification"]["ok"]
+    rows = list(csv.reader(Path("a.csv").read_text().splitlines()))
+    assert rows[0][:3] == ["t [s]", "x [m]", "v [m/s]"]
+    assert load("a.npz").cost == found["cost"]
+    assert Path("a.png").stat().st_size > 1000
+    again = symfric("ocp mine.py:problem --set T=2 --guess a.npz --scheme legendre2 --json -").json
+    assert again["cost"] == pytest.approx(12 / 8, rel=1e-3)
+
+
+def test_options_are_the_arguments_of_solve(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve(problem: object, **given: object) -> None:
+        seen.update(given)
+        raise ValueError("enough")
+
+    seen: dict[str, object] = {}
+    monkeypatch.setattr(command, "solve", solve)
+    options = "--intervals 7 --tolerance 0.1 --resting-margin 0.002 --max-time 3 --solver sqp"
+    symfric(f"ocp out_and_back --scheme radau5 --friction smooth {options}", 2)
+    del seen["progress"]
+    assert str(seen.pop("solver")).startswith("Sqp")
+    assert seen == {
+        "scheme": Radau(5), "friction": "smooth", "tolerance": 0.1, "resting_margin": 0.002,
+        "intervals": 7, "max_time": 3.0, "guess": None, "throw": False,
+    }  # fmt: skip
+
+
+def test_a_ready_problem_is_compared_with_its_best_known_cost(symfric) -> None:
+    said = symfric("ocp bryson_denham --intervals 10")
+    assert "difference" in said.out
+    assert "difference" not in symfric("ocp bryson_denham --intervals 10 --set wall=0.2").out
+
+
+def test_names_of_schemes() -> None:
+    assert scheme_of("radau") == Radau(3)
+    assert scheme_of("radau5") == Radau(5)
+    assert scheme_of("legendre2") == Legendre(2)
+    assert scheme_of("shooting") == Shooting("rodas5p")
+    assert scheme_of("shooting:exponential:4") == Shooting("exponential", 4)
