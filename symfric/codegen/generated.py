@@ -125,7 +125,9 @@ def generate(
         write_text(folder / file, text)
     content = manifest(several, texts)
     compiler = find_compiler() if kit else None
-    for c in several if compiler else ():
+    for c in several:
+        if compiler is None:
+            break
         try:
             sizes = footprint(c, folder, compiler)
         except CompileError:  # no sizes without a working compiler; `verify` reports why
@@ -223,7 +225,7 @@ def _described(c: CBlock) -> dict[str, Any]:
         "header": f"{c.name}.h",
         "source": f"{c.name}.c",
         "bytes": {
-            group: c.real.size * sum(row.count for row in rows)
+            group: c.real.size * sum(row.length for row in rows)
             for group, rows in c.block.members.items()
         },
         "functions": {

@@ -125,7 +125,7 @@ def helpers(c: CBlock, text: str) -> str:
         infinite="UINT32_C(0x7F800000)" if c.real.size == 4 else "UINT64_C(0x7FF0000000000000)",
     )
     names = ("bits", "beyond", "outside", "mended")
-    parts = dict(zip(names, general.rstrip().split("\n\n"), strict=True))
+    parts: dict[str, str] = dict(zip(names, general.rstrip().split("\n\n"), strict=True))
     limits = [parameter_range(v)[:2] for v in c.block.parameters]
     parts["unfit"] = _any(c, "unfit", "a parameter is outside its range", "param", limits)
     limits = [(-state_limit(v), state_limit(v)) for v in c.block.states]
@@ -152,7 +152,7 @@ def _any(c: CBlock, what: str, doc: str, group: str, limits: Sequence[tuple[floa
     """Return a function that is true if a member of a struct is outside its range."""
     single, loops = list[str](), list[str]()
     for member in c.block.members.get(group, ()):
-        ranges = limits[member.first : member.first + member.count]
+        ranges = limits[member.first : member.first + member.length]
         if group == "param" and member.name == STEP_SIZE:
             continue
         if member.size and len(set(ranges)) == 1:

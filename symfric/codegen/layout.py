@@ -53,7 +53,7 @@ class CBlock:
         return f"{self.name}_step({', '.join(structs)})"
 
     @property
-    def sizes(self) -> dict[str, object]:
+    def sizes(self) -> dict[str, str | int]:
         """Names and sizes for templates that call `flat_step`."""
         counts = {
             "states": len(self.block.states),

@@ -184,7 +184,7 @@ def _constant(c: CBlock, group: str, name: str) -> str:
     """Return a constant struct with the start value of every variable; arrays in own braces."""
     rows: list[tuple[str, str]] = []
     for member in c.block.members.get(group, ()):
-        variables = c.block.groups[group][member.first : member.first + member.count]
+        variables = c.block.groups[group][member.first : member.first + member.length]
         text = ", ".join(c.real.literal(float(v.start)) for v in variables)
         text = f"{{{text}}}," if member.size else f"{text},"
         rows.append((text, f"{member.name} [{member.unit}]"))
@@ -232,7 +232,7 @@ def _struct(c: CBlock, group: str, rows: Sequence[Member]) -> str:
     """Return a struct, every member with its meaning, unit, start or default value, and range."""
     width, lines = max(len(row.declared) for row in rows) + 1, ""
     for row in rows:
-        own = c.block.groups.get(group, ())[row.first : row.first + row.count]
+        own = c.block.groups.get(group, ())[row.first : row.first + row.length]
         text = meaning(row.doc, row.unit, *_numbers(group, own, c.guards))
         start = f"    {c.real.name} {row.declared + ';':<{width}} /* "
         columns = max(WIDTH - len(start) - 3, NARROW)

@@ -58,7 +58,7 @@ class Steps(NamedTuple):
 
     def chosen(self, rows: Integers) -> "Steps":
         """Return some of the rows."""
-        return Steps(*(column[rows] for column in self))
+        return Steps(self.states[rows], self.inputs[rows], self.changed[rows], self.values[rows])
 
 
 @final

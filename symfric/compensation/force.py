@@ -269,9 +269,14 @@ class Parts:
 
 
 def finished(
-    parts: Parts, F: ca.SX, ramp: float | None, limit: float | None, h: ca.SX | float, where: str
+    parts: Parts,
+    force: ca.SX,
+    ramp: float | None,
+    limit: float | None,
+    h: ca.SX | float,
+    where: str,
 ) -> ca.SX:
-    """Return F faded in over t_ramp, C1, while `enable` is above 1/2, and within +-F_max.
+    """Return the force faded in over t_ramp, C1, while `enable` is above 1/2, and within +-F_max.
 
     Args:
         ramp, limit: time [s] and largest force [N]; None if not chosen.
@@ -283,9 +288,9 @@ def finished(
         e = parts.state("faded_in", "1", "0: off, 1: on")
         end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
         parts.next.append(end)
-        F = F * smooth.step3(end)
+        force = force * smooth.step3(end)
     if limit is not None:
         checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
         most = parts.parameter("F_max", limit, "N", "largest force that is added")
-        F = ca.SX(smooth.clip(F, -most, most))
-    return F
+        force = ca.SX(smooth.clip(force, -most, most))
+    return force

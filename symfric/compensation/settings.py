@@ -10,7 +10,7 @@ from symfric.compensation.force import TERMS
 from symfric.foundation import checks
 
 VELOCITIES = ("blend", "reference", "measured")
-BOUNDS: dict[str, tuple[str, dict[str, float]]] = {
+BOUNDS: dict[str, tuple[str, dict[str, Any]]] = {
     "N": ("N", {"lower": 0.0}), "offset": ("N", {}), "v_blend": ("m/s", {"above": 0.0}),
     "build_up": ("m", {"above": 0.0}), "ramp": ("s", {"above": 0.0}),
     "dead_zone": ("m/s", {"lower": 0.0}), "inertia": ("kg", {"lower": 0.0}),

@@ -224,12 +224,11 @@ def woven(source: Graph, strands: Sequence[Strand], arrays: Arrays) -> Body:
         elif node.op != ca.OP_CONST:
             node = replace(node, args=tuple(number[a] for a in gathered[lanes]))
         number[lanes] = known.setdefault(node, len(known))
-    results = tuple(
-        tuple(number[s.lanes] for s in strands if isinstance(s, kind)) for kind in (Store, Sum)
-    )
+    stores = tuple(number[s.lanes] for s in strands if isinstance(s, Store))
+    sums = tuple(number[s.lanes] for s in strands if isinstance(s, Sum))
     inside = frozenset(i for lanes in gathered if len(set(lanes)) > 1 for i in lanes)
     leaves = tuple(outer), tuple(truths), tuple(reads), tuple(tables)
-    return Body(Graph(tuple(known), results), *leaves, inside)
+    return Body(Graph(tuple(known), (stores, sums)), *leaves, inside)
 
 
 def is_truth(source: Graph, i: int) -> bool:

@@ -82,7 +82,7 @@ class Member(NamedTuple):
         return f"{self.name}[{self.size}]" if self.size else self.name
 
     @property
-    def count(self) -> int:
+    def length(self) -> int:
         """Number of its values."""
         return max(self.size, 1)
 

@@ -143,13 +143,14 @@ def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
 def _together(body: Body, load: Body, frame: Frame) -> Body:
     """Return a body and its load at a frame, as one body."""
     c = ca.SX(frame.p) + ca.SX(frame.R) @ load.c
-    J = body.J + ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
+    inertia = body.J + ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
     mass = load.mass
     if not equals(body.mass, 0.0):
         mass = ca.SX(body.mass) + load.mass
         share, d = load.mass / mass, c - body.c
-        c, J = body.c + share * d, J - share * body.mass * (skew(d) @ skew(d))
-    six = [ca.SX(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        c = body.c + share * d
+        inertia = inertia - share * body.mass * (skew(d) @ skew(d))
+    six = [ca.SX(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     return replace(body, mass=mass, com=c, inertia=six, ideal=True)
 
 

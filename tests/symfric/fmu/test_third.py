@@ -9,6 +9,7 @@ from units import DISCARD, ERROR, OK, Archive, Third, over
 
 from symfric import BrownMcPhee, LuGre, simulate
 from symfric.codegen import plant_block
+from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu import export_fmu
@@ -57,7 +58,7 @@ def test_steps_of_a_fixed_length_are_those_of_the_plant(tmp_path):
     times = np.arange(33) / 8 * 0.25
     found = over(unit, times, ["x", "v", "attempts"])
     block = plant_block(model, h=1 / 1024, name="plant")
-    same = run_vm(block, DOUBLE, np.full((1024, 1), 1.7))
+    same = run_vm(CBlock(block, DOUBLE), np.full((1024, 1), 1.7))
     names = [*(s.name for s in block.states), *block.outputs]
     assert found[-1, 2] == 1024  # 1/32 s in 32 equal steps of at most 1 ms
     for i, name in enumerate(("x", "v")):

@@ -179,7 +179,7 @@ def test_arrays_are_struct_members_that_loops_of_three_and_more_elements_index()
     assert names[first : first + 4] == ["alpha_1", "alpha_2", "alpha_3", "alpha_4"]
     param = blocks[10].members["param"]
     assert [m.first for m in param if m.name == "alpha"] == [first]
-    assert sum(m.count for m in param) == len(blocks[10].parameters)
+    assert sum(m.length for m in param) == len(blocks[10].parameters)
     lines = [line.strip() for line in step(blocks[10])]
     assert [line.split()[0] for line in lines if "+=" in line].count("sum2") == 3
     assert any(line.startswith("double sum2 = ") for line in lines)
