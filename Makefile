@@ -21,7 +21,6 @@ test: $(VENV)/.test
 # SYMFRIC_DOCS=keep takes every picture as it is, for those who write text.
 docs: $(VENV)/.docs
 	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -n -q -j auto -d out/doctrees docs out/docs
-	$(BIN)/python -m docs.machine.links out/docs
 	@echo "docs: out/docs/index.html"
 
 # Every page in a browser, narrow and wide; says so where Chromium is not installed.
@@ -67,7 +66,7 @@ check: $(VENV)/.dev
 
 clean:
 	rm -rf $(VENV) .venv-newest .venv-extras out dist build .pytest_cache .ruff_cache .hypothesis
-	rm -rf docs/made docs/laws docs/scenes docs/gallery docs/examples docs/reference docs/benchmarks/*.rst
+	rm -rf docs/made docs/laws docs/scenes docs/gallery docs/examples docs/reference docs/benchmarks/*.md
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stages build on each other, so that `make -j` never runs two installers at once.

@@ -1,4 +1,4 @@
-"""Settings of the documentation; `make docs` builds it, `docs/README.md` says how it is made."""
+"""Settings of the documentation; `make docs` builds it, see `docs/README.md`."""
 
 import sys
 from pathlib import Path
@@ -18,8 +18,11 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_copybutton",
     "docs.machine.sphinx_pages",
+    "sphinx.ext.napoleon",  # after ours, which escapes markup
 ]
-source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+source_suffix = {".md": "markdown"}
+default_role = "code"
+napoleon_custom_sections = [("Attributes", "params_style")]
 exclude_patterns = ["README.md", "machine", "made"]
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence", "attrs_inline", "attrs_block"]
 myst_heading_anchors = 4

@@ -1,6 +1,4 @@
-"""A module that is called like CuPy as far as symfric goes: arrays in the memory of this machine,
-kernels compiled by its compiler; it records what is asked of it.
-"""
+"""Stand-in for CuPy: arrays in the memory of this machine, kernels compiled by its compiler."""
 
 import ctypes
 from types import SimpleNamespace
@@ -10,8 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.cuda import kernel
+from symfric.integrator.cuda.kernel import AFTER, BEFORE, NAME
 
+ON_HOST = """#include <math.h>
+#include <stdbool.h>
+#define DEVICE inline
+#define BESIDE
+#define TICKET(count) ((*(count))++)
+"""
+LAUNCH_ON_HOST = f"""
+/* Runs the threads one after another. */
+void {NAME}(const Many *all, long long threads)
+{{
+    for (long long i = 0; i < threads; ++i) symfric_thread(all);
+}}
+"""
 PROPERTIES = {
     "name": b"Fake 100", "multiProcessorCount": 3, "maxThreadsPerMultiProcessor": 2048,
     "regsPerMultiprocessor": 65536,
@@ -29,40 +40,21 @@ class FakeArray:
         return self._array.copy()
 
 
-class FakeFunction:
-    """As far as needed, `cupy.RawKernel`."""
-
-    num_regs = 94
-
-    def __init__(self, module: "FakeCupy", code: str) -> None:
-        self.module = module
-        begin, end = kernel.ON_DEVICE, code[code.index('\nextern "C" __global__') :]
-        assert code.startswith(begin)
-        text = code.removeprefix(begin).removesuffix(end)
-        whole = f"{kernel.ON_HOST}{text}{kernel.LAUNCH_ON_HOST.substitute(name=kernel.NAME)}"
-        self.library = load(whole, kernel.NAME)
-
-    def __call__(self, grid: tuple[int], block: tuple[int], arguments: tuple[FakeArray]) -> None:
-        self.module.launches.append((grid, block))
-        if self.module.broken:
-            raise RuntimeError("cudaErrorLaunchTimeout: the launch timed out")
-        (held,) = arguments
-        self.library.symfric_launch(
-            ctypes.c_void_p(held.data.ptr), ctypes.c_longlong(grid[0] * block[0])
-        )
-
-
 class FakeCupy:
-    """As far as needed, the module `cupy`."""
+    """As far as needed, the module `cupy`; it records its calls.
+
+    `most` limits the threads of a launch, which a device takes from its properties.
+    """
 
     class CompileException(Exception):  # noqa: N818
         """As CuPy's, not a RuntimeError."""
 
-    def __init__(self, devices: int = 1, free: int = 2**30) -> None:
+    def __init__(self, devices: int = 1, free: int = 2**30, most: int | None = None) -> None:
         self.modules: list[dict[str, Any]] = []
         self.launches: list[tuple[tuple[int], tuple[int]]] = []
-        self.room, self.broken, self.refuses = free, False, False
-        self.waited = 0
+        self.todo: list[int] = []
+        self.room, self.largest, self.most = free, free, most
+        self.broken, self.refuses, self.waited = False, False, 0
         runtime = SimpleNamespace(
             getDeviceCount=lambda: self._count(devices),
             getDevice=lambda: 0,
@@ -87,19 +79,36 @@ class FakeCupy:
         return SimpleNamespace(free_all_blocks=lambda: None)
 
     def asarray(self, array: NDArray[Any]) -> FakeArray:
-        if array.nbytes > self.room:
+        if array.nbytes > self.largest:
             raise MemoryError("out of memory")
+        if array.dtype == np.int32:
+            self.todo.append(array.size)
         return FakeArray(np.array(array, order="C"))
 
     def full(self, shape: tuple[int, ...], value: float, dtype: Any) -> FakeArray:
         return FakeArray(np.full(shape, value, dtype))
 
-    def RawModule(self, **asked: Any) -> Any:
-        self.modules.append(asked)
+    def RawModule(self, **given: Any) -> Any:
+        self.modules.append(given)
         return SimpleNamespace(get_function=self._function)
 
-    def _function(self, name: str) -> FakeFunction:
-        assert name == kernel.NAME
+    def _function(self, name: str) -> Any:
+        assert name == NAME
         if self.refuses:
             raise self.CompileException("symfric.cu(1): error: identifier is undefined\nmore")
-        return FakeFunction(self, self.modules[-1]["code"])
+        code = self.modules[-1]["code"]
+        assert code.startswith(BEFORE) and code.endswith(AFTER)
+        text = code.removeprefix(BEFORE).removesuffix(AFTER)
+        library = load(f"{ON_HOST}{text}{LAUNCH_ON_HOST}", NAME)
+
+        def launch(grid: tuple[int], block: tuple[int], arguments: tuple[FakeArray]) -> None:
+            self.launches.append((grid, block))
+            if self.broken:
+                raise RuntimeError("cudaErrorLaunchTimeout: the launch timed out")
+            threads = min(self.most or 2**60, grid[0] * block[0])
+            library.symfric_launch(
+                ctypes.c_void_p(arguments[0].data.ptr), ctypes.c_longlong(threads)
+            )
+
+        launch.num_regs = 94  # type: ignore[attr-defined]
+        return launch

@@ -8,7 +8,12 @@ FLOORS: dict[str, set[str]] = {
     "symfric.laws.composed": {"symfric.foundation", "symfric.laws.base"},
     "symfric.laws": {"symfric.foundation"},
     "symfric.model": {"symfric.foundation"},
-    "symfric.multibody": {"symfric.foundation", "symfric.laws", "symfric.model"},
+    "symfric.multibody": {
+        "symfric.foundation",
+        "symfric.laws",
+        "symfric.model",
+        "symfric.results",
+    },
     "symfric.scenes": {
         "symfric.foundation",
         "symfric.laws",

@@ -3,7 +3,6 @@
 from functools import cache
 
 import casadi as ca
-from dynamic_cases import DYNAMIC
 
 from symfric import (
     ALL_LAWS,
@@ -23,14 +22,45 @@ from symfric import (
 )
 from symfric.laws import (
     BAM,
+    GMS,
+    BlimanSorine,
+    Bristle2D,
+    ElastoPlastic,
+    ExactCoulomb,
+    HaessigFriedland,
     Hollars,
+    Karnopp,
+    Lagged,
+    LeineSwitch,
     MakkarDixon,
+    MaxwellSlip,
     PoppStelter,
     PowerLawViscous,
+    RateAndState,
     RuiWang,
     Specker,
     SteadyStateLuGre,
+    StickSlip,
+    TemperatureDependent,
 )
+
+DYNAMIC: dict[str, Law] = {
+    "bliman_sorine, order 1": BlimanSorine(order="1"),
+    "haessig_friedland, event": HaessigFriedland(form="event"),
+    "elasto_plastic, viscous": ElastoPlastic(sigma_2=0.4),
+    "maxwell_slip, n 2": MaxwellSlip(n=2.0),
+    "maxwell_slip, event": MaxwellSlip(form="event"),
+    "gms, event, viscous": GMS(sigma_2=0.4, form="event"),
+    "stick_slip, published": StickSlip(branch="published"),
+    "bristle_2d, kappa 0.2": Bristle2D(kappa=0.2),
+    "lagged(stribeck)": Lagged(Stribeck(sigma_2=0.4)),
+    "temperature_dependent(lugre)": TemperatureDependent(LuGre(sigma_2=0.4), T=303.15, k_dry=0.01),
+    "karnopp, event": Karnopp(sigma_2=0.4, form="event"),
+    "exact_coulomb, stribeck": ExactCoulomb(sigma_2=0.4, form="stribeck"),
+    "leine_switch, event": LeineSwitch(form="event"),
+    "rate_and_state, slip": RateAndState(evolution="slip"),
+}
+"""Laws with states whose options lead to other expressions than the defaults."""
 
 SYMMETRIC: dict[str, Law] = {
     **{name: kind() for name, kind in ALL_LAWS.items() if kind.facts.odd},

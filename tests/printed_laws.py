@@ -1,17 +1,30 @@
-"""The equation that each static law prints, at any numbers, for v > 0, in plain Python.
+"""The equation that each static law prints, in plain Python: branches, signs, powers of floats.
 
-sign(v) is the smooth sign that the law names; |v| is |v|. `p` holds the parameters by their names.
+Independent of the library. `p` is a law with numbers, of which only parameters and options are
+read. Equations hold for v > 0, those of laws with further inputs for either sign.
 """
 
 from collections.abc import Callable
-from math import asin, atan, e, exp, pi, sin, sqrt, tanh
+from math import asin, atan, copysign, cos, e, erf, exp, pi, sin, sqrt, tan, tanh
 from types import SimpleNamespace
+from typing import Any
 
-Given = SimpleNamespace
-Formula = Callable[[Given, float, float], float]
+Formula = Callable[[Any, float, float], float]
+SIGNS: dict[str, Callable[[float], float]] = {
+    "tanh": tanh,
+    "atan": lambda u: 2 * atan(u) / pi,
+    "erf": erf,
+    "sqrt": lambda u: u / sqrt(1 + u**2),
+    "saturation": lambda u: min(u, 1.0),
+    "quadratic": lambda u: 2 * u - u**2 if u < 1 else 1.0,
+}
 
 
-def falls(p: Given, share: float) -> float:
+def sign(v: float, width: float) -> float:
+    return tanh(v / width) if width else 1.0
+
+
+def falls(p: Any, share: float) -> float:
     """The coefficient that falls from mu_s to mu_d with a share."""
     return p.mu_d + (p.mu_s - p.mu_d) * share
 
@@ -26,53 +39,73 @@ def quintic(t: float) -> float:
     return t**3 * (10 - 15 * t + 6 * t * t)
 
 
-def stribeck(p: Given, v: float, N: float) -> float:
-    return N * falls(p, weight(v / p.v_s, p.delta)) * tanh(v / p.v_eps) + p.sigma_2 * v
+def cubic(t: float) -> float:
+    """STEP of ADAMS."""
+    t = min(max(t, 0.0), 1.0)
+    return t * t * (3 - 2 * t)
 
 
-def tustin(p: Given, v: float, N: float) -> float:
-    return N * falls(p, exp(-v / p.v_s)) * tanh(v / p.v_eps) + p.sigma_2 * v
+def coulomb(p: Any, v: float, N: float) -> float:
+    return p.mu_d * N * SIGNS[p.shape](v / p.v_eps)
 
 
-def benson(p: Given, v: float, N: float) -> float:
-    return N * falls(p, exp(-p.d_c * v)) * tanh(v / p.v_eps)
+def viscous(p: Any, v: float, N: float) -> float:
+    return p.sigma_2 * v
 
 
-def berger(p: Given, v: float, N: float) -> float:
+def power_law_viscous(p: Any, v: float, N: float) -> float:
+    return p.sigma_2 * v * (v**2 + p.v_eps**2) ** ((p.d - 1) / 2)
+
+
+def stribeck(p: Any, v: float, N: float) -> float:
+    return N * falls(p, weight(v / p.v_s, p.delta)) * sign(v, p.v_eps) + p.sigma_2 * v
+
+
+def tustin(p: Any, v: float, N: float) -> float:
+    return N * falls(p, exp(-v / p.v_s)) * sign(v, p.v_eps) + p.sigma_2 * v
+
+
+def benson(p: Any, v: float, N: float) -> float:
+    return N * falls(p, exp(-p.d_c * v)) * sign(v, p.v_eps)
+
+
+def berger(p: Any, v: float, N: float) -> float:
     return N * falls(p, exp(-v / p.v_s)) * tanh(v / p.v_t)
 
 
-def duan_singh(p: Given, v: float, N: float) -> float:
+def duan_singh(p: Any, v: float, N: float) -> float:
     return p.mu_d * N * (1 + (p.mu_s / p.mu_d - 1) * exp(-p.c * v)) * tanh(p.sigma * v)
 
 
-def andersson(p: Given, v: float, N: float) -> float:
+def andersson(p: Any, v: float, N: float) -> float:
     return N * falls(p, weight(v / p.v_s, p.p)) * tanh(p.k_t * v) + p.sigma_2 * v
 
 
-def steady_state_lugre(p: Given, v: float, N: float) -> float:
+def steady_state_lugre(p: Any, v: float, N: float) -> float:
     level = p.F_C + (p.F_S - p.F_C) * weight(v / p.v_s, p.delta)
-    return level * tanh(v / p.v_eps) + p.sigma_2 * v
+    return level * sign(v, p.v_eps) + p.sigma_2 * v
 
 
-def quarter_car_simple(p: Given, v: float, N: float) -> float:
+def quarter_car_simple(p: Any, v: float, N: float) -> float:
     return p.C_e * exp(-v / p.e_1) * tanh(v / p.v_eps) + p.sigma_v * v
 
 
-def lorentzian(p: Given, v: float, N: float) -> float:
-    return N * falls(p, 1 / (1 + (v / p.v_s) ** 2)) * tanh(v / p.v_eps) + p.sigma_2 * v
+def lorentzian(p: Any, v: float, N: float) -> float:
+    return N * falls(p, 1 / (1 + (v / p.v_s) ** 2)) * sign(v, p.v_eps) + p.sigma_2 * v
 
 
-def popp_stelter(p: Given, v: float, N: float) -> float:
+def popp_stelter(p: Any, v: float, N: float) -> float:
     mu = p.mu_s * ((1 - p.eta) / (1 + p.d * v) + p.eta) + p.kappa * v**2
-    return N * mu * tanh(v / p.v_eps)
+    return N * mu * sign(v, p.v_eps)
 
 
-def leine_switch(p: Given, v: float, N: float) -> float:
-    return p.mu_s * N * (2 / pi) * atan(v / p.v_eps) / (1 + p.delta * v)
+def leine_switch(p: Any, v: float, N: float) -> float:
+    """For the original, beyond its band."""
+    direction = 1.0 if p.form == "original" else 2 / pi * atan(v / p.v_eps)
+    return p.mu_s * N * direction / (1 + p.delta * v)
 
 
-def bittencourt(p: Given, v: float, N: float) -> float:
+def bittencourt(p: Any, v: float, N: float) -> float:
     """The maximum as the law rounds it, over F_eps."""
     static = p.F_s0 + p.F_sT * p.T
     static = (static + sqrt(static**2 + p.F_eps**2)) / 2
@@ -81,108 +114,154 @@ def bittencourt(p: Given, v: float, N: float) -> float:
     return level * tanh(v / p.v_eps) + (p.F_v0 + p.F_vT * exp(-p.T / p.T_v)) * v
 
 
-def coulomb(p: Given, v: float, N: float) -> float:
-    return p.mu_d * N * tanh(v / p.v_eps)
+def threlfall(p: Any, v: float, N: float) -> float:
+    if p.form == "smooth":
+        return p.mu_d * N * tanh(3 * v / p.v_r)
+    return p.mu_d * N * (1 - exp(-3 * v / p.v_r) if v <= p.v_r else 0.95)
 
 
-def viscous(p: Given, v: float, N: float) -> float:
-    return p.sigma_2 * v
+def modified_threlfall(p: Any, v: float, N: float) -> float:
+    if p.form == "smooth":
+        return p.mu_d * N * tanh(3 * v / p.v_r)
+    return p.mu_d * N * ((1 - exp(-3 * v / p.v_r)) / (1 - exp(-3)) if v <= p.v_r else 1.0)
 
 
-def power_law_viscous(p: Given, v: float, N: float) -> float:
-    return p.sigma_2 * v * (v**2 + p.v_eps**2) ** ((p.d - 1) / 2)
-
-
-def threlfall(p: Given, v: float, N: float) -> float:
-    return p.mu_d * N * tanh(3 * v / p.v_r)
-
-
-def bengisu_akay(p: Given, v: float, N: float) -> float:
+def bengisu_akay(p: Any, v: float, N: float) -> float:
     u = v / p.v_0
     if u <= 1:
         return p.mu_s * N * u * (2 - u)
-    return N * falls(p, exp(-((p.xi * (v - p.v_0)) ** 2)))
+    beyond = p.xi * (v - p.v_0)
+    return N * falls(p, exp(-(beyond**2 if p.form == "smooth" else beyond)))
 
 
-def velocity_based(p: Given, v: float, N: float) -> float:
-    rise = 2 * quintic((v + p.v_s) / (2 * p.v_s)) - 1
-    return N * rise * (p.mu_s - (p.mu_s - p.mu_d) * quintic((v - p.v_s) / (p.v_d - p.v_s)))
+def velocity_based(p: Any, v: float, N: float) -> float:
+    step = quintic if p.form == "smooth" else cubic
+    rise = 2 * step((v + p.v_s) / (2 * p.v_s)) - 1
+    return N * rise * (p.mu_s - (p.mu_s - p.mu_d) * step((v - p.v_s) / (p.v_d - p.v_s)))
 
 
-def ambrosio(p: Given, v: float, N: float) -> float:
-    return p.mu_d * N * quintic((v - p.v_0) / (p.v_1 - p.v_0))
+def ambrosio(p: Any, v: float, N: float) -> float:
+    t = (v - p.v_0) / (p.v_1 - p.v_0)
+    return p.mu_d * N * (quintic(t) if p.form == "smooth" else min(max(t, 0.0), 1.0))
 
 
-def step5(p: Given, v: float, N: float) -> float:
+def step5(p: Any, v: float, N: float) -> float:
     u = v / p.v_t
     fall = (p.mu_s - p.mu_d) * quintic((u - 1) / 2)
     return N * (p.mu_s * quintic(u) - fall + p.mu_v * v)
 
 
-def hollars(p: Given, v: float, N: float) -> float:
+def hollars(p: Any, v: float, N: float) -> float:
     u = v / p.v_t
     return N * (min(u, 1) * (p.mu_d + 2 * (p.mu_s - p.mu_d) / (1 + u**2)) + p.mu_v * v)
 
 
-def exudyn(p: Given, v: float, N: float) -> float:
+def exudyn(p: Any, v: float, N: float) -> float:
     if v <= p.v_reg:
         return N * p.mu_s * v / p.v_reg
     w = v - p.v_reg
     return N * (falls(p, exp(-w / p.v_exp)) + p.mu_v * w)
 
 
-def brown_mcphee(p: Given, v: float, N: float) -> float:
+def brown_mcphee(p: Any, v: float, N: float) -> float:
     x = v / p.v_t
     dry = p.mu_d * tanh(4 * x) + (p.mu_s - p.mu_d) * x / (x**2 / 4 + 3 / 4) ** 2
     return N * dry + p.mu_v * v * tanh(4 * N / p.N_t)
 
 
-def simscape_breakaway(p: Given, v: float, N: float) -> float:
+def simscape_breakaway(p: Any, v: float, N: float) -> float:
     u = v / (sqrt(2) * p.v_brk)
     bump = sqrt(2 * e) * (p.mu_s - p.mu_d) * u * exp(-(u**2))
     return N * (bump + p.mu_d * tanh(10 * v / p.v_brk)) + p.sigma_2 * v
 
 
-def specker(p: Given, v: float, N: float) -> float:
+def specker(p: Any, v: float, N: float) -> float:
     top = N * (p.mu_s - p.mu_d * tanh(p.v_sp / p.v_t)) - p.sigma_2 * p.v_sp
     bump = top * (v / p.v_sp) * exp(0.5 - (v / p.v_sp) ** 2 / 2)
     return bump + p.mu_d * N * tanh(v / p.v_t) + p.sigma_2 * v
 
 
-def makkar_dixon(p: Given, v: float, N: float) -> float:
+def makkar_dixon(p: Any, v: float, N: float) -> float:
     bump = p.gamma_1 * (tanh(p.gamma_2 * v) - tanh(p.gamma_3 * v))
     return bump + p.gamma_4 * tanh(p.gamma_5 * v) + p.gamma_6 * v
 
 
-def self_tuning(p: Given, v: float, N: float) -> float:
+def self_tuning(p: Any, v: float, N: float) -> float:
     y = p.B * v
     C = 2 - (2 / pi) * asin(p.mu_d / p.mu_s)
     return p.mu_s * N * sin(C * atan((1 - p.E) * y + p.E * atan(y)))
 
 
-def brittle_self_tuning(p: Given, v: float, N: float) -> float:
+def brittle_self_tuning(p: Any, v: float, N: float) -> float:
     share = (p.mu_s - p.mu_d) / p.difference_ref * N / p.N_ref
     B = p.B_0 + (p.B_max - p.B_0) * (1 - exp(-share))
     return self_tuning(SimpleNamespace(**{**vars(p), "B": B}), v, N)
 
 
-def rui_wang(p: Given, v: float, N: float) -> float:
+def rui_wang(p: Any, v: float, N: float) -> float:
     y = p.B * v
     return p.D * sin(p.C * atan((1 - p.E) * y + p.E * atan(y)))
 
 
-def capstan(p: Given, v: float, N: float) -> float:
-    return N * (exp(p.mu_d * p.beta * tanh(v / p.v_eps)) - 1)
+def capstan(p: Any, v: float, N: float) -> float:
+    return N * (exp(p.mu_d * p.beta * sign(v, p.v_eps)) - 1)
 
 
-SMOOTH: dict[str, Formula] = {
+PRINTED: dict[str, Formula] = {
     f.__name__: f
     for f in (
-        *(stribeck, tustin, benson, berger, duan_singh, andersson, steady_state_lugre),
-        *(quarter_car_simple, lorentzian, popp_stelter, leine_switch, bittencourt, coulomb),
-        *(viscous, power_law_viscous, threlfall, bengisu_akay, velocity_based, ambrosio, step5),
-        *(hollars, exudyn, brown_mcphee, simscape_breakaway, specker, makkar_dixon, self_tuning),
-        *(brittle_self_tuning, rui_wang, capstan),
+        *(coulomb, viscous, power_law_viscous, stribeck, tustin, benson, berger, duan_singh),
+        *(andersson, steady_state_lugre, quarter_car_simple, lorentzian, popp_stelter, capstan),
+        *(leine_switch, bittencourt, threlfall, modified_threlfall, bengisu_akay, velocity_based),
+        *(ambrosio, step5, hollars, exudyn, brown_mcphee, simscape_breakaway, specker),
+        *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang),
     )
-} | {"modified_threlfall": threlfall}
-"""Law by name -> its equation."""
+}
+"""Law by name -> its equation (law, v, N)."""
+
+
+def karnopp(p: Any, v: float, N: float, F_e: float) -> float:
+    if abs(v) >= p.D_v:
+        return copysign(p.mu_d * N, v) + p.sigma_2 * v
+    return max(-p.mu_s * N, min(F_e, p.mu_s * N))
+
+
+def awrejcewicz(p: Any, v: float, N: float, F_e: float) -> float:
+    """The four branches; the slip branch starts at the static level with a Gaussian fall."""
+    static, width = p.mu_s * N, p.epsilon
+    if abs(v) > width:
+        fall = N * falls(p, exp(-(((abs(v) - width) / p.v_s) ** 2)))
+        return copysign(fall, v)
+    direction = copysign(1.0, v) if v else 0.0
+    A = v**2 / width**2 * (3 - 2 * abs(v) / width)
+    if abs(F_e) <= static:
+        return A * (static * direction - F_e) + F_e
+    if v * F_e >= 0:
+        return copysign(static, F_e)
+    return (2 * A - 1) * static * direction
+
+
+def quarter_car_general(p: Any, v: float, N: float, x_rel: float, v_rel: float) -> float:
+    """Equation 24, smooth beyond the stick window."""
+    f = p.k_s * x_rel + p.b_d * v_rel
+    shift = x_rel * cos(p.theta) / (p.L_d - x_rel * sin(p.theta))
+    lever = p.mu / tan(p.theta - atan(shift / sqrt(1 - shift**2)))
+    if v == 0:
+        return f
+    direction = copysign(1.0, v)
+    load = f if p.form == "as_printed" else direction * sqrt(f**2 + p.F_eps**2)
+    return direction * p.C_e * exp(-abs(v) / p.e_1) + load * lever + p.sigma_v * v
+
+
+def wojewoda(p: Any, v: float, N: float, dv: float) -> float:
+    """Far from the smoothing, for v > 0."""
+    return N * falls(p, copysign(exp(-p.a_1 * v / (abs(dv) + p.a_2)), dv))
+
+
+def bam(p: Any, v: float, N: float, tau_m: float, tau_e: float) -> float:
+    """Model M6 of the servo family for v > 0, far from the smoothing."""
+    budget = p.K_s + abs(p.K_es * tau_e - p.K_ms * tau_m)
+    if tau_m * tau_e < 0:
+        budget += p.Q_e * tau_e**2 if abs(tau_m) > abs(tau_e) else p.Q_m * tau_m**2
+    stribeck = exp(-((v / p.v_s) ** p.alpha)) * budget
+    return p.K_b + abs(p.K_e * tau_e - p.K_m * tau_m) + stribeck + p.K_v * v

@@ -9,19 +9,23 @@ import casadi as ca
 from symfric import Contact, Law, Model, Output, Variable
 from symfric.scenes.base import contact
 
+SCALE = Variable("scale", "1", start=1.0)
+"""Factor of the velocity of a prescribed motion."""
+
 
 def prescribed_motion(law: Law, N: float, velocity: Callable[[ca.SX], ca.SX]) -> Model:
-    """`law` slid with the given velocity of time from the unloaded law: path, work, friction."""
+    """`law`, unloaded at first, slid with `SCALE` times a velocity of time."""
     path = Variable("path", "m", nominal=1e-5)
     work = Variable("work", "J", nominal=1e-5)
     t = ca.SX.sym("t")
-    v = velocity(t)
+    v = SCALE.symbol * velocity(t)
     slip = contact("slide", law, v, N, rest={})
     rest = law.steady_state(0.0, N)
     states = tuple(replace(s, start=float(rest[i])) for i, s in enumerate(slip.states))
     return Model(
         "rig",
         x=(path, work, *states),
+        p=(SCALE,),
         ode=ca.vertcat(v, slip.friction * v, slip.rate),
         events=slip.events(),
         outputs={"friction": Output(slip.friction, "N"), "v": Output(v, "m/s")},

@@ -1,16 +1,15 @@
-"""Pages of laws and scenes: formula, picture, facts and parameters, all of it from the code."""
+"""Pages of laws and scenes from the code: formula, picture, facts and parameters."""
 
 import inspect
 import re
-from inspect import getdoc
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from docs.machine import rst
+from docs.machine.docstrings import first_line
 from docs.machine.formula import name as symbol
-from docs.machine.names import linked
-from docs.machine.rst import first_line, sentence, to_rst
+from docs.machine.markdown import block, code, contents, directive, plain, table
 from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, law_name, parameters
 from symfric.cli.laws import costs
 from symfric.figures.data import phenomena
@@ -33,22 +32,24 @@ MADE_OF_LAWS: dict[str, type[Any]] = {
     "spatial_slip": SpatialSlip,
     "table": Table,
 }
-"""Laws that need other laws or data; they have no defaults, hence no picture of their own."""
+"""Laws that need other laws or data; without defaults, they have no picture."""
+LAW_PAGES: Mapping[str, type[Any]] = ALL_LAWS | POPULATIONS | MADE_OF_LAWS
+"""Name of the page -> class."""
 
+WITH_DATA = "Made of laws and data"
 FAMILIES = {
-    "Maps of the velocity": "The force follows from velocity and load alone. Smooth at rest, so "
-    "that they creep under a load.",
-    "With the applied force": "They hold what is applied at rest, and need to know it.",
-    "With states": "Bristles, lag, ageing and modes: what friction remembers for a while.",
-    "With non-local memory": "Closed loops inside loops: pre-sliding hysteresis as measured.",
-    "Populations of contacts": "Many contacts that are made and lost at random: for figures, no "
-    "scene takes them.",
-    "Made of laws and data": "They wrap other laws, or take a table.",
+    "Maps of the velocity": "The force follows from velocity and load alone. These laws are smooth "
+    "at rest and creep under a load.",
+    "With the applied force": "These laws hold the applied force at rest and need it as an input.",
+    "With states": "Bristles, lag, ageing and modes: friction with memory.",
+    "With non-local memory": "Nested closed loops: pre-sliding hysteresis as measured.",
+    "Populations of contacts": "Many contacts that form and break at random: for figures only.",
+    WITH_DATA: "These laws wrap other laws, or take a table.",
 }
 
 
 def family(law: AnyLaw) -> str:
-    """The family of a law in the gallery."""
+    """Return the family of a law in the gallery."""
     if type(law) in POPULATIONS.values():
         return "Populations of contacts"
     if "M" in law.facts.phenomena and law.states:
@@ -59,316 +60,224 @@ def family(law: AnyLaw) -> str:
 
 
 def every() -> dict[str, AnyLaw]:
-    """Every law with defaults."""
+    """Return every law with defaults."""
     return {name: kind() for name, kind in (ALL_LAWS | POPULATIONS).items()}
 
 
 def law_pages() -> dict[str, str]:
-    """Name of each page, relative to `laws`, -> its text."""
+    """Return the text of each page, by its name relative to `laws`."""
     laws = every()
     found = {name: law_page(name, law) for name, law in laws.items()}
-    found |= {name: wrapper_page(kind) for name, kind in MADE_OF_LAWS.items()}
+    found |= {name: entry(kind, f"symfric.{kind.__name__}") for name, kind in MADE_OF_LAWS.items()}
     return found | {"index": law_index(laws)}
 
 
-def law_index(laws: dict[str, AnyLaw]) -> str:
-    """All laws by family, and what the codes mean."""
-    text = rst.title("Laws")
-    text += (
-        f"{len(laws)} laws with default parameters, each as an equation, a picture and a table; "
-        f"and {len(MADE_OF_LAWS)} that are made of laws or data. Names are those of "
-        "``symfric laws NAME`` and of ``symfric run SCENE --law NAME``. What the letters under "
-        "*shows* mean stands at the end; *instructions* are those of CasADi for force and rate, "
-        "and for their derivatives; *formula* says what it was compared with, *unverified* that it "
-        "was written from memory.\n\n"
+def law_index(laws: Mapping[str, AnyLaw]) -> str:
+    """Return all laws by family, and the meaning of the codes."""
+    text = (
+        f"# Laws\n\n{len(laws)} laws with default parameters, each with its equation, a picture "
+        f"and a table; and {len(MADE_OF_LAWS)} that are made of laws or data. Names are those of "
+        "`symfric laws NAME` and of `symfric run SCENE --law NAME`. The codes under *shows* are "
+        "explained at the end of the page; *instructions* are those of CasADi for force and rate, "
+        "and for their derivatives; *formula* states the reference of the formula, *unverified* "
+        "if there is none.\n\n"
     )
     for title, about in FAMILIES.items():
-        text += rst.title(title, "-") + about + "\n\n"
-        if title == "Made of laws and data":
-            rows = [
-                [f":doc:`{name} <{name}>`", rst.plain(first_line(kind.__doc__))]
-                for name, kind in MADE_OF_LAWS.items()
-            ]
-            text += rst.table(["law", "what it is"], rows)
-            text += rst.pages((f"{name} <{name}>" for name in MADE_OF_LAWS), hidden="")
+        text += f"## {title}\n\n{about}\n\n"
+        if title == WITH_DATA:
+            rows = [[f"[{n}]({n}.md)", first_line(k.__doc__)] for n, k in MADE_OF_LAWS.items()]
+            text += table(["law", "description"], rows) + contents(MADE_OF_LAWS)
             continue
         own = {name: law for name, law in laws.items() if family(law) == title}
-        text += cards(own) + overview(own) + rst.pages((f"{n} <{n}>" for n in own), hidden="")
-    text += rst.title("Codes", "-")
-    return text + rst.table(
-        ["code", "phenomenon"], [[c, rst.plain(said)] for c, said in PHENOMENA.items()]
-    )
+        text += cards((f"/made/laws/{n}_small.png", n, n, f"force of {n} in sliding") for n in own)
+        rows = [
+            [f"[{name}]({name}.md)", " ".join(phenomena(law)), len(law.states),
+             law.facts.smoothness.split()[0], f"{cost(law).value} / {cost(law).gradient}",
+             plain(law.facts.confidence)]
+            for name, law in own.items()
+        ]  # fmt: skip
+        head = ["law", "shows", "states", "smoothness", "instructions", "formula"]
+        text += table(head, rows, "numbers") + contents(own)
+    return text + "## Codes\n\n" + table(["code", "phenomenon"], PHENOMENA.items())
 
 
-def overview(laws: dict[str, AnyLaw]) -> str:
-    """A table of laws: what they show, how smooth they are and what they cost."""
-    rows = [
-        [
-            f":doc:`{name} <{name}>`",
-            " ".join(phenomena(law)),
-            str(len(law.states)),
-            rst.plain(law.facts.smoothness.split()[0]),
-            f"{cost(law).value} / {cost(law).gradient}",
-            rst.plain(law.facts.confidence),
-        ]
-        for name, law in laws.items()
-    ]
-    return rst.table(
-        ["law", "shows", "states", "smoothness", "instructions", "formula"], rows, "numbers"
-    )
+def cards(pictures: Iterable[tuple[str, str, str, str]], kind: str = "cards") -> str:
+    """Return small pictures: file, page, caption and alternative text of each."""
+    return directive("container", kind, "".join(
+        directive("figure", file, caption, target=f"{page}.html", alt=plain(alt))
+        for file, page, caption, alt in pictures
+    ))  # fmt: skip
 
 
-def cards(laws: dict[str, AnyLaw]) -> str:
-    """Small pictures that lead to the pages."""
-    body = "".join(
-        rst.directive(
-            "figure", f"/made/laws/{name}_small.png", rst.plain(name) + "\n",
-            target=f"{name}.html", alt=f"force of {name} in steady sliding",
-        )
-        for name in laws
-    )  # fmt: skip
-    return rst.directive("container", "cards", body)
+def entry(kind: type[Any], full: str) -> str:
+    """Return the title and the documentation of a law or a scene."""
+    title = first_line(kind.__doc__).split(":")[0].rstrip(".")
+    text = f"# {plain(title)}\n\n" + directive("eval-rst", "", f".. autoclass:: {full}\n")
+    if kind in (PlanarSlip, SpatialSlip):
+        base = kind.__mro__[1]
+        rst = f".. autoclass:: {base.__module__}.{base.__name__}\n   :no-index:\n"
+        text += f"## {base.__name__}\n\n" + directive("eval-rst", "", rst)
+    return text
 
 
 def law_page(name: str, law: AnyLaw) -> str:
-    """One law in full."""
-    kind = type(law)
-    doc = getdoc(kind) or ""
-    text = rst.title(first_line(doc).split(":")[0].rstrip("."))
-    text += (
-        f"``{name}`` on the command line, ``from symfric import {kind.__name__}`` in Python.\n\n"
-    )
-    text += to_rst(without_title(doc), linked, symbols=True)
-    about = f"{name}: what it does, with its default numbers"
-    text += rst.directive("figure", f"/made/laws/{name}.png", alt=about)
-    text += rst.title("Facts", "-") + facts(law)
-    text += rst.title("Parameters", "-") + parameter_table(law)
+    """Return the page of one law."""
+    kind, instructions = type(law), cost(law)
+    text = entry(kind, f"symfric.{kind.__name__}")
+    text += f"`{name}` on the command line, `from symfric import {kind.__name__}` in Python.\n\n"
+    text += directive("figure", f"/made/laws/{name}.png", alt=f"{name} with default parameters")
+    facts = [
+        ["shows", ", ".join(PHENOMENA[code] for code in phenomena(law))],
+        ["smoothness", law.facts.smoothness],
+        ["load", law.facts.load],
+        ["symmetry", "odd in the motion" if law.facts.odd else "not odd"],
+        ["cost", f"{instructions.value} CasADi instructions for {costs(law)}, "
+         f"{instructions.gradient} for their derivatives"],
+        ["source", law.facts.source],
+        ["formula", law.facts.formula],
+        *(["warning", warning] for warning in law.warnings()),
+    ]  # fmt: skip
+    text += "## Facts\n\n" + table((), [[k, plain(v)] for k, v in facts])
+    text += "## Parameters\n\n" + parameter_table(parameters(law).values())
     if options(law):
         rows = [
-            [rst.code(o.name), rst.code(str(o.value)), ", ".join(o.choices), rst.plain(o.doc)]
+            [code(o.name), code(str(o.value)), ", ".join(o.choices), plain(o.doc)]
             for o in options(law).values()
         ]
-        text += rst.table(["option", "default", "choices", "meaning"], rows)
+        text += table(["option", "default", "choices", "meaning"], rows)
     if law.states:
-        rows = [
-            [rst.code(s.name), rst.plain(s.unit), f"{s.nominal:g}", rst.plain(s.doc or "-")]
-            for s in law.states
-        ]
-        text += rst.title("States", "-")
-        text += rst.table(["state", "unit", "typical", "meaning"], rows)
+        rows = [[code(s.name), s.unit, f"{s.nominal:g}", plain(s.doc)] for s in law.states]
+        text += "## States\n\n" + table(["state", "unit", "typical", "meaning"], rows)
     if getattr(law, "inputs", ()):
-        rows = [[rst.code(i.name), rst.plain(i.unit), rst.plain(i.doc)] for i in law.inputs]
-        text += rst.title("Inputs besides v and N", "-")
-        text += rst.table(["input", "unit", "meaning"], rows)
-    return text + usage(name, law)
-
-
-def wrapper_page(kind: type[Any]) -> str:
-    """A law that takes laws or data."""
-    doc = getdoc(kind) or ""
-    text = rst.title(first_line(doc).split(":")[0].rstrip("."))
-    text += to_rst(without_title(doc), linked, symbols=True)
-    if kind in (PlanarSlip, SpatialSlip):
-        base = kind.__mro__[1]
-        text += rst.title(base.__name__, "-") + to_rst(getdoc(base) or "", linked, symbols=True)
-    text += rst.title("In Python", "-")
-    return text + rst.directive("py:class", f"symfric.{kind.__name__}{signature(kind)}")
-
-
-def without_title(doc: str) -> str:
-    """A docstring without its first line, unless that says more than a title."""
-    first, _, rest = doc.partition("\n")
-    return doc if ":" in first else rest.lstrip("\n")
-
-
-def signature(kind: type[Any]) -> str:
-    """Names and defaults, without types: all are numbers or symbols."""
-    found = inspect.signature(kind)
-    plain = [p.replace(annotation=inspect.Parameter.empty) for p in found.parameters.values()]
-    text = str(found.replace(parameters=plain, return_annotation=inspect.Signature.empty))
-    return re.sub(r"<[^>]*>", "...", text)
-
-
-def facts(law: AnyLaw) -> str:
-    """Facts about a law."""
-    instructions = cost(law)
-    rows = [
-        ["shows", ", ".join(rst.plain(PHENOMENA[code]) for code in phenomena(law)) or "-"],
-        ["smoothness", rst.plain(law.facts.smoothness)],
-        ["load", rst.plain(law.facts.load)],
-        ["symmetry", "odd in the motion" if law.facts.odd else "not odd"],
-        [
-            "cost",
-            f"{instructions.value} CasADi instructions for {costs(law)}, {instructions.gradient} "
-            "for their derivatives",
-        ],
-        ["source", rst.plain(law.facts.source)],
-        ["formula", rst.plain(law.facts.formula)],
-    ]
-    rows += [["warning", rst.plain(warning)] for warning in law.warnings()]
-    return rst.table((), rows)
-
-
-def parameter_table(law: Any) -> str:
-    """Parameters of a law or a scene: symbol, default, unit, bounds."""
-    rows = [
-        [
-            rst.code(p.name),
-            shown_symbol(p.name),
-            number(float(p.value)),
-            rst.plain(p.unit),
-            _bounds(p.lower, p.upper),
-            rst.plain(p.doc),
-        ]
-        for p in parameters(law).values()
-    ]
-    return rst.table(["parameter", "", "default", "unit", "range", "meaning"], rows, "numbers")
-
-
-def shown_symbol(name: str) -> str:
-    """The symbol of a parameter as a formula, where its name is one."""
-    try:
-        return f":math:`{symbol(name)}`"
-    except KeyError:
-        return ""
-
-
-def number(value: float) -> str:
-    """Six digits."""
-    return f"{value:.6g}"
-
-
-def _bounds(lower: float, upper: float) -> str:
-    if not isfinite(lower) and not isfinite(upper):
-        return "any"
-    if not isfinite(upper):
-        return f"≥ {lower:g}"
-    return f"{lower:g} ... {upper:g}" if isfinite(lower) else f"≤ {upper:g}"
-
-
-def usage(name: str, law: AnyLaw) -> str:
-    """Commands and code that show more of it."""
+        rows = [[code(i.name), i.unit, plain(i.doc)] for i in law.inputs]
+        text += "## Inputs besides v and N\n\n" + table(["input", "unit", "meaning"], rows)
     lines = [f"$ symfric laws {name}"]
     if {"P", "M"} & set(phenomena(law)) and law.states:
         lines.append(f"$ symfric laws {name} --figure hysteresis --plot {name}.png")
     if type(law) in ALL_LAWS.values() and not getattr(law, "inputs", ()):
         lines.append(f"$ symfric run rabinowicz --law {name} --plot run.png")
-    text = rst.title("Use", "-") + rst.literal("\n".join(lines), "console")
-    kind = type(law)
-    return text + rst.directive("py:class", f"symfric.{kind.__name__}{signature(kind)}")
+    return text + "## Use\n\n" + block("\n".join(lines), "console")
+
+
+def signature(kind: type[Any]) -> str:
+    """Return names and defaults without types: all are numbers or symbols."""
+    found = inspect.signature(kind)
+    bare = [p.replace(annotation=inspect.Parameter.empty) for p in found.parameters.values()]
+    text = str(found.replace(parameters=bare, return_annotation=inspect.Signature.empty))
+    return re.sub(r"<[^>]*>", "...", text)
+
+
+def parameter_table(chosen: Iterable[Any]) -> str:
+    """Return a table of parameters of a law or a scene."""
+    rows = [
+        [code(p.name), shown_symbol(p.name), f"{float(p.value):.6g}", p.unit,
+         bounds(p.lower, p.upper), plain(p.doc)]
+        for p in chosen
+    ]  # fmt: skip
+    return table(["parameter", "symbol", "default", "unit", "range", "meaning"], rows, "numbers")
+
+
+def shown_symbol(name: str) -> str:
+    """Return the symbol of a parameter as a formula if its name is one."""
+    try:
+        return f"${symbol(name)}$"
+    except ValueError:
+        return ""
+
+
+def bounds(lower: float, upper: float) -> str:
+    """Return the range of a parameter."""
+    if not isfinite(lower):
+        return f"≤ {upper:g}" if isfinite(upper) else "any"
+    return f"{lower:g} ... {upper:g}" if isfinite(upper) else f"≥ {lower:g}"
 
 
 RUBS = BrownMcPhee
-"""What rubs in the pictures: runs in every machine, whatever its load."""
-RUBS_NAME = law_name(RUBS())
+"""Law of the pictures, which runs in every scene at any load."""
 
 
 def scene_pages() -> dict[str, str]:
-    """Name of each page, relative to `scenes`, -> its text."""
-    return {name: scene_page(name, kind) for name, kind in ALL_SCENES.items()} | {
-        "index": scene_index()
-    }
-
-
-def scene_index() -> str:
-    """All scenes in a table."""
-    text = rst.title("Scenes")
-    text += (
-        "Ready machines: each takes any friction law and gives a :py:obj:`Model "
-        "<symfric.Model>`. Names are those of ``symfric run SCENE --law NAME``.\n\n"
+    """Return the text of each page, by its name relative to `scenes`."""
+    text = (
+        "# Scenes\n\nPredefined machines: each takes any friction law and returns a `Model`. Names "
+        "are those of `symfric run SCENE --law NAME`.\n\n"
     )
-    rows = []
-    for name, kind in ALL_SCENES.items():
-        model = kind(RUBS()).model()
-        presets = ", ".join(f"``{p}``" for p in kind.presets) or "-"
-        said = sentence(first_line(kind.__doc__), linked)
-        rows.append([f":doc:`{name} <{name}>`", said, str(len(model.x)), presets])
-    text += rst.table(["scene", "what it is", "states", "presets"], rows)
-    return text + rst.pages((f"{name} <{name}>" for name in ALL_SCENES), hidden="")
+    rows = [
+        [f"[{name}]({name}.md)", first_line(kind.__doc__), len(kind(RUBS()).model().x),
+         ", ".join(map(code, kind.presets))]
+        for name, kind in ALL_SCENES.items()
+    ]  # fmt: skip
+    text += table(["scene", "description", "states", "presets"], rows) + contents(ALL_SCENES)
+    return {name: scene_page(name, kind) for name, kind in ALL_SCENES.items()} | {"index": text}
 
 
 def scene_page(name: str, kind: type[Scene]) -> str:
-    """One scene in full."""
+    """Return the page of one scene."""
     scene = kind(RUBS())
-    model = scene.model()
-    doc = getdoc(kind) or ""
-    text = rst.title(name.replace("_", " ").capitalize())
-    text += f"``{name}`` on the command line, "
-    text += f"``from symfric.scenes import {kind.__name__}`` in Python.\n\n"
-    text += to_rst(doc, linked, symbols=True)
+    model, law = scene.model(), law_name(RUBS())
+    rst = f".. autoclass:: symfric.scenes.{kind.__name__}\n"
+    text = f"# {name.replace('_', ' ').capitalize()}\n\n" + directive("eval-rst", "", rst)
+    text += f"`{name}` on the command line, "
+    text += f"`from symfric.scenes import {kind.__name__}` in Python.\n\n"
     if model.sketch is not None:
         about = f"{name} at an instant of this run"
-        text += rst.directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")
-    command = f"symfric run {name} --law {RUBS_NAME}"
-    said = f"{name} with {RUBS_NAME} friction over {kind.t_end:g} s, by ``{command}``"
-    text += rst.directive("figure", f"/made/scenes/{name}.png", said + "\n", alt=f"run of {name}")
-    text += rst.title("Parameters", "-") + machine_table(scene)
-    if kind.presets:
-        rows = [
-            [f"``{n}``", sentence(p.doc, linked), sentence(p.source, linked)]
-            for n, p in kind.presets.items()
-        ]
-        text += rst.title("Presets", "-")
-        text += f"``{kind.__name__}.preset(NAME, law)``, ``symfric run {name} --preset NAME``.\n\n"
-        text += rst.table(["preset", "what it is", "source"], rows)
-    places = kind.places()
-    if places:
-        rows = [[f"``{n}``", sentence(doc, linked)] for n, doc in places.items()]
-        text += rst.title("Places that rub", "-")
-        text += "Each may have a law of its own: ``--law-of PLACE=LAW``.\n\n"
-        text += rst.table(["place", "what it is"], rows)
-    text += signals(kind, model) + rst.title("In Python", "-")
-    return text + rst.directive("py:class", f"symfric.scenes.{kind.__name__}{signature(kind)}")
-
-
-def machine_table(scene: Scene) -> str:
-    """Parameters of the machine, without those of its laws."""
+        text += directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")
+    caption = f"{name} with {law} friction over {kind.t_end:g} s, by "
+    caption += code(f"symfric run {name} --law {law}")
+    text += directive("figure", f"/made/scenes/{name}.png", caption, alt=f"run of {name}")
     own = [p for p in parameters(scene).values() if p.name not in parameters(scene.law)]
-    rows = [
-        [
-            rst.code(p.name),
-            shown_symbol(p.name),
-            number(float(p.value)),
-            rst.plain(p.unit),
-            rst.plain(p.doc),
-        ]
-        for p in own
-    ]
-    return rst.table(["parameter", "", "default", "unit", "meaning"], rows, "numbers")
-
-
-def signals(kind: type[Scene], model: Any) -> str:
-    """Inputs, states and outputs with their units."""
-    text = ""
+    text += "## Parameters\n\n" + parameter_table(own)
+    if kind.presets:
+        rows = [[code(n), plain(p.doc), plain(p.source)] for n, p in kind.presets.items()]
+        text += f"## Presets\n\n`{kind.__name__}.preset(NAME, law)`, `symfric run {name} --preset "
+        text += "NAME`.\n\n" + table(["preset", "description", "source"], rows)
+    if places := kind.places():
+        rows = [[code(n), plain(doc)] for n, doc in places.items()]
+        text += "## Frictional contacts\n\nEach may have its own law: `--law-of PLACE=LAW`.\n\n"
+        text += table(["place", "description"], rows)
     if model.u:
-        rows = [
-            [
-                rst.code(u.name),
-                rst.plain(u.unit),
-                rst.plain(kind.inputs[u.name].text if u.name in kind.inputs else "0"),
-                rst.plain(u.doc or "-"),
-            ]
-            for u in model.u
-        ]
-        text += rst.title("Inputs", "-")
-        text += rst.table(["input", "unit", "where none is given", "meaning"], rows)
-    rows = [[rst.code(v.name), rst.plain(v.unit), rst.plain(v.doc or "state")] for v in model.x]
-    rows += [
-        [rst.code(n), rst.plain(o.unit), rst.plain(o.kind or "-")] for n, o in model.outputs.items()
-    ]
+        given = {u.name: kind.inputs[u.name].text if u.name in kind.inputs else "0"
+                 for u in model.u}  # fmt: skip
+        rows = [[code(u.name), u.unit, plain(given[u.name]), plain(u.doc)] for u in model.u]
+        text += "## Inputs\n\n" + table(["input", "unit", "default", "meaning"], rows)
+    rows = [[code(v.name), v.unit, plain(v.doc or "state")] for v in model.x]
+    rows += [[code(n), o.unit, plain(o.kind)] for n, o in model.outputs.items()]
+    text += "## Signals\n\n" + table(["signal", "unit", "meaning"], rows)
     details = [n for n in model.details() if n not in model.outputs]
-    text += rst.title("Signals", "-")
-    text += rst.table(["signal", "unit", "what it is"], rows)
     if details:
-        shown = ", ".join(rst.code(n) for n in details[:60])
         more = f" and {len(details) - 60} more" if len(details) > 60 else ""
-        text += f"On request (``run[name]``): {shown}{more}.\n\n"
+        text += f"On request (`run[name]`): {', '.join(map(code, details[:60]))}{more}.\n\n"
     return text
 
 
+# ---- pictures; matplotlib is imported in the processes that draw ----
+
+
+def draw_law(name: str, folder: Path) -> None:
+    """Draw the picture of `symfric laws NAME --plot`, and a small one of the steady force."""
+    import numpy as np  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    from symfric import any_from_text  # noqa: PLC0415
+    from symfric.figures.pictures import plot_laws, window  # noqa: PLC0415
+    from symfric.laws import steady_force  # noqa: PLC0415
+
+    law = any_from_text(name)
+    plot_laws({name: law}, path=folder / f"{name}.png")
+    edge = window(law, 1.0)
+    v = np.linspace(-edge, edge, 1001)
+    figure = Figure(figsize=(2.2, 1.4), layout="constrained")
+    axis = figure.add_subplot()
+    axis.plot(v, steady_force(law, v, 1.0), linewidth=2)
+    axis.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
+    axis.axvline(0.0, color="0.7", linewidth=0.8, zorder=0)
+    axis.set(xticks=[], yticks=[])
+    figure.savefig(folder / f"{name}_small.png", dpi=110)
+
+
 def draw_scene(name: str, folder: Path) -> None:
-    """The run of a scene, and the machine at an instant of it."""
-    import numpy as np  # noqa: PLC0415  (in the process that draws)
+    """Draw the run of a scene, and the machine at an instant of it."""
+    import numpy as np  # noqa: PLC0415
 
     from symfric import simulate  # noqa: PLC0415
     from symfric.results.animation import picture  # noqa: PLC0415

@@ -1,111 +1,116 @@
-"""Pages made of lists: the reference of Python, examples, commands, limits, literature."""
+"""Pages that are lists: the Python reference, examples, commands, limits, literature."""
 
 import ast
 import inspect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
-from inspect import getdoc
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import typer
+from typer.cli import get_docs_for_click
 
-from docs.machine import rst
-from docs.machine.items import MADE_OF_LAWS
-from docs.machine.made import PACKAGES
-from docs.machine.names import FRONTS, Public, catalogue, known, linked, source_of
+from docs.machine.docstrings import first_line
+from docs.machine.items import LAW_PAGES
+from docs.machine.markdown import block, code, contents, directive, plain, table
 from docs.machine.pages import ROOT
-from docs.machine.rst import Symbols, first_line, sentence, to_rst
 from symfric import ALL_LAWS, POPULATIONS, __version__
-from symfric.cli.app import COMMANDS, app, argument_shown, arguments, is_option, prose_and_examples
+from symfric.cli.app import COMMANDS, app
 from symfric.gallery import scripts
+from symfric.gallery.plate import about_paper
 from symfric.scenes import ALL_SCENES
 
-
-def reference_pages() -> dict[str, str]:
-    """Name of each page, relative to `reference`, -> its text."""
-    return {front: reference_page(front, names) for front, names in catalogue().items() if names}
-
-
-def reference_rows() -> list[list[str]]:
-    """Module and subject of each page."""
-    return [[f":doc:`{f}`", rst.plain(FRONTS[f])] for f, names in catalogue().items() if names]
-
-
-def reference_page(front: str, names: list[Public]) -> str:
-    """The names of one module: a table, then each in full."""
-    text = rst.title(front)
-    text += rst.plain(FRONTS[front]) + "\n\n"
-    elsewhere = own_pages()
-    laws = [p for p in names if elsewhere.get(id(p.object), "").startswith("/laws/")]
-    others = sorted((p for p in names if p not in laws), key=lambda p: p.name.lower())
-    rows = [[_link(p, elsewhere), sentence(summary(p), linked)] for p in others]
-    text += rst.table(["name", "what it is"], rows)
-    if laws:
-        text += rst.title("Laws", "-") + "Each has a page of its own, with its equation.\n\n"
-        shown = [f":doc:`{p.name} <{elsewhere[id(p.object)]}>`" for p in laws]
-        text += ", ".join(shown) + "\n\n"
-    full = [p for p in others if id(p.object) not in elsewhere]
-    return text + "".join(entry(p) for p in full)
+PACKAGES = ("symfric", "ocp", "identification")
+MODULES = {
+    "symfric": "Laws, models, simulation and figures: what most programs import.",
+    "ocp": "Optimal control, verified by simulation.",
+    "ocp.mpc": "Model predictive controllers.",
+    "identification": "Friction from measured data.",
+    "symfric.laws": "Base classes and parts of laws.",
+    "symfric.model": "The interface between equations and solvers.",
+    "symfric.multibody": "Mechanisms: bodies, joints, loads.",
+    "symfric.scenes": "Predefined machines; each has its page in the gallery of scenes.",
+    "symfric.figures": "Behaviour of laws as data and pictures.",
+    "symfric.integrator": "Simulation, its settings and results.",
+    "symfric.choice": "Choice of a law for a machine.",
+    "symfric.codegen": "C of laws, plants and robots.",
+    "symfric.compensation": "Friction compensators and observers, in Python and in C.",
+    "symfric.fmu": "Functional Mock-up Units.",
+    "symfric.gallery": "Figures of the papers.",
+    "symfric.results.pictures": "Pictures of runs.",
+    "symfric.results.animation": "Animations of machines.",
+}
+"""Public modules with their subjects; a name is documented in the first that exports it."""
 
 
-@cache
-def own_pages() -> dict[int, str]:
-    """Objects that have a page of their own, and which."""
-    found: dict[int, str] = {}
-    for name, kind in (ALL_LAWS | POPULATIONS | MADE_OF_LAWS).items():
-        found[id(kind)] = f"/laws/{name}"
-    for name, kind in ALL_SCENES.items():
-        found[id(kind)] = f"/scenes/{name}"
-    return found
+class Public(NamedTuple):
+    """Public name: `module.name` is `object`."""
 
+    module: str
+    name: str
+    object: Any
 
-def _link(public: Public, elsewhere: dict[int, str]) -> str:
-    if id(public.object) in elsewhere:
-        return f":doc:`{public.name} <{elsewhere[id(public.object)]}>`"
-    return f":py:obj:`{public.name} <{public.full}>`"
+    @property
+    def full(self) -> str:
+        """The name by which it is imported."""
+        return f"{self.module}.{self.name}"
 
+    @property
+    def page(self) -> str:
+        """Page of a law or a scene, "" for other objects."""
+        return own_pages().get(id(self.object), "")
 
-def entry(public: Public) -> str:
-    """Return the page of one public name, from its docstring."""
-    item: Any = public.object
-    if inspect.isclass(item):
-        kind = "autoexception" if issubclass(item, BaseException) else "autoclass"
-        return rst.directive(kind, public.full, members="")
-    if is_function(item):
-        return rst.directive("autofunction", public.full)
-    return rst.directive("py:data", public.full, sentence(summary(public), linked) + "\n")
+    def summary(self) -> str:
+        """Return the first line of its docstring; of data, the text below it in the source."""
+        if inspect.isclass(self.object) or is_function(self.object):
+            return first_line(self.object.__doc__).rstrip(".")
+        from sphinx.pycode import ModuleAnalyzer  # noqa: PLC0415  (not for tests without Sphinx)
 
-
-def summary(public: Public) -> str:
-    """The first line of its docstring; of data, the text below them in their source."""
-    item: Any = public.object
-    if inspect.isclass(item) or is_function(item):
-        return first_line(item.__doc__).rstrip(".")
-    said = data_docs(source_of(public.front, public.name))
-    return first_line(said.get(public.name, "")).rstrip(".")
+        module = self.module
+        while (other := getattr(import_module(module), "_places", {}).get(self.name)) is not None:
+            module = other
+        docs = ModuleAnalyzer.for_module(module).find_attr_docs()
+        return first_line("\n".join(docs.get(("", self.name), []))).rstrip(".")
 
 
 def is_function(item: Any) -> bool:
-    """A function, also a wrapped one; types such as `float | None` can be called, too."""
+    """Return True for functions, also wrapped ones, but not for types such as `float | None`."""
     return inspect.isroutine(item) or hasattr(item, "__wrapped__")
 
 
 @cache
-def data_docs(module: str) -> dict[str, str]:
-    """The texts below the data of a module."""
-    tree = ast.parse(inspect.getsource(import_module(module)))
-    found: dict[str, str] = {}
-    for before, behind in zip(tree.body, tree.body[1:], strict=False):
-        said = isinstance(behind, ast.Expr) and isinstance(behind.value, ast.Constant)
-        if said and isinstance(before, ast.Assign | ast.AnnAssign):
-            targets = before.targets if isinstance(before, ast.Assign) else [before.target]
-            names: Iterable[str] = (t.id for t in targets if isinstance(t, ast.Name))
-            found |= dict.fromkeys(names, str(behind.value.value))  # pyright: ignore
+def own_pages() -> Mapping[int, str]:
+    """Return the page of each law and scene, by the identity of its class."""
+    laws = {id(kind): f"/laws/{name}" for name, kind in LAW_PAGES.items()}
+    return laws | {id(kind): f"/scenes/{name}" for name, kind in ALL_SCENES.items()}
+
+
+@cache
+def catalogue() -> Mapping[str, list[Public]]:
+    """Return the names of each module, each object in the first module that exports it."""
+    seen: set[int] = set()
+    found: dict[str, list[Public]] = {}
+    for module in MODULES:
+        package = import_module(module)
+        names = getattr(package, "__all__", None) or [
+            n for n, item in vars(package).items()
+            if getattr(item, "__module__", "") == module and n[0].islower()
+        ]  # fmt: skip
+        every = [Public(module, name, getattr(package, name)) for name in names]
+        found[module] = [p for p in every if id(p.object) not in seen]
+        seen |= {id(p.object) for p in every}
     return found
+
+
+@cache
+def known() -> Mapping[str, Public]:
+    """Return public names by their short names, without ambiguous ones."""
+    found: dict[str, Public | None] = {}
+    for public in (p for names in catalogue().values() for p in names):
+        found[public.name] = None if public.name in found else public
+    return {name: public for name, public in found.items() if public is not None}
 
 
 Place = tuple[str, str, str]
@@ -114,239 +119,192 @@ COMMAND = re.compile(r"symfric ([\w-]+)\b")
 
 
 def place(text: str) -> Place | None:
-    """The place that documents a name between backticks; None if it is no name of ours."""
+    """Return the place that documents a name between backticks; None for other texts."""
     bare = text.removesuffix("()")
-    if bare in ALL_LAWS or bare in POPULATIONS or bare in MADE_OF_LAWS:
+    if bare in LAW_PAGES:
         return "std", "doc", f"/laws/{bare}"
     if bare in ALL_SCENES:
         return "std", "doc", f"/scenes/{bare}"
     command = COMMAND.match(text)
     if command is not None and command[1] in COMMANDS:
         return "std", "ref", f"symfric-{command[1]}"
-    if bare in FRONTS:  # a package whose names all stand on the page of its parent has none
+    if bare in MODULES:  # without names of its own, it is documented with its parent
         return "std", "doc", f"/reference/{bare if catalogue()[bare] else bare.rpartition('.')[0]}"
     public = known().get(bare.rpartition(".")[2])
     if public is None or bare not in (public.name, public.full) or not callable(public.object):
         return None
-    own = own_pages().get(id(public.object))
-    return ("std", "doc", own) if own else ("py", "obj", public.full)
+    return ("std", "doc", public.page) if public.page else ("py", "obj", public.full)
 
 
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+def reference_pages() -> dict[str, str]:
+    """Return the text of each page, by its name relative to `reference`."""
+    modules = {module: names for module, names in catalogue().items() if names}
+    found = {module: module_page(module, names) for module, names in modules.items()}
+    text = "# Python\n\nEvery public name, from its docstring.\n\n"
+    text += table(["module", "subject"], [[f"[{m}]({m}.md)", MODULES[m]] for m in modules])
+    return found | {
+        "python": text + contents(modules),
+        "commands": command_page(),
+        "limits": limit_page(),
+        "literature": literature_page(),
+    }
 
 
-def example_pages() -> dict[str, str]:
-    """Name of each page, relative to `examples`, -> its text."""
-    found = {path.stem: example_page(path) for path in EXAMPLES}
-    return found | {"index": example_index()}
+def module_page(module: str, names: list[Public]) -> str:
+    """Return the page of one module: a table of its names, then their documentation."""
+    laws = [p for p in names if p.page.startswith("/laws/")]
+    others = sorted((p for p in names if p not in laws), key=lambda p: p.name.lower())
+    text = f"# {module}\n\n{MODULES[module]}\n\n"
+    text += table(["name", "description"], [[link(p), plain(p.summary())] for p in others])
+    if laws:
+        text += "## Laws\n\nEach has its own page.\n\n" + ", ".join(map(link, laws)) + "\n\n"
+    entries = [entry(p) for p in others if not p.page]
+    return text + directive("eval-rst", "", "\n".join(entries))
 
 
-def example_index() -> str:
-    """All examples in a table."""
-    text = rst.title("Examples")
-    text += (
-        f"{len(EXAMPLES)} programs of at most a hundred lines in the folder ``examples``; each "
-        "runs in the tests, and writes pictures into the folder that is named behind it.\n\n"
-    )
-    rows = [[f":doc:`{p.stem}`", rst.plain(first_line(doc(p)))] for p in EXAMPLES]
-    return (
-        text
-        + rst.table(["example", "what it shows"], rows)
-        + rst.pages([p.stem for p in EXAMPLES], hidden="")
-    )
+def link(public: Public) -> str:
+    """Return a link to the documentation of a name."""
+    if public.page:
+        return f"[{public.name}]({public.page}.md)"
+    return f"{{py:obj}}`{public.name} <{public.full}>`"
 
 
-def example_page(path: Path) -> str:
-    """One example."""
-    text = rst.title(path.stem) + to_rst(doc(path), linked, formulas=False)
-    picture = ROOT / "examples" / "pictures" / f"{path.stem}.png"
-    if picture.exists():
-        text += rst.directive("image", f"../../examples/pictures/{picture.name}", alt=path.stem)
-    text += rst.title(f"examples/{path.name}", "-")
-    return text + rst.literal(code(path), "python")
-
-
-def doc(path: Path) -> str:
-    """The docstring of a program."""
-    return ast.get_docstring(ast.parse(path.read_text("utf-8"))) or ""
-
-
-def code(path: Path) -> str:
-    """The program without its docstring."""
-    source = path.read_text("utf-8")
-    first = ast.parse(source).body[0]
-    return "\n".join(source.splitlines()[first.end_lineno or 0 :]).strip() + "\n"
+def entry(public: Public) -> str:
+    """Return the directive that documents a name."""
+    item = public.object
+    if inspect.isclass(item):
+        kind = "autoexception" if issubclass(item, BaseException) else "autoclass"
+        return f".. {kind}:: {public.full}\n   :members:\n"
+    if is_function(item):
+        return f".. autofunction:: {public.full}\n"
+    return f".. py:data:: {public.full}\n\n   {public.summary()}\n"
 
 
 def command_page() -> str:
-    """All commands with their arguments and options."""
+    """Return all commands with their arguments and options, as Typer writes them."""
     group = typer.main.get_command(app)
     context = typer.Context(group, info_name="symfric")
-    text = rst.title("Command line")
-    text += "Names and units are those of Python. Exit status 0: done; 1: a solve failed, what "
-    text += "there is so far is written; 2: bad input; 130: Ctrl-C.\n\n"
-    rows = [[f"`symfric {name}`_", rst.plain(said)] for name, said in COMMANDS.items()]
-    text += rst.table(["command", "what it does"], rows)
+    text = f"# Command line\n\nNames and units are those of Python. {group.epilog}\n\n"
+    rows = [[f"[symfric {n}](#symfric-{n})", plain(about)] for n, about in COMMANDS.items()]
+    text += table(["command", "description"], rows)
     for name in COMMANDS:
-        text += command_section(name, group.get_command(context, name))  # pyright: ignore
+        command = group.get_command(context, name)  # pyright: ignore
+        full = f"symfric {name}"
+        own = get_docs_for_click(obj=command, ctx=typer.Context(command, info_name=full), name=full)
+        own = re.sub(r"^# .*", f"(symfric-{name})=\n## {full}", own.replace("`symfric", "`symfric"))
+        own = re.sub(r"^Example: (.*)\n+", r"```console\n$ \1\n```\n\n", own, flags=re.M)
+        text += re.sub(r"(?<![\w`-])(--[a-z][\w-]*(?:=[\w.=]+)?)(?![^\n]*`:)", r"`\1`", own) + "\n"
     return text
 
 
-def command_section(name: str, command: Any) -> str:
-    """One command."""
-    text = f".. _symfric-{name}:\n\n" + rst.title(f"symfric {name}", "-")
-    positional, named = arguments(command), [p for p in command.params if is_option(p)]
-    words = [argument_shown(p) for p in positional]
-    text += rst.literal(" ".join([f"symfric {name}", *words, "[OPTIONS]"]), "text")
-    prose, examples = prose_and_examples(command.help or "")
-    text += to_rst(flagged(prose), linked, formulas=False)
-    if examples:
-        text += rst.literal("\n".join(f"$ {line}" for line in examples), "console")
-    if positional:
-        rows = [[rst.code(argument_shown(p)), sentence(flagged(p.help or ""))] for p in positional]
-        text += rst.table(["argument", "meaning"], rows)
-    rows = [
-        [rst.code(_option(p)), sentence(flagged(p.help or "")), _default(p)]
-        for p in named
-        if not getattr(p, "hidden", False)
-    ]
-    return text + rst.table(["option", "meaning", "default"], rows, "options")
+EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
 
 
-FLAG = re.compile(r"(?<![\w-])(--?[a-z][\w-]*(?:[= ][A-Z]{2,}\b|=[\w.=]+)?)")
-
-
-def flagged(text: str) -> str:
-    """Words in which options stand as code, so that no line ends behind their hyphens."""
-    parts = text.split("`")  # what stands between backticks is code already
-    return "`".join(FLAG.sub(r"`\1`", p) if k % 2 == 0 else p for k, p in enumerate(parts))
-
-
-def _option(parameter: Any) -> str:
-    flag = ", ".join([*parameter.opts, *parameter.secondary_opts])
-    value = "" if parameter.is_flag else f" {parameter.metavar or 'VALUE'}"
-    return flag + value
-
-
-def _default(parameter: Any) -> str:
-    if parameter.required:
-        return "required"
-    value = parameter.default
-    if value is None or value is False or value in ((), [], ""):
-        return ""
-    return rst.code(str(getattr(value, "value", value)))
+def example_pages() -> dict[str, str]:
+    """Return the text of each page, by its name relative to `examples`."""
+    found: dict[str, str] = {}
+    rows: list[list[str]] = []
+    for path in EXAMPLES:
+        source = path.read_text("utf-8")
+        tree = ast.parse(source)
+        about = ast.get_docstring(tree) or ""
+        program = "\n".join(source.splitlines()[tree.body[0].end_lineno or 0 :]).strip()
+        text = f"# {path.stem}\n\n{plain(about)}\n\n"
+        picture = path.parent / "pictures" / f"{path.stem}.png"
+        if picture.exists():
+            text += f"![{path.stem}](../../examples/pictures/{picture.name})\n\n"
+        text += f"## {path.relative_to(ROOT)}\n\n" + block(program, "python")
+        found[path.stem] = text
+        rows.append([f"[{path.stem}]({path.stem}.md)", plain(first_line(about))])
+    index = (
+        f"# Examples\n\n{len(EXAMPLES)} programs of at most a hundred lines in the folder "
+        "`examples`. Each runs in the tests, and writes pictures into the folder given as "
+        "its argument.\n\n"
+    )
+    return found | {"index": index + table(["example", "subject"], rows) + contents(found)}
 
 
 LIMITS = re.compile(r"^(?:Limits|Not valid): (.*?)(?=\n\n|\n[A-Z][a-z]+:|\Z)", re.M | re.S)
 
 
 def limits(item: Any) -> str:
-    """The limits that a docstring states, "" for none."""
-    return " ".join(" ".join(found.split()) for found in LIMITS.findall(getdoc(item) or ""))
+    """Return the limits that a docstring states, "" for none."""
+    return " ".join(" ".join(x.split()) for x in LIMITS.findall(inspect.getdoc(item) or ""))
 
 
 def limit_page() -> str:
-    """Limits of laws, scenes and public names, each with its link."""
-    found = rst.title("Limits")
-    found += "Limits that docstrings state; each is also on the page of its object.\n\n"
-    kinds: dict[str, dict[str, Any]] = {
-        "Laws": ALL_LAWS | POPULATIONS | MADE_OF_LAWS,
-        "Scenes": dict(ALL_SCENES),
-    }
-    seen: set[int] = set()
-    for title, items in kinds.items():
-        room = title.lower()
-        rows = [
-            [f":doc:`{name} </{room}/{name}>`", sentence(limits(kind), Symbols(linked))]
-            for name, kind in items.items()
-            if limits(kind)
-        ]
-        seen |= {id(kind) for kind in items.values()}
-        found += rst.title(title, "-") + rst.table([room[:-1], "limits"], rows)
+    """Return limits of laws, scenes and public names, each with its link."""
+    text = "# Limits\n\nLimits that docstrings state; each is also on the page of its object.\n\n"
+    for title, items in {"Laws": LAW_PAGES, "Scenes": ALL_SCENES}.items():
+        folder = title.lower()
+        rows = [[f"[{name}](../{folder}/{name}.md)", plain(limits(kind))]
+                for name, kind in items.items() if limits(kind)]  # fmt: skip
+        text += f"## {title}\n\n" + table([folder[:-1], "limits"], rows)
     rows = [
-        [f":py:obj:`{p.full}`", sentence(limits(p.object), linked)]
-        for names in catalogue().values()
-        for p in names
-        if id(p.object) not in seen and limits(p.object)
-    ]
-    return found + rst.title("Python", "-") + rst.table(["name", "limits"], rows)
+        [f"{{py:obj}}`{p.full}`", plain(limits(p.object))]
+        for names in catalogue().values() for p in names if not p.page and limits(p.object)
+    ]  # fmt: skip
+    return text + "## Python\n\n" + table(["name", "limits"], rows)
 
 
 SOURCES = re.compile(
     r"^\s*Sources?(?: of [\w' ]+)?: (.*?)(?=\n\s*\n|\n\s*[A-Z]\w+:|\Z)", re.M | re.S
 )
 YEAR = re.compile(r"\b1[6-9]\d\d\b|\b20\d\d\b")
-ASIDE = ("laws", "gallery", "bench", "stress", "cli")
-"""Packages of symfric whose sources stand elsewhere, or are those of tables."""
-
-
-def literature_page() -> str:
-    """Citation of symfric, then laws, figures and methods with their sources."""
-    text = rst.title("Literature, and how to cite")
-    text += cite()
-    text += rst.title("Laws", "-")
-    text += "What each formula was taken from; how sure we are of it stands on its page.\n\n"
-    rows = [
-        [rst.plain(source), ", ".join(f":doc:`{name} </laws/{name}>`" for name in names)]
-        for source, names in laws().items()
-    ]
-    text += rst.table(["source", "laws"], rows)
-    text += rst.title("Figures", "-")
-    text += "Papers whose figures are computed again in the :doc:`gallery </gallery/index>`.\n\n"
-    text += "".join(f"* {rst.plain(paper)}\n" for paper in papers()) + "\n"
-    text += rst.title("Scenes and methods", "-")
-    rows = [[rst.plain(said), rst.code(where)] for said, where in methods()]
-    return text + rst.table(["source", "used in"], rows)
-
-
-def cite() -> str:
-    """The entry for a paper."""
-    words = "Name the version, and the paper of the law that you took.\n\n"
-    entry = f"""@software{{symfric,
+ELSEWHERE = ("laws", "gallery", "bench", "stress", "cli")
+"""Packages of symfric whose sources are listed elsewhere, or belong to tables."""
+CITE = f"""@software{{symfric,
   title   = {{symfric: friction laws as {{CasADi}} expressions}},
   author  = {{{{The symfric authors}}}},
   version = {{{__version__}}},
   license = {{MIT}}
 }}"""
-    return rst.title("How to cite", "-") + words + rst.literal(entry, "bibtex")
+
+
+def literature_page() -> str:
+    """Return the citation of symfric, and the sources of laws, figures and methods."""
+    text = "# Literature, and how to cite\n\n## How to cite\n\n"
+    text += "Name the version, and the paper of the law that you use.\n\n" + block(CITE, "bibtex")
+    text += "## Laws\n\nThe source of each formula; its page states how it was verified.\n\n"
+    rows = [
+        [plain(source), ", ".join(f"[{name}](../laws/{name}.md)" for name in names)]
+        for source, names in laws().items()
+    ]
+    text += table(["source", "laws"], rows)
+    text += "## Figures\n\nPapers whose figures are recomputed in the "
+    text += "[gallery](../gallery/index.md).\n\n"
+    folders = dict.fromkeys(module.rpartition(".")[0] for module in scripts().values())
+    text += "".join(f"* {plain(about_paper(folder)['paper'])}\n" for folder in folders) + "\n"
+    rows = [[plain(source), code(module)] for source, module in methods()]
+    return text + "## Scenes and methods\n\n" + table(["source", "used in"], rows)
 
 
 def laws() -> dict[str, list[str]]:
-    """Source -> names of the laws that it is given for, by the alphabet."""
+    """Return source -> names of its laws, in alphabetical order."""
     found: dict[str, list[str]] = {}
     for name, kind in (ALL_LAWS | POPULATIONS).items():
         found.setdefault(kind.facts.source, []).append(name)
     return dict(sorted(found.items(), key=lambda item: item[0].removeprefix("after ").lower()))
 
 
-def papers() -> list[str]:
-    """The first paragraph of each paper's folder in the gallery."""
-    folders = dict.fromkeys(module.rpartition(".")[0] for module in scripts().values())
-    found: list[str] = []
-    for folder in folders:
-        source = ROOT.joinpath(*folder.split("."), "__init__.py").read_text("utf-8")
-        said = ast.get_docstring(ast.parse(source)) or ""
-        found.append(" ".join(said.split("\n\n")[0].split()))
-    return found
-
-
 def methods() -> list[tuple[str, str]]:
-    """Publication and the module that stands on it, of all code but the laws, by the alphabet."""
+    """Return publication and module of all code but the laws, in alphabetical order."""
     found: dict[tuple[str, str], None] = {}
     for path in sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
-        if len(parts) > 1 and parts[1] in ASIDE:
+        if len(parts) > 1 and parts[1] in ELSEWHERE:
             continue
         module = ".".join(part for part in parts if part != "__init__")
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            holds = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
-            for said in sources(ast.get_docstring(node) or "") if holds else ():
-                found[said, module] = None
+        text = path.read_text("utf-8")
+        for node in ast.walk(ast.parse(text)) if "Source" in text else ():
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                for source in sources(ast.get_docstring(node) or ""):
+                    found[source, module] = None
     return sorted(found, key=lambda item: item[0].lower())
 
 
 def sources(docstring: str) -> Iterator[str]:
-    """The publications that a docstring names: parts between semicolons, each with its year.
+    """Yield the publications of a docstring: parts between semicolons, each with its year.
 
     A part without a year belongs to the one before it.
     """

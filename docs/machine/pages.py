@@ -1,13 +1,11 @@
-"""Blocks of code in a page: what runs, what it prints, and which pictures it leaves.
+"""Blocks of code in a page: run them and compare their output with the page.
 
-A page is text with fenced blocks. Its `python` and `console` blocks run one after the other, in
-one namespace and one empty folder. A `text` block right behind Python is what that prints. A
-`console` block holds lines `$ symfric ...`, each followed by what it prints. In what is printed
-`...` stands for anything. Blocks of other languages (`bash`, `c`, `yaml`, ...) are only shown.
+The `python` and `console` blocks of a page run one after the other, in one namespace and one empty
+folder. A `text` block directly after Python is its output. A `console` block has lines
+`$ symfric ...`, each followed by its output. In outputs, `...` stands for any text. Blocks of other
+languages (`bash`, `c`, `yaml`, ...) are only displayed.
 
-`<!-- test: heavy -->` in a page says that it runs for more than some seconds.
-
-`python -m docs.machine.pages PAGE FOLDER` runs the blocks of a page in a folder.
+`python -m docs.machine.pages PAGE FOLDER` runs a page in a folder and prints all differences.
 """
 
 import ast
@@ -30,20 +28,19 @@ ROOT = DOCS.parent
 FENCE = re.compile(
     r"^(?P<fence>```+)(?P<language>[\w-]+)[ \t]*\n(?P<body>.*?)^(?P=fence)[ \t]*$", re.M | re.S
 )
-MARK = re.compile(r"^<!-- test: (\w+) -->$", re.M)
 PICTURE = re.compile(r"(!\[[^\]]*\]\()([\w-]+\.(?:png|svg|gif))(\))")
 
 
 @final
 @dataclass(frozen=True)
 class Block:
-    """One block of code of a page.
+    """Block of code of a page.
 
     Attributes:
-        language: what stands behind the fence.
-        body: the code.
-        line: where it begins in the page.
-        prints: the `text` block right behind, None where there is none.
+        language: language behind the fence.
+        body: code.
+        line: first line in the page.
+        prints: `text` block directly behind, None if there is none.
     """
 
     language: str
@@ -53,7 +50,7 @@ class Block:
 
 
 def blocks(text: str) -> list[Block]:
-    """The blocks of a page; output stands with the block that prints it."""
+    """Return the blocks of a page, each Python block with its output."""
     found: list[Block] = []
     end = 0
     for match in FENCE.finditer(text):
@@ -70,20 +67,14 @@ def blocks(text: str) -> list[Block]:
 
 
 def written_pages() -> Iterator[Path]:
-    """Every hand-written page, and the README."""
+    """Yield every hand-written page, and the README."""
     yield ROOT / "README.md"
     for folder in (DOCS, *(DOCS / name for name in ("start", "tutorials", "howto", "theory"))):
         yield from sorted(p for p in folder.glob("*.md") if p != DOCS / "README.md")
 
 
-def mark(text: str) -> str:
-    """The mark of a page for its tests, "" for none."""
-    found = MARK.search(text)
-    return found[1] if found else ""
-
-
 def commands(block: Block) -> list[tuple[str, str]]:
-    """The lines behind `$` of a `console` block, each with what it prints."""
+    """Return the commands of a `console` block, each with its output."""
     parts = re.split(r"^\$ ", block.body, flags=re.M)
     if parts[0].strip():
         raise ValueError(f"line {block.line}: expected a command behind '$ ' first")
@@ -95,18 +86,18 @@ def commands(block: Block) -> list[tuple[str, str]]:
 
 
 def agrees(printed: str, expected: str) -> bool:
-    """True if `printed` is the text of a page, where `...` stands for anything."""
+    """Return True if `printed` is the text of a page, where `...` stands for any text."""
     wanted = [re.escape(part) for part in plain(expected).split("...")]
     return re.fullmatch(".*".join(wanted), plain(printed), re.S) is not None
 
 
 def plain(text: str) -> str:
-    """Without blanks at the ends of lines and of the text."""
+    """Remove blanks at the ends of lines and of the text."""
     return "\n".join(line.rstrip() for line in text.strip().splitlines())
 
 
 def made_pictures(text: str, folder: Path) -> list[str]:
-    """Names of the pictures that blocks of the page in `folder` leave, not those next to it."""
+    """Return the names of pictures that blocks of the page in `folder` write."""
     return [name for _, name, _ in PICTURE.findall(text) if not (folder / name).exists()]
 
 
@@ -116,15 +107,15 @@ def run(
     changed: ast.NodeTransformer | None = None,
     known: Mapping[str, object] | None = None,
 ) -> Iterator[tuple[str, str, str]]:
-    """Run the blocks of a page; each piece of code with what it printed and what the page says.
+    """Run the blocks of a page; yield each piece of code with its output and that of the page.
 
-    Code that the page gives no output for has "" there, and prints nothing if it is Python.
+    The output on the page is "" if it is missing; then Python must print nothing.
 
     Args:
-        page: its blocks.
-        name: of the page, in tracebacks.
-        changed: what is done to its Python before it runs; as it is by default.
-        known: names that its Python finds there.
+        page: blocks of the page.
+        name: name of the page, in tracebacks.
+        changed: transformation of its Python before it runs.
+        known: names that its Python finds.
     """
     names: dict[str, object] = {"__name__": "__main__", **(known or {})}
     for block in page:
@@ -143,10 +134,10 @@ def run(
 
 
 def output(command: str) -> str:
-    """Output of a line of a console: `symfric` runs in this process, all else in a shell."""
+    """Return the output of a command: `symfric` runs in this process, others in a shell."""
     if not command.startswith("symfric ") or set(command) & set("|><&;*`"):
         return in_shell(command)
-    from symfric.cli.app import main as symfric  # noqa: PLC0415  (of pages that are run only)
+    from symfric.cli.app import main as symfric  # noqa: PLC0415  (for pages that are run only)
 
     printed = StringIO()
     with redirect_stdout(printed), redirect_stderr(printed), warnings.catch_warnings():
@@ -156,13 +147,13 @@ def output(command: str) -> str:
 
 
 def in_shell(command: str) -> str:
-    """Run in a shell that knows `python` and `symfric` as the ones that run here."""
+    """Run in a shell in which `python` and `symfric` are those of this process."""
     python = shlex.quote(sys.executable)
     tools = f'python() {{ {python} "$@"; }}; symfric() {{ {python} -m symfric "$@"; }}; '
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(
         ["bash", "-c", tools + command],
-        env=os.environ
-        | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])},
+        env=os.environ | {"PYTHONPATH": path},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -171,17 +162,25 @@ def in_shell(command: str) -> str:
     return done.stdout
 
 
+def differences(page: Path) -> Iterator[str]:
+    """Run a page in the current folder; yield a text for each output that differs."""
+    for code, printed, expected in run(blocks(page.read_text("utf-8")), str(page)):
+        if not agrees(printed, expected):
+            yield f"{code}\nprints\n{printed}\ninstead of\n{expected}"
+
+
 def main(page: Path, folder: Path) -> int:
-    """Run `page` in `folder` for the pictures that it leaves there; 0 when it went well."""
-    page = page.resolve()
+    """Run `page` in `folder`, which keeps its pictures; return 0 if all outputs agree."""
+    page, wrong = page.resolve(), 0
     os.chdir(folder)
+    warnings.simplefilter("error")
     try:
-        for _ in run(blocks(page.read_text("utf-8")), str(page)):
-            pass
-    except Exception:  # noqa: BLE001  (whatever a page may raise, said with its line)
+        for wrong, difference in enumerate(differences(page), start=1):  # noqa: B007
+            print(difference, file=sys.stderr)
+    except Exception:  # noqa: BLE001  (any error of a page, with its line)
         traceback.print_exc()
         return 1
-    return 0
+    return int(wrong > 0)
 
 
 if __name__ == "__main__":

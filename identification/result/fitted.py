@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Fitted(Outcome):
+class Fitted(packed.Portable, Outcome):
     """The result of a fit.
 
     `print(fit)` prints a one-page report; `fit.to_html("out.html")` writes one with figures;
@@ -70,14 +70,6 @@ class Fitted(Outcome):
         """Return the fields; without `asked` if it holds functions that a file cannot store."""
         asked = self.asked if packed.holds(self.asked) else None
         return packed.state_of(self) | {"live": None, "asked": asked}
-
-    def __copy__(self) -> "Fitted":
-        """Return a fit with the same fields."""
-        return packed.shallow(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return the arguments of pickle; a pickle holds the same as a file."""
-        return packed.loads, (packed.dumps(self),)
 
     def save(self, path: str | Path) -> None:
         """Write the fit with its data to one file, which `identification.load_fit` reads.

@@ -18,7 +18,7 @@ Reaction Systems, Springer, 1981.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any, final
 
@@ -57,17 +57,15 @@ class Start:
 
     Attributes:
         number: of the start, in order of generation.
-        w0, w: coordinates at the start and at the end, shape (n,).
+        w: coordinates at the end, shape (n,).
         cost: sum of the losses at the end, under the noise levels of the best start.
         status, message: of the end.
         evaluations: of the residuals.
         noise: noise levels at the end [SI].
         objective: -2 log-likelihood, by which starts are compared.
-        evidence: cost of each trial in turn; inf if it failed.
     """
 
     number: int
-    w0: Array
     w: Array
     cost: float
     status: Status
@@ -75,7 +73,6 @@ class Start:
     evaluations: int
     noise: dict[str, float]
     objective: float
-    evidence: tuple[float, ...] = ()
 
 
 class _EndedError(Exception):
@@ -90,35 +87,30 @@ class _Search:
     task: Task
     best: Point
     left: int
+    tell: Tell | None
     goal: float = GAIN
     why: str = ""
-    costs: list[float] = field(default_factory=list[float])
+    count: int = 1
     last: Point | str = ""
     interrupted: bool = False
-    tell: Tell | None = None
 
     def at(self, w: Array) -> Point | str:
         for known in (self.best, self.last):
             if isinstance(known, Point) and np.array_equal(known.w, w):
                 return known
-        if self.left <= 0 or not self._far_enough(w):
+        near = not np.abs(w - self.best.w).max() > NOWHERE  # failures shrank the region; also NaN
+        if self.left <= 0 or near:
             raise _EndedError
         self.left -= 1
+        self.count += 1
         if self.tell is not None:
-            self.tell(len(self.costs) + 1)
+            self.tell(self.count)
         self.last = self.task.at(w)
         if isinstance(self.last, str):
             self.why = self.last
-            self.costs.append(np.inf)
-            return self.last
-        self.costs.append(self.last.cost)
-        if self.last.cost < self.best.cost:
+        elif self.last.cost < self.best.cost:
             self.best = self.last
         return self.last
-
-    def _far_enough(self, w: Array) -> bool:
-        """Return False if failures shrank the region to the best point, else True."""
-        return bool(np.abs(w - self.best.w).max() > NOWHERE)  # False of NaN, too
 
     def residuals(self, w: Array) -> Array:
         """Return reduced residuals; infinite ones on failure, for which SciPy shrinks the step."""
@@ -141,7 +133,7 @@ class _Search:
         optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
         box = self.task.unknowns
         try:
-            with np.errstate(all="ignore"):  # for a region of zero size; see `_far_enough`
+            with np.errstate(all="ignore"):  # for a region of zero size
                 optimize.least_squares(
                     self.residuals, self.best.w, self.slopes, bounds=(box.lower, box.upper),
                     x_scale="jac", ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=self.left + 9,
@@ -168,19 +160,8 @@ def descend(
     except KeyboardInterrupt:
         first, status = "interrupted by the user before the first residuals", Status.INTERRUPTED
     if isinstance(first, str):
-        return Start(
-            number=number,
-            w0=w0,
-            w=w0,
-            cost=np.inf,
-            status=status,
-            message=first,
-            evaluations=1,
-            noise=task.noise,
-            objective=np.inf,
-            evidence=(np.inf,),
-        )
-    search = _Search(task, first, evaluations - 1, costs=[first.cost], tell=tell)
+        return Start(number, w0, np.inf, status, first, 1, task.noise, np.inf)
+    search = _Search(task, first, evaluations - 1, tell)
     if task.estimated:
         _renew(search)
     for count in range(ROUNDS if task.estimated else 1):
@@ -194,20 +175,9 @@ def descend(
         if settled and (fall <= GAIN * variance(search.task, search.best) or count):
             break
     spent = evaluations - search.left + _back(search)
-    status, message = _verdict(search)
-    end = search.best
-    return Start(
-        number=number,
-        w0=w0,
-        w=end.w,
-        cost=end.cost,
-        status=status,
-        message=message,
-        evaluations=spent,
-        noise=search.task.noise,
-        objective=objective(search.task, end),
-        evidence=tuple(search.costs),
-    )
+    end, noise = search.best, search.task.noise
+    likelihood = objective(search.task, end)
+    return Start(number, end.w, end.cost, *_verdict(search), spent, noise, likelihood)
 
 
 def _back(search: _Search) -> int:
@@ -294,28 +264,19 @@ def descend_easier_first(
     for other in task.easier if number else ():
         shared = set(task.unknowns.fitted) & set(other.unknowns.fitted)
         here = _parameters(task, w, shared)
-        first = other.unknowns.of(here)
-        end = descend(_near(other, first), first, number, min(evaluations, ENOUGH), tell)
+        first, box = other.unknowns.of(here), other.unknowns
+        # parts of a record may be fitted equally well by values that vanish or grow without bound
+        free = np.array([np.log(REACH) if u.logarithmic else np.inf for u in box.unknowns])
+        lower, upper = np.maximum(box.lower, first - free), np.minimum(box.upper, first + free)
+        near = replace(other, unknowns=replace(box, lower=lower, upper=upper))
+        end = descend(near, first, number, min(evaluations, ENOUGH), tell)
         spent += end.evaluations
         if end.status is Status.INTERRUPTED:
-            return replace(end, w0=w0, w=w, cost=np.inf, objective=np.inf)
+            return replace(end, w=w, cost=np.inf, objective=np.inf)
         if np.isfinite(end.cost):
             w = task.unknowns.of(_parameters(other, end.w, shared))
     found = descend(task, w, number, evaluations, tell)
-    return replace(found, w0=w0, evaluations=found.evaluations + spent)
-
-
-def _near(task: Task, w: Array) -> Task:
-    """Return the problem with logarithmic values within a factor of `REACH` of those at `w`.
-
-    Parts of a record may be fitted equally well by values that vanish or grow without bound.
-    """
-    box = task.unknowns
-    free = np.array([np.log(REACH) if u.logarithmic else np.inf for u in box.unknowns])
-    near = replace(
-        box, lower=np.maximum(box.lower, w - free), upper=np.minimum(box.upper, w + free)
-    )
-    return replace(task, unknowns=near)
+    return replace(found, evaluations=found.evaluations + spent)
 
 
 def _parameters(task: Task, w: Array, shared: set[str]) -> dict[str, float]:

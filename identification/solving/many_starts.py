@@ -15,13 +15,13 @@ import pickle
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from threading import get_ident
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.descent import Start, Tell, descend, descend_easier_first
+from identification.solving.descent import Start, descend, descend_easier_first
 from identification.solving.task import Point, Task, square
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
@@ -63,17 +63,12 @@ def _moved(unknown: Unknown, w: float, share: float, lower: float, upper: float)
     side = 2 * share - 1
     if unknown.nuisance and not (np.isfinite(lower) and np.isfinite(upper)):
         return w
+    whole = bool(np.isfinite(upper) and np.isfinite(lower))
     if unknown.logarithmic and not unknown.above:
-        if upper - lower < np.log(WIDE):
-            return lower + share * (upper - lower)
-        return w + side * np.log(REACH)
-    if np.isfinite(lower) and np.isfinite(upper) and not unknown.logarithmic:
+        whole = upper - lower < np.log(WIDE)
+    if whole:
         return lower + share * (upper - lower)
-    if unknown.logarithmic:
-        return (
-            w + side * np.log(REACH) if not np.isfinite(upper) else lower + share * (upper - lower)
-        )
-    if unknown.above:
+    if unknown.logarithmic or unknown.above:
         return w + side * np.log(REACH)
     if lower >= 0 and w > 0:
         return w * REACH**side
@@ -136,7 +131,10 @@ def many_starts(
         found.close()
     if all(start.status is not Status.INTERRUPTED for start in done):
         _go_on(task, done, evaluations)
-    return tuple(_alike(done))
+    best = best_of(done) if done else None
+    if best is None or not np.isfinite(best.objective):
+        return tuple(done)
+    return tuple(replace(s, cost=best.cost + s.objective - best.objective) for s in done)
 
 
 def _mark_interrupted(done: list[Start], why: str) -> None:
@@ -155,8 +153,7 @@ def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
     more = descend(task, best.w, best.number, evaluations)
     if more.objective <= best.objective:
         spent = best.evaluations + more.evaluations
-        evidence = best.evidence + more.evidence
-        done[done.index(best)] = replace(more, w0=best.w0, evaluations=spent, evidence=evidence)
+        done[done.index(best)] = replace(more, evaluations=spent)
 
 
 def best_of(starts: Sequence[Start]) -> Start:
@@ -172,10 +169,10 @@ def _in_turn(
     evaluations: int,
 ) -> Generator[Start]:
     """Yield results in the order of the numbers."""
+    for number, w in enumerate(starts if executor is None else ()):
+        tell = None if progress is None else partial(_tell, progress, number, len(starts))
+        yield descend_easier_first(task, w, number, evaluations, tell)
     if executor is None:
-        for number, w in enumerate(starts):
-            tell = None if progress is None else _telling(progress, number, len(starts))
-            yield descend_easier_first(task, w, number, evaluations, tell)
         return
     packed = pickle.dumps(task)
     waiting: list[Future[Start]] = [
@@ -190,13 +187,8 @@ def _in_turn(
             future.cancel()
 
 
-def _telling(progress: Progress, number: int, count: int) -> Tell:
-    """Return a callback for the evaluations of one start."""
-
-    def tell(evaluation: int) -> None:
-        progress(f"start {number + 1} of {count}, evaluation {evaluation}", number / count)
-
-    return tell
+def _tell(progress: Progress, number: int, count: int, evaluation: int) -> None:
+    progress(f"start {number + 1} of {count}, evaluation {evaluation}", number / count)
 
 
 def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> Start:
@@ -210,25 +202,13 @@ def _unpacked(packed: bytes, thread: int) -> Task:
     return pickle.loads(packed)
 
 
-def _alike(done: Sequence[Start]) -> list[Start]:
-    """Return starts with costs under the noise levels of the best, for comparison."""
-    if not done:
-        return []
-    best = best_of(done)
-    if not np.isfinite(best.objective):
-        return list(done)
-    return [replace(s, cost=best.cost + s.objective - best.objective) for s in done]
-
-
 def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
     """Return True if no further start is needed."""
     best = best_of(done)
-    if not best.status.ok:
-        return False
     same = [s for s in done if s.status.ok and s.objective - best.objective < SAME]
-    if len(same) >= agree:
+    if best.status.ok and len(same) >= agree:
         return True
-    if best is not done[-1]:
+    if not best.status.ok or best is not done[-1]:
         return False
     point = task.with_noise(best.noise).at(best.w)
     return isinstance(point, Point) and is_white(task, point)

@@ -34,7 +34,7 @@ SHORTEST = 1e-4
 """Smallest radius over the travel, unless the steps of the record are larger."""
 SPARE = 4
 """Additional elements, merged with their neighbours later."""
-TOLD = 0.1
+LEAST_EXPLAINED = 0.1
 """Least share of the force that elements must explain."""
 STEPS, QUICK = 40, 8
 """Evaluations to refine the radii, and those of a start."""
@@ -74,7 +74,7 @@ class Elements:
 
     def force(self, measured: Measured) -> Array:
         """Return the force [N] along records that begin in the state `loaded`."""
-        e = _stretches(measured, _path(measured), self.radii, self.loaded)[0]
+        e = _stretches(measured, self.radii, self.loaded)[0]
         return e @ self.k + self.sigma_2 * measured.v + self.offset
 
 
@@ -119,23 +119,28 @@ def fit_elements(
     """
     count = checks.count("fit_elements: count", count)
     used = _thinned(measured, most)
-    path, columns = _path(used), _columns(used, viscous, offset)
+    path, one = _path(used), np.ones(used.v.size)
     travel = max(float(np.ptp(path[r])) for r in used.records)
     if not travel > 0:
         raise ValueError("fit_elements: expected a position that moves, got the same everywhere")
-    radii = np.geomspace(_shortest(path, travel), travel / 2, CANDIDATES)
-    trials = [(*_dense(used, path, columns, radii, loaded), loaded) for loaded in (0, 1, -1)]
+    moves = np.abs(np.diff(path))
+    step = float(np.quantile(moves[moves > 0], 0.1))  # shorter elements are not resolved
+    shortest = min(max(SHORTEST * travel, step), travel / 4)
+    radii = np.geomspace(shortest, travel / 2, CANDIDATES)
+    columns = [used.v] * viscous + [one, -one] * offset  # both signs of the offset
+    others = np.column_stack([np.zeros((one.size, 0)), *columns])
+    trials = [(*_dense(used, others, radii, loaded), loaded) for loaded in (0, 1, -1)]
     w, left, loaded = min(trials, key=lambda trial: trial[1])
-    k = w[:CANDIDATES]
-    if not k.any() or left > (1 - TOLD) * np.linalg.norm(used.F):
+    k, explained = w[:CANDIDATES], 1 - left / np.linalg.norm(used.F)
+    if not k.any() or explained < LEAST_EXPLAINED:
         raise ValueError(
             "fit_elements: expected a force that increases along the path after each reversal, got "
-            f"one that elements explain to {100 * (1 - left / np.linalg.norm(used.F)):.0f} %; "
-            "check that its sign is that of the sliding velocity"
+            f"one that elements explain to {100 * explained:.0f} %; check that its sign is that of "
+            "the sliding velocity"
         )
 
     def improved(start: Array, steps: int = STEPS) -> Elements:
-        return _improved(used, path, columns, start, (viscous, offset, loaded), steps)
+        return _improved(used, others, start, (viscous, offset, loaded), steps)
 
     few = _quantiles(radii, k, count)
     if not thorough:
@@ -146,13 +151,11 @@ def fit_elements(
     return min(improved(_merged(more, count)), improved(few), key=lambda found: found.rms)
 
 
-def _dense(
-    measured: Measured, path: Array, others: Array, radii: Array, loaded: int
-) -> tuple[Array, float]:
+def _dense(measured: Measured, others: Array, radii: Array, loaded: int) -> tuple[Array, float]:
     """Return coefficients of a dense set of radii and of the other columns, and the error norm."""
     from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
 
-    X = np.column_stack([_stretches(measured, path, radii, loaded)[0], others])
+    X = np.column_stack([_stretches(measured, radii, loaded)[0], others])
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     w, left = nnls(X / scale, measured.F)
     return w / scale, float(left)
@@ -180,23 +183,11 @@ def _thinned(measured: Measured, most: int) -> Measured:
     return measured.at(kept)
 
 
-def _columns(measured: Measured, viscous: bool, offset: bool) -> Array:
-    """Return columns for sigma_2 and for both signs of the offset."""
-    one = np.ones(measured.v.size)
-    columns = [measured.v] * viscous + [one, -one] * offset
-    return np.column_stack(columns) if columns else np.zeros((one.size, 0))
-
-
-def _shortest(path: Array, travel: float) -> float:
-    """Return the radius below which the samples do not resolve an element."""
-    moves = np.abs(np.diff(path))
-    step = float(np.quantile(moves[moves > 0], 0.1)) if (moves > 0).any() else travel
-    return min(max(SHORTEST * travel, step), travel / 4)
-
-
-def _stretches(measured: Measured, path: Array, radii: Array, loaded: int) -> tuple[Array, Array]:
-    found = [stretches(path[r], radii, loaded) for r in measured.records]
-    return np.vstack([e for e, _ in found]), np.vstack([slope for _, slope in found])
+def _stretches(measured: Measured, radii: Array, loaded: int) -> tuple[Array, Array]:
+    path = _path(measured)
+    found = zip(*(stretches(path[r], radii, loaded) for r in measured.records), strict=True)
+    e, slope = map(np.vstack, found)
+    return e, slope
 
 
 def _quantiles(radii: Array, k: Array, count: int) -> Array:
@@ -222,19 +213,14 @@ def _merged(elements: Elements, count: int) -> Array:
 
 
 def _improved(
-    measured: Measured,
-    path: Array,
-    others: Array,
-    radii: Array,
-    kinds: tuple[bool, bool, int],
-    steps: int,
+    measured: Measured, others: Array, radii: Array, kinds: tuple[bool, bool, int], steps: int
 ) -> Elements:
     """Refine stiffnesses, log radii and the other coefficients by a trust region."""
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
 
     viscous, offset, loaded = kinds
     n, size = radii.size, float(np.abs(measured.F).max())
-    w = _dense(measured, path, others, radii, loaded)[0]
+    w = _dense(measured, others, radii, loaded)[0]
     k, rest = w[:n], w[n:]
 
     def split(w: Array) -> tuple[Array, Array, Array]:
@@ -242,11 +228,11 @@ def _improved(
 
     def residuals(w: Array) -> Array:
         r, k, rest = split(w)
-        return (_stretches(measured, path, r, loaded)[0] @ k + others @ rest - measured.F) / size
+        return (_stretches(measured, r, loaded)[0] @ k + others @ rest - measured.F) / size
 
     def slopes(w: Array) -> Array:
         r, k, _ = split(w)
-        e, moved = _stretches(measured, path, r, loaded)
+        e, moved = _stretches(measured, r, loaded)
         by_radius = (moved * r - e) * k  # at constant k r
         return np.hstack([by_radius, e / r * size, others]) / size
 
@@ -254,15 +240,12 @@ def _improved(
     low = np.concatenate([np.log(radii) - 3, np.zeros(n), np.zeros(rest.size)])
     high = np.concatenate([np.log(radii) + 3, np.full(n + rest.size, np.inf)])
     found = least_squares(
-        residuals,
-        np.clip(start, low + 1e-9, high - 1e-9),
+        residuals, np.clip(start, low + 1e-9, high - 1e-9),
         jac=slopes,  # pyright: ignore[reportArgumentType]
-        bounds=(low, high),
-        x_scale="jac",
-        max_nfev=steps,
-    )
+        bounds=(low, high), x_scale="jac", max_nfev=steps,
+    )  # fmt: skip
     radii = np.sort(np.exp(found.x[:n]))
-    w, left = _dense(measured, path, others, radii, loaded)
+    w, left = _dense(measured, others, radii, loaded)
     k, rest = w[:n], w[n:]
     kept = k * radii > 1e-6 * float(k @ radii)
     shift = float(rest[-2] - rest[-1]) if offset else 0.0

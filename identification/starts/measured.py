@@ -54,14 +54,11 @@ class Measured:
             if self.t is not None and not (np.diff(self.t[record]) > 0).all():
                 raise checks.refused("Measured: t", "increasing times", self.t)
         if self.x is None and self.t is not None:
-            object.__setattr__(self, "x", self._integrated(self.t))
-
-    def _integrated(self, t: Array) -> Array:
-        x = np.zeros(t.size)
-        for record in self.records:
-            steps = np.diff(t[record]) * (self.v[record][1:] + self.v[record][:-1]) / 2
-            x[record] = np.concatenate([[0.0], np.cumsum(steps)])
-        return x
+            x = np.zeros(self.t.size)
+            for record in self.records:
+                t, v = self.t[record], self.v[record]
+                x[record][1:] = np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2)
+            object.__setattr__(self, "x", x)
 
     @property
     def records(self) -> tuple[slice, ...]:
@@ -189,7 +186,14 @@ def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -
     forces = np.array([event.force for event in events])
     level = float(np.median(forces))
     scatter = float(np.median(np.abs(forces - level))) / abs(level)
-    return BreakAways(events, level, scatter, *_by_rate(events))
+    decades = np.log10([event.rate for event in events])
+    if len(events) < 3 or np.ptp(decades) < np.log10(APART):
+        return BreakAways(events, level, scatter, None, 0.0)
+    X = np.column_stack([np.ones(decades.size), decades])
+    w, *_ = np.linalg.lstsq(X, forces, rcond=None)
+    spread = float(np.sum((forces - X @ w) ** 2)) / (decades.size - 2)
+    error = float(np.sqrt(spread * np.linalg.inv(X.T @ X)[1, 1]))
+    return BreakAways(events, level, scatter, float(w[1]), error)
 
 
 def _events(measured: Measured, record: slice, rest: float, offset: float) -> Iterator[BreakAway]:
@@ -204,25 +208,14 @@ def _events(measured: Measured, record: slice, rest: float, offset: float) -> It
         top = int(np.argmax(ramp))
         if top == 0 or ramp[top] <= 0:
             continue
-        rising = (ramp[:top] > RISE[0] * ramp[top]) & (ramp[:top] < RISE[1] * ramp[top])
-        last = np.flatnonzero(ramp[:top] <= RISE[0] * ramp[top])
-        rising[: last[-1] + 1 if last.size else 0] = False  # samples before the last rise
-        if rising.sum() >= 2:
-            rate = float(np.polyfit(t[begin : begin + top][rising], ramp[:top][rising], 1)[0])
-            if rate > 0:
-                yield BreakAway(float(t[begin + top]), float(ramp[top]), rate, side)
-
-
-def _by_rate(events: tuple[BreakAway, ...]) -> tuple[float | None, float]:
-    """Return the slope of the force over the decades of the rate, and its standard error."""
-    decades = np.log10([event.rate for event in events])
-    if len(events) < 3 or np.ptp(decades) < np.log10(APART):
-        return None, 0.0
-    X = np.column_stack([np.ones(decades.size), decades])
-    forces = np.array([event.force for event in events])
-    w, *_ = np.linalg.lstsq(X, forces, rcond=None)
-    spread = float(np.sum((forces - X @ w) ** 2)) / (decades.size - 2)
-    return float(w[1]), float(np.sqrt(spread * np.linalg.inv(X.T @ X)[1, 1]))
+        low, high = (share * ramp[top] for share in RISE)
+        below = np.flatnonzero(ramp[:top] <= low)
+        rise = slice(below[-1] + 1 if below.size else 0, top)  # the last one
+        times, force = t[begin : begin + top][rise], ramp[rise]
+        rising = force < high
+        rate = float(np.polyfit(times[rising], force[rising], 1)[0]) if rising.sum() > 1 else 0.0
+        if rate > 0:
+            yield BreakAway(float(t[begin + top]), float(ramp[top]), rate, side)
 
 
 DEAD = 2e-3
@@ -334,58 +327,36 @@ def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -
     branches = list[Branch]()
     for record in measured.records:
         x, F, v = measured.x[record], measured.F[record] - offset, measured.v[record]
-        typical = float(np.quantile(np.abs(F), 0.75))
-        ends = turning_points(x, dead * float(np.ptp(x)))
-        shift = record.start
-        branches += _branches(x, F, v, [*ends, x.size - 1], typical, shift)
+        branches += _branches(x, F, v, dead, record.start)
     if not branches:
         return None
     halves = np.array([b.half for b in branches])
     half = float(np.median(halves))
-    return Hysteresis(
-        tuple(branches),
-        half,
-        float(np.median([b.level for b in branches])),
-        float(np.median([b.damping for b in branches])),
-        float(np.median(np.abs(halves - half))) / half,
+    level, damping = (
+        float(np.median([getattr(b, n) for b in branches])) for n in ("level", "damping")
     )
+    scatter = float(np.median(np.abs(halves - half))) / half
+    return Hysteresis(tuple(branches), half, level, damping, scatter)
 
 
-def _branches(
-    x: Array, F: Array, v: Array, ends: list[int], typical: float, shift: int
-) -> Iterator[Branch]:
-    smooth = _median_of_three(F)
-    for first, last in pairwise(ends):
+def _branches(x: Array, F: Array, v: Array, dead: float, shift: int) -> Iterator[Branch]:
+    typical = float(np.quantile(np.abs(F), 0.75))
+    middle = np.median([F[:-2], F[1:-1], F[2:]], axis=0)  # of three, against single spikes
+    smooth = np.concatenate([F[:1], middle, F[-1:]])
+    for first, last in pairwise([*turning_points(x, dead * float(np.ptp(x))), x.size - 1]):
         side = 1 if x[last] > x[first] else -1
         along, force = side * (x[first : last + 1] - x[first]), side * smooth[first : last + 1]
         level = -float(force[: max(2, force.size // 50)].mean())
         crossed = np.flatnonzero(force > 0)
-        if level < PART * typical or not crossed.size or force.max() < PART * typical:
-            continue
-        k = int(crossed[0])
-        if k < 1 or along[k] <= 0:
+        k = int(crossed[0]) if crossed.size else 0
+        if min(level, force.max()) < PART * typical or k < 1 or along[k] <= 0:
             continue
         share = -force[k - 1] / (force[k] - force[k - 1])
         half = float(along[k - 1] + share * (along[k] - along[k - 1]))
-        if half <= 0:
-            continue
-        speed = side * v[first : first + k + 1]
-        slope, damping = _slopes(along[: k + 1], speed, force[: k + 1])
-        yield Branch(
-            first=first + shift,
-            last=last + shift,
-            side=side,
-            level=level,
-            half=half,
-            slope=slope,
-            damping=damping,
-        )
-
-
-def _median_of_three(F: Array) -> Array:
-    """Return the running median of three samples, against single spikes."""
-    inner = np.median([F[:-2], F[1:-1], F[2:]], axis=0)
-    return np.concatenate([F[:1], inner, F[-1:]])
+        if half > 0:
+            speed = side * v[first : first + k + 1]
+            slopes = _slopes(along[: k + 1], speed, force[: k + 1])
+            yield Branch(first + shift, last + shift, side, level, half, *slopes)
 
 
 def _slopes(along: Array, speed: Array, force: Array) -> tuple[float, float]:

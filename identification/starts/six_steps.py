@@ -85,8 +85,8 @@ class SixSteps:
             ValueError: no falling part was found, so there is no v_s.
         """
         if not np.isfinite(self.values["v_s"]):
-            why = self.doubts[0]
-            raise ValueError(f"six_steps: law: expected points that determine v_s, got none; {why}")
+            such = "six_steps: law: expected points that determine v_s"
+            raise ValueError(f"{such}, got none; {self.doubts[0]}")
         return SteadyStateLuGre(**self.values, v_eps=1e-3 * float(self.curve.v.min()))
 
     def __str__(self) -> str:
@@ -125,32 +125,34 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
     low = int(np.argmin(force))
     top = int(np.argmax(force[: low + 1]))
     F_S, F_min, v_min = float(force[top]), float(force[low]), float(speed[low])
-    sigma_2 = _slope(speed[low:], force[low:])
+    sigma_2 = 0.0  # of one point
+    if speed.size - low > 1:
+        sigma_2 = max(float(np.polyfit(speed[low:], force[low:], 1)[0]), 0.0)
     F_C = max(F_min - sigma_2 * v_min, 0.0)
     part = _exponential(curve, top, low, F_S, F_C, sigma_2)
     gaussian, v_s, delta = _exponents(*part)
     values = {"F_S": F_S, "F_C": F_C, "v_s": v_s, "sigma_2": sigma_2, "delta": delta}
     count = part[0].size
-    steps = (
-        Step(1, "F_S: largest force", 1, {"F_S": F_S, "v": float(speed[top])}),
-        Step(2, "F_C + sigma_2 v: smallest force", 1, {"F_min": F_min, "v_min": v_min}),
-        Step(3, "m^2 = 1/v_s^2: exponential part, delta = 2", count, {"v_s": gaussian}),
-        Step(4, "sigma_2: linear part", force.size - low, {"sigma_2": sigma_2}),
-        Step(5, "F_C: step 2 less sigma_2 v_min", 1, {"F_C": F_C}),
-        Step(6, "delta: exponential part again", count, {"delta": delta, "v_s": v_s}),
-    )
+    steps = [
+        ("F_S: largest force", 1, {"F_S": F_S, "v": float(speed[top])}),
+        ("F_C + sigma_2 v: smallest force", 1, {"F_min": F_min, "v_min": v_min}),
+        ("m^2 = 1/v_s^2: exponential part, delta = 2", count, {"v_s": gaussian}),
+        ("sigma_2: linear part", force.size - low, {"sigma_2": sigma_2}),
+        ("F_C: step 2 less sigma_2 v_min", 1, {"F_C": F_C}),
+        ("delta: exponential part again", count, {"delta": delta, "v_s": v_s}),
+    ]
     if count:
-        found = StribeckCurve(
-            F_S=F_S, F_C=F_C, v_s=v_s, delta=delta, sigma_2=sigma_2, offset=0.0, rms=0.0
-        )
+        found = StribeckCurve(F_S, F_C, v_s, delta, sigma_2, offset=0.0, rms=0.0)
         error = found.force(speed) - force
-        errors = standard_errors(found, speed, _noise(error))
+        noise = float(np.sqrt(np.sum(error**2) / max(error.size - len(NAMES), 1)))
+        errors = standard_errors(found, speed, noise)
         doubts = (*_doubts(found, curve, low, count, unstable), *_undetermined(errors))
     else:
         error, errors = F_C + sigma_2 * speed - force, {name: np.inf for name in NAMES}
         doubts = (_no_fall(curve, top, low), *_of_line(curve, low))
     rms = 100 * float(np.sqrt(np.mean(error**2)) / force.mean())
-    return SixSteps(steps, values, errors, rms, curve, doubts)
+    numbered = tuple(Step(number, *step) for number, step in enumerate(steps, start=1))
+    return SixSteps(numbered, values, errors, rms, curve, doubts)
 
 
 def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[str, float]:
@@ -173,18 +175,6 @@ def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[st
     size = np.abs([F_S, F_C, v_s, curve.sigma_2, delta])
     found = np.divide(error, size, out=np.full(size.size, np.inf), where=size > 0)
     return dict(zip(NAMES, found.tolist(), strict=True))
-
-
-def _noise(error: Array) -> float:
-    """Return the standard deviation of the residuals of five parameters."""
-    return float(np.sqrt(np.sum(error**2) / max(error.size - len(NAMES), 1)))
-
-
-def _slope(speed: Array, force: Array) -> float:
-    """Return the slope of the linear part [N s/m], >= 0; 0 if it has one point."""
-    if speed.size < 2:
-        return 0.0
-    return max(float(np.polyfit(speed, force, 1)[0]), 0.0)
 
 
 def _exponential(

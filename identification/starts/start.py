@@ -1,9 +1,10 @@
 """Start values of any law from data, assigned by the roles of its parameters."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from math import isfinite, sqrt
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from identification.data.dataset import Dataset
 from identification.data.differentiate import differentiate
 from identification.data.findings import Findings
 from identification.residuals.points import Points
-from identification.starts.law_fit import fit_law, law_curve, velocity
+from identification.starts.law_fit import fit_law, velocity
 from identification.starts.maxwell_slip import HEADROOM, carrying, element_values, scaled, shared
 from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve
@@ -36,9 +37,7 @@ SPIKE = 0.3
 """Bristle damping force at the largest speed over the sliding force, without a mass."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Facts:
+class Facts(NamedTuple):
     """Information from the data, independent of the law.
 
     Attributes:
@@ -48,8 +47,6 @@ class Facts:
         reversals: branches after reversals, or None.
         m: moving mass [kg], 0 without a mass or a known acceleration.
         offset: constant force [N].
-        N: normal force [N].
-        fastest: largest speed [m/s].
     """
 
     stribeck: StribeckCurve
@@ -58,8 +55,11 @@ class Facts:
     reversals: Hysteresis | None
     m: float
     offset: float
-    N: float
-    fastest: float
+
+    @property
+    def N(self) -> float:
+        """Normal force [N]."""
+        return self.friction.N
 
 
 def start_values(
@@ -91,18 +91,13 @@ def start_values(
     shift = facts.stribeck.offset
     elements = element_values(law, facts.friction, facts.stribeck, offset=shift, free=names)
     values |= {n: value for n, value in elements.items() if n in values}
-    mine = [n for n in names if n in parameters(law) and _is_steady(known[n], law)]
-    if (curve := law_curve(law, mine, facts.curve.v, N)) is not None:
-        values |= fit_law(curve, facts.curve, values)
+    own = parameters(law)  # elements that share a level are not told apart by the steady curve
+    mine = [n for n in names if n in own and known[n].role in STEADY]
+    mine = [n for n in mine if known[n].field != "mu" or "mu_s" not in own]
+    values |= fit_law(law, mine, facts.curve, N, values)
     values |= {n: value for n, value in elements.items() if n in values}
     values |= carrying(law, values)
     return _constructible(what, values)
-
-
-def _is_steady(parameter: Parameter, law: Law) -> bool:
-    """Return True if the steady curve determines a parameter; not if elements share a level."""
-    shared = parameter.field == "mu" and "mu_s" in parameters(law)
-    return parameter.role in STEADY and not shared
 
 
 def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) -> Facts:
@@ -125,17 +120,7 @@ def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) ->
             stribeck = fit_curve(curve)
             reversals = hysteresis(pure, offset=stribeck.offset) or reversals
     shift = stribeck.offset if offset else 0.0
-    points = replace(curve, F=curve.F - shift)
-    return Facts(
-        stribeck=stribeck,
-        curve=points,
-        friction=pure,
-        reversals=reversals,
-        m=m,
-        offset=shift,
-        N=measured.N,
-        fastest=measured.fastest,
-    )
+    return Facts(stribeck, replace(curve, F=curve.F - shift), pure, reversals, m, shift)
 
 
 def noise_speed(measured: Measured) -> float:
@@ -161,10 +146,7 @@ def _mass(measured: Measured) -> float:
     edges = np.quantile(measured.v, np.linspace(0, 1, BINS + 1))
     place = np.clip(np.searchsorted(edges, measured.v, side="right") - 1, 0, BINS - 1)
     count = np.maximum(np.bincount(place, minlength=BINS), 1)
-    a, F = (
-        signal - (np.bincount(place, signal, BINS) / count)[place]
-        for signal in (measured.a, measured.F)
-    )
+    a, F = (y - (np.bincount(place, y, BINS) / count)[place] for y in (measured.a, measured.F))
     return max(float(a @ F) / max(float(a @ a), 1e-300), 0.0)
 
 
@@ -230,7 +212,7 @@ def _damping(facts: Facts, stiffness: float) -> float:
         return DAMPED * sqrt(stiffness * facts.m)
     if facts.reversals is not None and facts.reversals.damping > facts.stribeck.sigma_2:
         return (facts.reversals.damping - facts.stribeck.sigma_2) / 2
-    return SPIKE * facts.stribeck.F_C / facts.fastest
+    return SPIKE * facts.stribeck.F_C / facts.friction.fastest
 
 
 def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, float]:
@@ -289,27 +271,18 @@ def measured(kind: object, data: Dataset, load: float) -> Measured | None:
     """Return velocity and force of points or of a drive, all records; None if unavailable."""
     try:
         if isinstance(kind, Points):
-            return _of_points(kind, data, load)
-        return _of_drive(kind, data, load)
+            timed = all(r.t is not None for r in data)
+            names = {"v": kind.v, "F": kind.F} | ({"t": "t"} if timed else {})
+            each = [{part: r[name] for part, name in names.items()} for r in data]
+        else:
+            called, chosen = _roles(kind), getattr(kind, "filter", None)
+            motions = [differentiate(r, chosen, **called) for r in data]
+            each = [{"v": m.v, "F": m.force, "x": m.x, "t": m.t, "a": m.a} for m in motions]
+        signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
+        breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())
+        return Measured(**signals, N=load, breaks=breaks)
     except ValueError:  # the preparation of the residuals reports missing channels
         return None
-
-
-def _of_points(kind: Points, data: Dataset, load: float) -> Measured:
-    v, F = (np.concatenate([r[name] for r in data]) for name in (kind.v, kind.F))
-    times = [r.t for r in data]
-    t = None if any(one is None for one in times) else np.concatenate([r.time for r in data])
-    return Measured(v, F, t=t, N=load, breaks=_breaks([r.size for r in data]))
-
-
-def _of_drive(kind: object, data: Dataset, load: float) -> Measured:
-    names, chosen = _roles(kind), getattr(kind, "filter", None)
-    each = [differentiate(r, chosen, x=names["x"], force=names["force"]) for r in data]
-    v, F, x, t, a = (
-        np.concatenate([getattr(one, name) for one in each])
-        for name in ("v", "force", "x", "t", "a")
-    )
-    return Measured(v, F, x=x, t=t, a=a, N=load, breaks=_breaks([one.v.size for one in each]))
 
 
 def strongest(
@@ -335,24 +308,11 @@ def slowest(kind: object, seen: Measured | None) -> float:
     return float(np.quantile(speeds, FEW)) if speeds.size else 0.0
 
 
-def _breaks(sizes: list[int]) -> tuple[int, ...]:
-    return tuple(np.cumsum(sizes)[:-1].tolist())
-
-
-def from_data(subject: Subject, seen: Measured | None) -> dict[str, float]:
-    """Return start values, from the data, of the free parameters of a law or a drive."""
-    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
-    if whole is None or seen is None:
-        return {}
-    names = [u.name for u in subject.unknowns]
-    try:
-        return start_values(whole, seen, free=names)
-    except ValueError:  # data without motion: keep the values of the law
-        return {}
-
-
 def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
     """Return the start of every free parameter: from the user, else the data, else the law."""
-    values = {u.name: u.start for u in subject.unknowns}
-    found = {n: x for n, x in from_data(subject, seen).items() if n not in subject.started}
-    return values | found | dict(given)
+    values, found = {u.name: u.start for u in subject.unknowns}, dict[str, float]()
+    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
+    if whole is not None and seen is not None:
+        with suppress(ValueError):  # data without motion: keep the values of the law
+            found = start_values(whole, seen, free=[*values])
+    return values | {n: x for n, x in found.items() if n not in subject.started} | dict(given)

@@ -142,7 +142,7 @@ def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
 
     For a curve that does not fall, F_S = F_C and v_s is meaningless.
     """
-    from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
+    from scipy.optimize import least_squares, nnls  # noqa: PLC0415 (slow to import)
 
     speed = np.abs(curve.v)
     exponents = EXPONENTS if delta is None else (delta,)
@@ -155,26 +155,17 @@ def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
         high = np.log([speed.max() * 3, 6.0])[:free]
 
         def residuals(w: Array) -> Array:
-            at = np.exp(w)
-            return _residuals(curve, float(at[0]), float(at[1]) if free == 2 else best)
+            X = _columns(curve, *[*np.exp(w).tolist(), best][:2])
+            return X @ nnls(X, curve.F)[0] - curve.F
 
-        found = least_squares(
-            residuals, np.log([v_s, best])[:free], bounds=(low, high), max_nfev=60
-        )
+        start = np.log([v_s, best])[:free]
+        found = least_squares(residuals, start, bounds=(low, high), max_nfev=60)
         if np.sqrt(2 * found.cost) < cost:
-            v_s, best = float(np.exp(found.x[0])), float(np.exp(found.x[1])) if free == 2 else best
+            v_s, best = [*np.exp(found.x).tolist(), best][:2]
     w, cost = _levels(curve, v_s, best)
     offset = w[3] - w[4] if curve.both else 0.0
     rms = cost / np.sqrt(curve.v.size)
-    return StribeckCurve(
-        F_S=w[0] + w[1],
-        F_C=w[0],
-        v_s=float(v_s),
-        delta=float(best),
-        sigma_2=w[2],
-        offset=offset,
-        rms=float(rms),
-    )
+    return StribeckCurve(w[0] + w[1], w[0], float(v_s), float(best), w[2], offset, float(rms))
 
 
 def _columns(curve: Curve, v_s: float, delta: float) -> Array:
@@ -191,10 +182,3 @@ def _levels(curve: Curve, v_s: float, delta: float) -> tuple[list[float], float]
     w, cost = nnls(_columns(curve, v_s, delta), curve.F)
     w[2] /= np.abs(curve.v).max()
     return w.tolist(), float(cost)
-
-
-def _residuals(curve: Curve, v_s: float, delta: float) -> Array:
-    from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
-
-    X = _columns(curve, v_s, delta)
-    return X @ nnls(X, curve.F)[0] - curve.F

@@ -9,9 +9,9 @@ A record that only slides shows how friction falls with speed, but not the stati
 fit it with a static level far above every measured force. Such levels (`Levels`) get no interval.
 """
 
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import final
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,7 @@ RANK = 1e-7
 """Smallest singular value of the scaled sensitivities that counts, relative to the largest."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Sandwich:
+class Sandwich(NamedTuple):
     """Linearised uncertainty of k values that depend on n coordinates.
 
     Directions that the residuals do not determine contribute nothing here; `null` lists them.
@@ -38,9 +36,7 @@ class Sandwich:
         white: the same for white residuals with the variance of each channel.
         freedom: effective degrees of freedom of the variances on the diagonal (Satterthwaite;
             includes the uncertainty of the estimated autocorrelation), shape (k,).
-        null: directions of the coordinates along which the residuals do not change, orthonormal
-            after multiplication by `size`, shape (n, nullity).
-        size: norm of the columns of J; one where it is zero, shape (n,).
+        null: directions of the coordinates along which the residuals do not change, (n, nullity).
         colours: autoregressive models of the channels.
     """
 
@@ -48,7 +44,6 @@ class Sandwich:
     white: Array
     freedom: Array
     null: Array
-    size: Array
     colours: tuple[Colour, ...]
 
 
@@ -78,20 +73,13 @@ def sandwich(found: Minimum) -> Sandwich:
         colours.append(seen)
     total = np.diag(coloured) ** 2
     freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
-    null = _null_space(Vt[kept], found.held) / size[:, None]
+    inside = Vt[kept][:, free]  # directions of the free coordinates orthogonal to it are null
+    null = np.zeros((free.size, inside.shape[1] - inside.shape[0]))
+    null[free] = np.linalg.svd(inside, full_matrices=True)[2][inside.shape[0] :].T
     back = np.outer(reach, reach)
     coloured, white = back * coloured, back * white
-    return Sandwich(coloured, white, np.maximum(freedom, 1.0), null, size, tuple(colours))
-
-
-def _null_space(rows: Array, held: NDArray[np.bool_]) -> Array:
-    """Return an orthonormal basis of the free coordinates orthogonal to `rows`, (n, nullity)."""
-    free = np.flatnonzero(~held)
-    inside = rows[:, free]
-    _, _, Vt = np.linalg.svd(inside, full_matrices=True)
-    null = np.zeros((held.size, free.size - inside.shape[0]))
-    null[free] = Vt[inside.shape[0] :].T
-    return null
+    freedom = np.maximum(freedom, 1.0)
+    return Sandwich(coloured, white, freedom, null / size[:, None], tuple(colours))
 
 
 def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
@@ -137,11 +125,9 @@ class Levels:
         for name, load in self.loads.items():
             force = abs(values.get(name, 0.0)) * load
             if force > FAR * self.largest > 0:
-                yield (
-                    name,
-                    f"{name} is not identifiable: no friction force in the data is near "
-                    f"{force:.3g} {self.unit}, the largest is {self.largest:.2g} {self.unit}.",
-                )
+                text = f"{name} is not identifiable: no friction force in the data is near "
+                text += f"{force:.3g} {self.unit}, the largest is {self.largest:.2g} {self.unit}."
+                yield name, text
 
 
 LEVEL = 0.95
@@ -212,9 +198,14 @@ class Covariance:
     @property
     def correlation(self) -> Array:
         """Correlation of the estimates, NaN where undefined, shape (k, k)."""
-        error = self.standard_errors
-        both = np.outer(error, error)
-        return np.divide(self.matrix, both, out=np.full_like(both, np.nan), where=both > 0)
+        return correlation(self.matrix)
+
+
+def correlation(matrix: Array) -> Array:
+    """Return the correlation of a covariance, NaN where undefined."""
+    error = np.sqrt(np.diag(matrix))
+    both = np.outer(error, error)
+    return np.divide(matrix, both, out=np.full_like(both, np.nan), where=both > 0)
 
 
 def covariance(task: Task, point: Point, levels: Levels | None = None) -> Covariance:
@@ -243,11 +234,9 @@ def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -
     wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
     size_of = np.abs(found.slope)  # one at an upper bound moves with its partner by rounding alone
     fixed = ~np.any((size_of > ROUNDING * size_of.max(axis=1, keepdims=True)) & ~found.held, axis=1)
-    matrix, white = inside.coloured.copy(), inside.white.copy()
-    for C in (matrix, white):
-        C[wanders | fixed, :] = C[:, wanders | fixed] = np.nan
+    matrix, white = (_without(C, wanders | fixed) for C in (inside.coloured, inside.white))
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
-    null_groups = list(
+    lost = list(
         groups(
             tuple(names[i] for i in own),
             values[own],
@@ -256,53 +245,47 @@ def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -
             lambda some: change(_spread(found, own, some)),
         )
     )
-    at_bound = tuple(u.name for u, held in zip(found.unknowns, found.held, strict=True) if held)
+    far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
+    gone = dict(_unlimited(found, low, high))
     labels = [found.label(c) for c in found.channels]
     effective = {n: c.effective for n, c in zip(labels, inside.colours, strict=True)}
-    made = Covariance(
-        names=names,
-        matrix=matrix,
-        white=white,
-        freedom=inside.freedom,
-        low=low,
-        high=high,
-        at_bound=at_bound,
-        undetermined=tuple(tuple(names[own[i]] for i in g.members) for g in null_groups),
-        effective=effective,
-        sentences=tuple(g.sentence for g in null_groups),
-    )
-    far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
-    gone = dict(_unlimited(found, made))
-    weak = _weak(found, made, (*far, *gone))
-    messages = (*made.sentences, *far.values(), *gone.values(), *weak, *_few(found, effective))
+    weak = _weak(found, matrix, low, high, {*far, *gone})
+    alone = [sentence for _, sentence in lost]
+    messages = (*alone, *far.values(), *gone.values(), *weak, *_few(found, effective))
     notes = dict.fromkeys(gone, LOST) | dict.fromkeys(far, BEYOND)
-    return replace(_without(made, notes), sentences=tuple(s for s in messages if s), notes=notes)
+    out = np.array([name in notes for name in names], dtype=bool)
+    return Covariance(
+        names=names,
+        matrix=_without(matrix, out),
+        white=_without(white, out),
+        freedom=inside.freedom,
+        low=np.where(out, np.nan, low),
+        high=np.where(out, np.nan, high),
+        at_bound=tuple(u.name for u, held in zip(found.unknowns, found.held, strict=True) if held),
+        undetermined=tuple(members for members, _ in lost),
+        effective=effective,
+        sentences=tuple(s for s in messages if s),
+        notes=notes,
+    )
 
 
-def _without(made: Covariance, notes: Collection[str]) -> Covariance:
-    """Return `made` without the intervals of the values in `notes`."""
-    out = np.array([name in notes for name in made.names], dtype=bool)
-    matrix, white = made.matrix.copy(), made.white.copy()
-    for C in (matrix, white):
-        C[out, :] = C[:, out] = np.nan
-    low, high = (np.where(out, np.nan, end) for end in (made.low, made.high))
-    return replace(made, matrix=matrix, white=white, low=low, high=high)
+def _without(matrix: Array, out: NDArray[np.bool_]) -> Array:
+    """Return a matrix with NaN in some rows and columns."""
+    return np.where(out[:, None] | out, np.nan, matrix)
 
 
-def _unlimited(found: Minimum, made: Covariance) -> Iterator[tuple[str, str]]:
+def _unlimited(found: Minimum, lows: Array, highs: Array) -> Iterator[tuple[str, str]]:
     """Yield the values whose interval is nearly unlimited, with a message (empty for nuisances)."""
-    known = {u.name: u for u in found.unknowns}
-    for name, value, low, high in zip(made.names, found.values, made.low, made.high, strict=True):
-        unknown = known.get(name)
-        if unknown is None or np.isnan(high - low):
-            continue
+    for unknown in found.unknowns:
+        i = found.names.index(unknown.name)
+        low, high, value = lows[i], highs[i], found.values[i]
         if unknown.logarithmic and low > 0:
             gone = high / low > 10**DECADES
         else:
             gone = high - low > WIDE * max(abs(value), abs(unknown.scale))
         if gone:
-            text = f"{name} is not identifiable: its effect on the measurements is below the noise."
-            yield name, "" if unknown.nuisance else text
+            why = "is not identifiable: its effect on the measurements is below the noise."
+            yield unknown.name, "" if unknown.nuisance else f"{unknown.name} {why}"
 
 
 def _sensitivity(found: Minimum, own: list[int]) -> Array:
@@ -344,26 +327,22 @@ def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Arr
     return low, high
 
 
-def _weak(found: Minimum, made: Covariance, mentioned: Collection[str]) -> Iterator[str]:
+def _weak(
+    found: Minimum, matrix: Array, low: Array, high: Array, mentioned: set[str]
+) -> Iterator[str]:
     """Yield a message for each poorly identified value outside `mentioned`."""
-    error, correlation = made.standard_errors, made.correlation
-    known: NDArray[np.bool_] = np.isfinite(error)
-    nuisance = {u.name for u in found.unknowns if u.nuisance}
-    units = {u.name: u.unit for u in found.unknowns}
-    for i, name in enumerate(made.names):
-        if not known[i] or name in nuisance or name in mentioned:
+    error, related = np.sqrt(np.diag(matrix)), np.nan_to_num(np.abs(correlation(matrix)))
+    np.fill_diagonal(related, 0.0)
+    mentioned = mentioned | {u.name for u in found.unknowns if u.nuisance}
+    units = {u.name: f" {u.unit}" for u in found.unknowns if u.unit != "1"}
+    for i, name in enumerate(found.names):
+        if name in mentioned or not error[i] > HARDLY * abs(found.values[i]):
             continue
-        if not error[i] > HARDLY * abs(found.values[i]):
-            continue
-        unit = units.get(name, "1")
-        unit = "" if unit == "1" else f" {unit}"
-        others = np.where(known, np.abs(correlation[i]), 0.0)
-        others[i] = 0.0
-        j = int(np.argmax(others))
-        goes = f"; strongly correlated with {made.names[j]}" if others[j] > TOGETHER else ""
+        j = int(np.argmax(related[i]))
+        goes = f"; strongly correlated with {found.names[j]}" if related[i, j] > TOGETHER else ""
         yield (
-            f"{name} is poorly identified: between {made.low[i]:.3g} and {made.high[i]:.3g}{unit} "
-            f"with 95 %{goes}."
+            f"{name} is poorly identified: between {low[i]:.3g} and {high[i]:.3g}"
+            f"{units.get(name, '')} with 95 %{goes}."
         )
 
 
@@ -371,7 +350,5 @@ def _few(found: Minimum, effective: dict[str, float]) -> Iterator[str]:
     count = sum(effective.values())
     n = int((~found.held).sum())
     if n and count < FEW * n:
-        yield (
-            f"The autocorrelated residuals are worth only {count:.0f} independent samples "
-            f"for {n} unknowns: the intervals are likely too small."
-        )
+        text = f"The autocorrelated residuals are worth only {count:.0f} independent samples for "
+        yield f"{text}{n} unknowns: the intervals are likely too small."

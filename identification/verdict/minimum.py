@@ -118,31 +118,20 @@ def minimum(task: Task, point: Point) -> Minimum:
         for channel in task.channels:
             rows = channel.rows
             gain[rows] = max(float(np.mean(above[rows] - below[rows])) / (2 * h), 0.05)
-    known = {s: sigma for s, sigma in task.noise.items() if s not in task.estimated}
+    known, box = {s: x for s, x in task.noise.items() if s not in task.estimated}, task.unknowns
     return Minimum(
-        channels=task.channels,
-        unknowns=task.unknowns.unknowns,
-        names=task.unknowns.names,
-        values=point.values,
-        slope=point.slope,
-        held=task.unknowns.at_bound(point.w),
-        r=point.weights * point.r,
-        J=point.J,
-        gain=gain,
-        raw=point.evaluation.r,
-        noise=known,
-    )
+        task.channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
+        point.weights * point.r, point.J, gain, point.evaluation.r, known,
+    )  # fmt: skip
 
 
 def shift(task: Task, found: Minimum) -> Callable[[Array], float]:
     """Return a function of the values: norm of the change of the weighted residuals."""
-    sigma = task.sigma
 
     def change(values: Array) -> float:
         there = task.residuals.at(values)
-        if isinstance(there, str):
-            return float("inf")
-        return float(np.linalg.norm((there.r - found.raw) / sigma))
+        failed = isinstance(there, str)
+        return np.inf if failed else float(np.linalg.norm((there.r - found.raw) / task.sigma))
 
     return change
 
@@ -158,24 +147,10 @@ STEP = 0.05
 """Relative change of values used to compare two descriptions."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Undetermined:
-    """A group of values with fewer identifiable combinations than members.
-
-    Attributes:
-        members: indices of the values.
-        sentence: message on the identifiable combinations.
-    """
-
-    members: tuple[int, ...]
-    sentence: str
-
-
 def groups(
     names: tuple[str, ...], values: Array, null: Array, size: Array, change: Shift
-) -> Iterator[Undetermined]:
-    """Yield the groups of values that the residuals do not determine.
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield each group of values that the residuals do not determine, with a message.
 
     Args:
         names: of the values.
@@ -189,76 +164,64 @@ def groups(
     basis, s, _ = np.linalg.svd(scaled, full_matrices=False)
     basis = basis[:, s > 1e-9]
     shared = np.abs(basis @ basis.T)
-    touched = np.flatnonzero(np.diag(shared) > SHARE**2)
-    for group in _connected(shared > SHARE, touched.tolist()):
-        members = list(group)
-        yield Undetermined(group, _sentence(_Group(names, values, members, basis, size), change))
+    left = set(np.flatnonzero(np.diag(shared) > SHARE**2).tolist())
+    while left:
+        members, edge = set[int](), {min(left)}
+        while edge:
+            members |= edge
+            linked = np.flatnonzero((shared[[*edge]] > SHARE).any(axis=0)).tolist()
+            edge = left.intersection(linked) - members
+        left -= members
+        group = np.array(sorted(members))
+        called = tuple(names[i] for i in group)
+        U, s, _ = np.linalg.svd(basis[group], full_matrices=True)
+        known, text = group.size - int((s > 1e-6).sum()), " and ".join(called[-2:])
+        text = ", ".join([*called[:-2], text])
+        if known == 0:
+            which = "has" if group.size == 1 else "have"
+            yield called, f"{text} {which} no influence on the measured signals."
+        elif known > 1:
+            yield called, f"Of {text} only {known} combinations are identifiable."
+        else:
+            g = U[:, -1] * size[group]  # gradient of the only identifiable combination
+
+            def moved(step: Array, group: NDArray[np.int64] = group) -> float:
+                there = values.copy()
+                there[group] += step
+                return change(there)
+
+            only = _combination(called, values[group], g, moved)
+            yield called, f"Only {only} is identifiable, not {text} each."
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Group:
-    """Members of a group, and the null directions of all values, scaled by `size`."""
-
-    all_names: tuple[str, ...]
-    all_values: Array
-    members: list[int]
-    basis: Array
-    size: Array
-
-    @property
-    def names(self) -> list[str]:
-        return [self.all_names[i] for i in self.members]
-
-    @property
-    def values(self) -> Array:
-        return self.all_values[self.members]
-
-    @property
-    def nullity(self) -> int:
-        return int((np.linalg.svd(self.basis[self.members], compute_uv=False) > 1e-6).sum())
-
-    def gradient(self) -> Array:
-        """Return the gradient of the only identifiable combination, shape (d,)."""
-        U, _, _ = np.linalg.svd(self.basis[self.members], full_matrices=True)
-        return U[:, len(self.members) - 1] * self.size[self.members]
-
-    def moved(self, change: Array) -> Array:
-        """Return all values after a change of the members."""
-        there = self.all_values.copy()
-        there[self.members] += change
-        return there
-
-
-def _sentence(group: _Group, change: Shift) -> str:
-    """Return the message on a group."""
-    names, known = group.names, len(group.members) - group.nullity
-    if known == 0:
-        which = "has" if len(names) == 1 else "have"
-        return f"{_and(names)} {which} no influence on the measured signals."
-    if known > 1:
-        return f"Of {_and(names)} only {known} combinations are identifiable."
-    return f"Only {_combination(group, change)} is identifiable, not {_and(names)} each."
-
-
-def _combination(group: _Group, change: Shift) -> str:
-    """Return the only identifiable combination g'values as text."""
-    names, here, g = group.names, group.values, group.gradient()
+def _combination(names: Sequence[str], here: Array, g: Array, moved: Shift) -> str:
+    """Return the combination g'values of the values `here` as text."""
     powers, weights = _small_integers(g * here), _small_integers(g)
     if powers is not None and weights is not None:
-        factor = np.array([STEP / powers[0], -STEP / powers[1]])
-        amount = STEP * here[0] * np.array([1 / weights[0], -1 / weights[1]])
-        rest = np.zeros(here.size - 2)
-        by_factor = group.moved(here * np.expm1(np.append(factor, rest)))
-        by_amount = group.moved(np.append(amount, rest))
-        if change(by_factor) < change(by_amount):
+        factor, amount = np.zeros(here.size), np.zeros(here.size)
+        factor[:2] = np.array([STEP, -STEP]) / powers[:2]
+        amount[:2] = STEP * here[0] * np.array([1.0, -1.0]) / weights[:2]
+        if moved(here * np.expm1(factor)) < moved(amount):
             weights = None
         else:
             powers = None
     if powers is not None:
-        return _product(names, powers)
+        above, below = (
+            [n if p == 1 else f"{n}^{p:g}" for n, p in zip(names, part, strict=True) if p > 0]
+            for part in (powers, -powers)
+        )
+        if not below:
+            return f"the product {' '.join(above)}"
+        under = below[0] if len(below) == 1 else f"({' '.join(below)})"
+        return f"the ratio {' '.join(above)} / {under}"
     if weights is not None:
-        return _sum(names, weights)
+        terms = [
+            n if abs(w) == 1 else f"{abs(w):g} {n}" for n, w in zip(names, weights, strict=True)
+        ]
+        signs = ["+" if w > 0 else "-" for w in weights]
+        text = "".join(f" {sign} {term}" for sign, term in zip(signs, terms, strict=True))
+        kind = "difference" if len(names) == 2 else "combination"
+        return f"the {'sum' if (weights > 0).all() else kind} {text[3:]}"
     g = g / g[np.argmax(np.abs(g))]
     terms = " + ".join(f"{c:.3g} {n}" for n, c in zip(names, g, strict=True)).replace("+ -", "- ")
     return f"{terms} (near the estimate)"
@@ -272,44 +235,3 @@ def _small_integers(g: Array) -> Array | None:
     scaled = g / smallest * np.sign(g[0])
     nearest = np.rint(scaled)
     return nearest if np.abs(scaled - nearest).max() < NEAR and np.abs(nearest).max() <= 3 else None
-
-
-def _product(names: list[str], powers: Array) -> str:
-    def factor(name: str, power: float) -> str:
-        return name if power == 1 else f"{name}^{power:g}"
-
-    above = [factor(n, p) for n, p in zip(names, powers, strict=True) if p > 0]
-    below = [factor(n, -p) for n, p in zip(names, powers, strict=True) if p < 0]
-    if not below:
-        return f"the product {' '.join(above)}"
-    under = below[0] if len(below) == 1 else f"({' '.join(below)})"
-    return f"the ratio {' '.join(above)} / {under}"
-
-
-def _sum(names: list[str], weights: Array) -> str:
-    def term(name: str, weight: float) -> str:
-        return name if abs(weight) == 1 else f"{abs(weight):g} {name}"
-
-    text = "".join(
-        f" {'+' if w > 0 else '-'} {term(n, w)}" for n, w in zip(names, weights, strict=True)
-    )
-    kind = "sum" if (weights > 0).all() else "difference" if len(names) == 2 else "combination"
-    return f"the {kind} {text[3:]}"
-
-
-def _and(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _connected(linked: NDArray[np.bool_], members: list[int]) -> Iterator[tuple[int, ...]]:
-    """Yield the connected subsets of `members`."""
-    left = set(members)
-    while left:
-        group, edge = set[int](), {min(left)}
-        while edge:
-            group |= edge
-            edge = {
-                j for i in edge for j in np.flatnonzero(linked[i]).tolist() if j in left
-            } - group
-        yield tuple(sorted(group))
-        left -= group

@@ -71,9 +71,8 @@ class Profile:
     __repr__ = brief
 
     def __str__(self) -> str:
-        ends = [e for e in (self.low, self.high) if e is not None]
-        near = [abs(e - self.best) for e in ends if e != self.best]
-        width = min(near, default=0.0)
+        ends = [end for end in (self.low, self.high) if end not in (None, self.best)]
+        width = min((abs(end - self.best) for end in ends), default=0.0)
         digits = ceil(log10(abs(self.best) / width)) + 3 if width and self.best else 4
         best, *sides = (
             "open" if x is None else f"{x:.{min(max(digits, 4), 12)}g}"
@@ -131,117 +130,88 @@ def profile(
     """
     checks.choice("profile: name", name, task.unknowns.fitted)
     points = checks.count("profile: points", points, least=2)
-    walk = _Walk.of(task, point, covariance, name)
-    down, up = (walk.side(direction, points) for direction in (-1, 1))
-    stations = [*down.stations[::-1], (walk.best, 0.0, point.values), *up.stations]
-    values = np.array([s[0] for s in stations])
-    rise = np.array([s[1] for s in stations])
-    low, high = (_crossing(walk, side.stations) for side in (down, up))
-    messages = [*_open_side(walk, down, low, "below"), *_open_side(walk, up, high, "above")]
+    walk = _Walk(task, point, covariance, name)
+    (down, low, below), (up, high, above) = (walk.side(side, points) for side in (-1, 1))
+    stations = [*down[::-1], (walk.best, 0.0, point.values), *up]
+    values, rise, others = (np.array(column) for column in zip(*stations, strict=True))
+    messages = [message for message in (below, above) if message]
     if rise.min() < -FLAT * walk.limit:
         better = float(values[np.argmin(rise)])
         messages.append(f"The cost is lower at {name} = {better:.4g}: the fit is not a minimum.")
     return Profile(
-        name=name,
-        unit=walk.unit,
-        best=walk.best,
-        values=values,
-        rise=rise,
-        others=np.array([s[2] for s in stations]),
-        names=task.unknowns.names,
-        limit=walk.limit,
-        low=low,
-        high=high,
-        logarithmic=walk.logarithmic,
-        sentences=tuple(messages),
-    )
+        name, walk.unknown.unit, walk.best, values, rise, others, task.unknowns.names,
+        walk.limit, low, high, walk.logarithmic, tuple(messages),
+    )  # fmt: skip
 
 
 Station = tuple[float, float, Array]
 """Value, rise, all values."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Side:
-    stations: list[Station]
-    why: str
-
-
-@final
-@dataclass(frozen=True, eq=False)
 class _Walk:
-    """Quantities that stay the same along a profile."""
+    """A profile on its way away from the minimum."""
 
-    task: Task
-    point: Point
-    name: str
-    unit: str
-    index: int
-    own: int
-    best: float
-    step: float
-    scale: float
-    limit: float
-    logarithmic: bool
-
-    @staticmethod
-    def of(task: Task, point: Point, covariance: Covariance, name: str) -> "_Walk":
+    def __init__(self, task: Task, point: Point, covariance: Covariance, name: str) -> None:
         from scipy.special import stdtrit  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
-        index, own = task.unknowns.names.index(name), task.unknowns.fitted.index(name)
-        unknown, best = task.unknowns.unknowns[own], float(point.values[index])
-        logarithmic = unknown.logarithmic and best > 0
-        error, white = covariance.standard_errors[index], covariance.white_errors[index]
-        colour = float((error / white) ** 2) if white > 0 and isfinite(error) else 1.0
-        t = float(stdtrit(covariance.freedom[index], 0.975)) if isfinite(error) else 1.96
-        size = abs(best) or unknown.scale
-        step = float(t * error) if isfinite(error) and error > 0 else BLIND * size
-        step = min(step / best, 1.0) if logarithmic else step
-        rows, n = point.r.size, task.unknowns.lower.size
-        variance = max(point.cost / max(rows - n, 1), 1e-300)
-        return _Walk(
-            task=task,
-            point=point,
-            name=name,
-            unit=unknown.unit,
-            index=index,
-            own=own,
-            best=best,
-            step=step,
-            scale=variance * colour,
-            limit=t**2,
-            logarithmic=logarithmic,
+        box = task.unknowns
+        self.task, self.point, self.name = task, point, name
+        self.index, self.own = box.names.index(name), box.fitted.index(name)
+        self.unknown, self.best = box.unknowns[self.own], float(point.values[self.index])
+        self.logarithmic = self.unknown.logarithmic and self.best > 0
+        error, white = (
+            part[self.index] for part in (covariance.standard_errors, covariance.white_errors)
         )
+        colour = float((error / white) ** 2) if white > 0 and isfinite(error) else 1.0
+        t = float(stdtrit(covariance.freedom[self.index], 0.975)) if isfinite(error) else 1.96
+        size = abs(self.best) or self.unknown.scale
+        step = float(t * error) if isfinite(error) and error > 0 else BLIND * size
+        self.step = min(step / self.best, 1.0) if self.logarithmic else step
+        freedom = max(point.r.size - box.lower.size, 1)
+        self.scale = max(point.cost / freedom, 1e-300) * colour
+        self.limit = t**2
 
-    def at(self, distance: float) -> float:
-        """Return the value at a distance from the minimum."""
-        return self.best * float(np.exp(distance)) if self.logarithmic else self.best + distance
-
-    def side(self, direction: int, points: int) -> _Side:
-        """Return the stations on one side, nearest first, up to the limit or the search's end."""
+    def side(self, direction: int, points: int) -> tuple[list[Station], float | None, str]:
+        """Return the stations on one side, nearest first, the value at the limit, or why not."""
         stations, w = list[Station](), self.point.w
-        distance, step = 0.0, self.step / (points - 1)
-        unknown = self.task.unknowns.unknowns[self.own]
+        distance, step, why = 0.0, self.step / (points - 1), "the end of the search"
         for count in range(FARTHEST + points):
             distance += step
-            c = self.at(direction * distance)
-            if not unknown.lower <= c <= unknown.upper:
-                return _Side(stations, "its bound")
+            away = direction * distance
+            c = self.best * float(np.exp(away)) if self.logarithmic else self.best + away
+            if not self.unknown.lower <= c <= self.unknown.upper:
+                why = "its bound"
+                break
             try:
                 found = held_at(self.task, w, self.index, self.own, c)
             except KeyboardInterrupt:
-                return _Side(stations, "an interruption")
+                why = "an interruption"
+                break
             if isinstance(found, str):
-                return _Side(stations, f"a value without a fit ({found})")
-            w = found.w
-            rise = (found.cost - self.point.cost) / self.scale
+                why = f"a value without a fit ({found})"
+                break
+            w, rise = found.w, (found.cost - self.point.cost) / self.scale
             stations.append((c, rise, found.values))
             if rise >= self.limit:
-                return _Side(stations, "")
+                return stations, self.crossing(stations), ""
             if count >= points:  # the linear theory was too short: increase the step
                 step *= 1.6
-        return _Side(stations, "the end of the search")
+        where = "below" if direction < 0 else "above"
+        if not stations:
+            return stations, None, f"{self.name} is open {where}: it reaches {why} at once."
+        value, rise, _ = stations[-1]
+        how = "flat" if rise < FLAT * self.limit else "open"
+        share = f"the rise is {100 * max(rise, 0.0) / self.limit:.0f} % of the limit"
+        return stations, None, f"{self.name} is {how} {where}: at {value:.4g}, near {why}, {share}."
+
+    def crossing(self, stations: list[Station]) -> float:
+        """Return the value at the limit, by interpolation of the square root of the rise."""
+        (last, before, _), (value, rise, _) = [(self.best, 0.0, self.point.w), *stations][-2:]
+        a, b = (float(np.sqrt(max(x, 0.0))) for x in (before, rise))
+        share = (float(np.sqrt(self.limit)) - a) / max(b - a, 1e-300)
+        if self.logarithmic:
+            return float(last * (value / last) ** share)
+        return last + share * (value - last)
 
 
 def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str:
@@ -253,18 +223,18 @@ def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str
     optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
     box, others = task.unknowns, np.arange(w.size) != own
     best: list[Point] = []
-    why = [""]
+    why = ""
 
     def at(rest: Array) -> Point | None:
+        nonlocal why
         whole = w.copy()
         whole[others] = rest
         there = _solved(task, whole, index, own, c)
-        if there is None:
-            why[0] = f"{box.fitted[own]} = {c:.4g} is outside its order or its bounds"
-            return None
-        found = task.at(there)
+        found = f"{box.fitted[own]} = {c:.4g} is outside its order or its bounds"
+        if there is not None:
+            found = task.at(there)
         if isinstance(found, str):
-            why[0] = found
+            why = found
             return None
         if not best or found.cost < best[0].cost:
             best[:] = [found]
@@ -272,26 +242,23 @@ def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str
 
     def residuals(rest: Array) -> Array:
         found = at(rest)
-        if found is None:
-            return np.full(len(box.names) + 1, inf)
-        return found.reduced[0]
+        return np.full(len(box.names) + 1, inf) if found is None else found.reduced[0]
 
     def slopes(rest: Array) -> Array:
         found = at(rest)
         if found is None:
-            raise ArithmeticError(why[0])
+            raise ArithmeticError(why)
         J, slope = found.reduced[1], found.slope[index]
         return J[:, others] - J[:, [own]] * (slope[others] / slope[own])
 
-    start = np.clip(w[others], box.lower[others], box.upper[others])
-    if not others.any() or at(start) is None:
-        at(start)
-        return best[0] if best else why[0]
-    optimize.least_squares(
-        residuals, start, slopes, bounds=(box.lower[others], box.upper[others]), x_scale="jac",
-        ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
-    )  # fmt: skip
-    return best[0]
+    low, high = box.lower[others], box.upper[others]
+    start = np.clip(w[others], low, high)
+    if at(start) is not None and others.any():
+        optimize.least_squares(
+            residuals, start, slopes, bounds=(low, high), x_scale="jac",
+            ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
+        )  # fmt: skip
+    return best[0] if best else why
 
 
 def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | None:
@@ -302,32 +269,4 @@ def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | 
         if abs(miss) <= 1e-10 * max(abs(c), 1e-300):
             break
         w[own] += max(-1e3, min(1e3, miss / float(box.slope(w)[index, own])))
-    if not box.lower[own] <= w[own] <= box.upper[own]:
-        return None
-    return np.asarray(w, float)
-
-
-def _crossing(walk: _Walk, stations: list[Station]) -> float | None:
-    """Return the value at the limit, by interpolation of the square root of the rise."""
-    last = (walk.best, 0.0)
-    for value, rise, _ in stations:
-        if rise >= walk.limit:
-            a, b = (float(np.sqrt(max(x, 0.0))) for x in (last[1], rise))
-            share = (float(np.sqrt(walk.limit)) - a) / max(b - a, 1e-300)
-            if walk.logarithmic:
-                return float(last[0] * (value / last[0]) ** share)
-            return last[0] + share * (value - last[0])
-        last = (value, rise)
-    return None
-
-
-def _open_side(walk: _Walk, side: _Side, end: float | None, where: str) -> list[str]:
-    """Return the message for a side that does not reach the limit."""
-    if end is not None:
-        return []
-    if not side.stations:
-        return [f"{walk.name} is open {where}: it reaches {side.why} at once."]
-    value, rise, _ = side.stations[-1]
-    how = "flat" if rise < FLAT * walk.limit else "open"
-    share = f"the rise is {100 * max(rise, 0.0) / walk.limit:.0f} % of the limit"
-    return [f"{walk.name} is {how} {where}: at {value:.4g}, near {side.why}, {share}."]
+    return w if box.lower[own] <= w[own] <= box.upper[own] else None

@@ -73,7 +73,7 @@ class Mode:
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution:
+class Solution(packed.Portable):
     """Optimal motion, and its verification under the control.
 
     `solution["v"]` is a signal at the times `solution.t`, nodes of the mesh and collocation points,
@@ -252,14 +252,6 @@ class Solution:
     def to_pack(self) -> dict[str, Any]:
         """Return the fields, with the resolved problem."""
         return packed.state_of(self) | {"problem": posed(self.problem), "cause": None}
-
-    def __copy__(self) -> "Solution":
-        """Return a solution with the same fields."""
-        return packed.shallow(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return the arguments of pickle; a pickle holds the same as a file."""
-        return packed.loads, (packed.dumps(self),)
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
         """Plot one panel per signal over time: optimised points and the re-simulated line.

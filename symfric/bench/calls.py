@@ -221,7 +221,7 @@ def _imports(quick: bool) -> Iterator[Found]:
     statements = (
         "import symfric", "from symfric import LuGre, rabinowicz, simulate", "import casadi"
     )  # fmt: skip
-    best = dict.fromkeys(statements, np.inf)
+    best: dict[str, float] = dict.fromkeys(statements, np.inf)
     for _ in range(1 if quick else 7):
         for text in statements:
             code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from symfric.bench.contenders import casadi
 from symfric.bench.report import Found, Progress, Report, best_time, interleaved, unwarned
 from symfric.integrator import Ensemble, simulate_many
-from symfric.integrator.cuda import on_device
-from symfric.integrator.cuda.device import DeviceError
+from symfric.integrator.cuda.device import Device, DeviceError
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.program import program
@@ -110,7 +109,7 @@ def _lanes(case: Case, members: int) -> Iterator[Found]:
     integrator, _ = built(model, input_data(model, None, 0.0, end), ADAPTIVE["rodas5p"])
     yield LANES, {
         "case": case.name, "members": members,
-        "lanes": int(getattr(program(integrator, True).load(), "lanes", 1)),
+        "lanes": int(getattr(program(integrator, True).members, "lanes", 1)),
         "time per member [us]": 1e6 * best["together"] / members,
         "one by one [us]": 1e6 * best["alone"] / members,
         "ratio to the ensemble": best["alone"] / best["together"],
@@ -170,8 +169,8 @@ def threads(case: str, law: Law, quick: bool) -> Iterator[Found]:
     model, velocities = rabinowicz(law), np.linspace(-0.1, 0.1, members)
     picked = np.linspace(0, members - 1, sample).astype(int)
     some = velocities[picked]
-    at_end = {"t_eval": [THREAD_END], "rtol": 1e-11}
-    exact = np.array([simulate(model, THREAD_END, x0={"v": v}, **at_end)["x"][0] for v in some])
+    end = partial(simulate, model, THREAD_END, t_eval=[THREAD_END], rtol=1e-11)
+    exact = np.array([end(x0={"v": v})["x"][0] for v in some])
 
     def error(found: Array) -> float:
         return float(np.median(np.abs(found - exact)) / np.abs(exact).max())
@@ -221,7 +220,7 @@ def cuda(quick: bool = False) -> Iterator[Found]:
     The compiled code runs on all cores, on a sample of the members.
     """
     try:
-        device = on_device.find_device().name
+        device = Device.found().name
     except DeviceError as error:
         yield f"Graphics processor: not run, {error}"
         return

@@ -224,14 +224,17 @@ def _sensors(rng: np.random.Generator) -> dict[str, Spoil]:
     def clipped(low: float, high: float = 1e9) -> Spoil:
         return put(F, lambda t, x, F: np.clip(F, low, high))
 
+    def altered(column: int, new: Callable[[Array], Any], rows: Any = slice(None)) -> Spoil:
+        return put(column, lambda t, x, F: new((t, x, F)[column]), rows)
+
     def rounded(column: int, step: float) -> Spoil:
-        return put(column, lambda *a: step * np.rint(a[column] / step))
+        return altered(column, lambda a: step * np.rint(a / step))
 
     def frozen(column: int, end: int | None) -> Spoil:
-        return put(column, lambda *a: a[column][0], slice(3400, end))
+        return altered(column, lambda a: a[0], slice(3400, end))
 
     def held(column: int, count: int) -> Spoil:
-        return put(column, lambda *a: np.repeat(a[column][::count], count)[: a[column].size])
+        return altered(column, lambda a: np.repeat(a[::count], count)[: a.size])
 
     def late(count: int) -> Spoil:
         return lambda a: np.column_stack([a[count:, :2], a[:-count, 2]])

@@ -206,7 +206,7 @@ def _speed(data: Dataset, law: str) -> tuple[str, Row]:
     residuals = replace(prepared.task.residuals, substeps=1)  # type: ignore[type-var]
     values = prepared.task.unknowns.values(prepared.centre)
     residuals.at(values)
-    seconds, _ = best_time(lambda: residuals.at(values), inf, most=5, clock=process_time)
+    seconds, _ = best_time(partial(residuals.at, values), inf, most=5, clock=process_time)
     note = f"{data.size} samples, {len(residuals.names)} unknowns, best of 5"
     return goal("record and its derivatives [s]", seconds, 0.15, note=note)
 

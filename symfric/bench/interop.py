@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.report import Found, Progress, Report, Row
+from symfric.bench.report import Found, Progress, Report, Row, timed
 from symfric.integrator import Hold, flow, simulate
 from symfric.laws import GMS, BrownMcPhee, ElastoPlastic, Law, LuGre
 from symfric.model import Model
@@ -243,17 +243,15 @@ def integrators(law: str) -> Iterator[Found]:
     times = np.linspace(0.0, 20.0, 401)
     exact = simulate(model, 20.0, samples=401, rtol=1e-10)
     start = [exact[v.name][0] for v in model.x]
-    spent = 0.0
 
     def row(name: str, x: Array | None, ratio: float, status: str = "") -> Found:
         error = np.nan if x is None else float(np.abs(x - exact["x"]).max())
         return RUNS, {"integrator": name, "law": law, "largest error [m]": error,
                       "ratio of time to symfric": ratio, "status": status}  # fmt: skip
 
-    for _ in range(2):  # the first call builds, as `ca.integrator` does below
-        begin = process_time()
-        ours = simulate(model, 20.0, samples=401, backend="vm")
-        spent = process_time() - begin
+    call = partial(simulate, model, 20.0, samples=401, backend="vm")
+    call()  # builds, as `ca.integrator` does below
+    spent, ours = timed(call)
     yield row("symfric", ours["x"], 1.0)
     x = model.vector("x")
     dae = {"x": x, "ode": ca.SX(right_hand_side(model)(x, []))}

@@ -83,7 +83,7 @@ PLANTS: dict[str, Callable[[], Law]] = {
     "brown_mcphee 1e-2": lambda: BrownMcPhee(v_t=1e-2, **LEVELS),
     "brown_mcphee 1e-4": lambda: BrownMcPhee(v_t=1e-4, **LEVELS),
     "lugre 1e5 N/m": lambda: LuGre(v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, **LEVELS),
-    "exact_coulomb": lambda: ExactCoulomb(**LEVELS),
+    "exact_coulomb": lambda: ExactCoulomb(mu_s=6.0, mu_d=4.0),
 }
 
 

@@ -34,7 +34,7 @@ from symfric.figures.regularisation import (
     regularisation,
     sample,
 )
-from symfric.foundation.parameters import parameters
+from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import (
     BrownMcPhee,
     Coulomb,
@@ -106,9 +106,9 @@ def _flat(law: Law) -> Law:
 
 def _falling(law: Law) -> Law:
     """Return dry friction that falls over the Stribeck velocity of bristles."""
-    own = parameters(law)
-    levels = {name: own[name].value for name in ("mu_s", "mu_d", "v_s", "sigma_2")}
-    return ExactCoulomb(form="stribeck", **levels)
+    return with_values(ExactCoulomb(form="stribeck"), {
+        name: parameters(law)[name].value for name in ("mu_s", "mu_d", "v_s", "sigma_2")
+    })  # fmt: skip
 
 
 def _brown(mu_s: float, mu_d: float) -> Law:
@@ -119,10 +119,9 @@ def _lugre(kind: type[LuGre | LuGreNormalised]) -> Law:
     return kind(mu_s=0.15, mu_d=0.1, v_s=1e-2, sigma_0=1e3, sigma_1=10.0, sigma_2=0.0)
 
 
-CYCLIC = {"scene": Rabinowicz, "t_end": 20.0, "cycle": True, "of": ("x",)}
 CASES = (
-    Case("rabinowicz brown_mcphee", _brown(0.15, 0.1), exact=_coulomb, **CYCLIC),
-    Case("rabinowicz lugre", _lugre(LuGre), exact=_falling, **CYCLIC),
+    Case("rabinowicz brown_mcphee", _brown(0.15, 0.1), Rabinowicz, 20.0, _coulomb, True, ("x",)),
+    Case("rabinowicz lugre", _lugre(LuGre), Rabinowicz, 20.0, _falling, True, ("x",)),
     Case("pendulum_box brown_mcphee", _brown(0.15, 0.1), PendulumBox, 15.0, _coulomb),
     Case("pendulum_box lugre_normalised", _lugre(LuGreNormalised), PendulumBox, 15.0, _falling),
     Case("four_mass coulomb", Coulomb(mu_d=0.1, v_eps=1e-2), FourMass, 4.0, _flat),

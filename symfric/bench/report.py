@@ -13,7 +13,7 @@ from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, TypeVar, final
 
 from symfric.foundation.files import write_table
-from symfric.foundation.programs import find_compiler, no_compiler
+from symfric.foundation.programs import find_compiler, needed_compiler
 from symfric.integrator.compiled.compiler import FLAGS
 
 if TYPE_CHECKING:
@@ -203,7 +203,8 @@ def _draw_curves(
     def label(row: Row) -> str:
         return ", ".join(c if isinstance(c := row[k], str) else f"{k} = {c:g}" for k in lines)
 
-    cases, labels = (list(dict.fromkeys(map(f, rows))) for f in (lambda r: r[panel], label))
+    cases = list(dict.fromkeys(row[panel] for row in rows))
+    labels = list(dict.fromkeys(map(label, rows)))
     points: dict[tuple[str, Cell, str], list[tuple[float, float]]] = {}
     for y in ys:
         for row in rows:
@@ -316,9 +317,7 @@ def compile_time(source: str, target: str | os.PathLike[str] = os.devnull) -> fl
     Raises:
         CompileError: no compiler.
     """
-    compiler = find_compiler()
-    if compiler is None:
-        raise no_compiler()
+    compiler = needed_compiler()
     before = os.times()
     compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
     after = os.times()

@@ -12,7 +12,7 @@ from symfric import Law, Linear, law_from_text, parameters, rate_of, with_values
 from symfric.cli.options import assignments, numbers
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.foundation.tables import Column, read_table
+from symfric.foundation.tables import read_columns
 from symfric.integrator import Input
 from symfric.integrator.equations.inputs import Sampled
 from symfric.model import Model
@@ -198,9 +198,7 @@ def input_from_text(name: str, text: str, unit: str) -> Linear | float:
         return checks.number(f"--input {name}", value)
     names = (column, column.partition("[")[0].strip())
     wanted = {"t": (("t", "time", "Time"), "s"), column: (names, unit)}
-    table = read_table(
-        Path(file), {n: Column(*of, assumed=True) for n, of in wanted.items()}
-    ).columns
+    table = read_columns(Path(file), wanted)
     try:
         return Linear(table["t"], table[column])
     except ValueError as error:

@@ -21,7 +21,7 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.numeric import bound
 from symfric.foundation.parameters import Parametric, Variable, param
-from symfric.foundation.programs import CompileError, Compiler, find_compiler, no_compiler
+from symfric.foundation.programs import CompileError, Compiler, find_compiler, needed_compiler
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant
@@ -264,8 +264,8 @@ def close_loop(
     checks.check_names(f"{WHERE}: real", [real], REALS)
     checks.choice(f"{WHERE}: backend", backend, ("auto", "c", "vm"))
     compiler = None if backend == "vm" else find_compiler()
-    if backend == "c" and compiler is None:
-        raise no_compiler()
+    if backend == "c":
+        compiler = needed_compiler()
     wanted = {"compensated": {}} if cases is None else checks.named(f"{WHERE}: cases", cases)
     measured = (position, velocity)
     setup = Setup(controller, delay, noise, seed, real, compiler, measured, load)

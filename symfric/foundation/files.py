@@ -20,6 +20,17 @@ _ASKING = Lock()
 
 
 @contextmanager
+def _expecting(what: str, path: str | Path) -> Generator[None, None, None]:
+    """Turn errors of the operating system into a ValueError that names the output path."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:  # RuntimeError for circular links in Python 3.12
+        system = error.strerror if isinstance(error, OSError) else None
+        reason = system.lower() if system else "circular links"
+        raise ValueError(f"output '{path}': expected {what}, got {reason}") from None
+
+
+@contextmanager
 def written(path: str | Path) -> Generator[Path, None, None]:
     """Yield a temporary path in the folder of `path` that is renamed to it if the block succeeds.
 
@@ -31,15 +42,11 @@ def written(path: str | Path) -> Generator[Path, None, None]:
             the disk is full.
     """
     target = check_file(path)
-    try:
+    with _expecting("a writable place", path):
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(
             prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
         )
-    except OSError as error:
-        raise ValueError(
-            f"output '{path}': expected a writable place, got {error.strerror}"
-        ) from None
     os.close(handle)
     temporary = Path(name)
     try:
@@ -66,13 +73,11 @@ def check_file(path: str | Path) -> Path:
         ValueError: not a path, a folder, a device, circular links, or see `check_folder`.
     """
     place = checks.path("output", path)
-    try:
+    with _expecting("a file name", path):
         target = _resolved(place)  # a link stays a link to the new file
         if target.exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device"
             raise ValueError(f"output '{path}': expected a file name, got {kind}")
-    except (OSError, RuntimeError) as error:
-        raise ValueError(f"output '{path}': expected a file name, got {_reason(error)}") from None
     check_folder(target.parent)
     return target
 
@@ -94,11 +99,9 @@ def check_folder(folder: str | Path) -> Path:
         ValueError: it, or the nearest folder above it, is a file, the root or without permission.
     """
     place = checks.path("output", folder)
-    try:
+    with _expecting("a folder", folder):
         absolute = _resolved(place)
         existing = next(p for p in (absolute, *absolute.parents) if p.exists())
-    except (OSError, RuntimeError) as error:
-        raise ValueError(f"output '{folder}': expected a folder, got {_reason(error)}") from None
     if not existing.is_dir():
         raise ValueError(f"output '{folder}': expected a folder, got the file '{existing}'")
     if existing != absolute and existing == Path(absolute.anchor):
@@ -119,19 +122,9 @@ def make_folder(folder: str | Path) -> Path:
         ValueError: it cannot be created.
     """
     place = check_folder(folder)
-    try:
+    with _expecting("a writable place", folder):
         place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(
-            f"output '{folder}': expected a writable place, got {_reason(error)}"
-        ) from None
     return place
-
-
-def _reason(error: OSError | RuntimeError) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror.lower()
-    return "circular links"
 
 
 def write_text(path: str | Path, text: str) -> None:

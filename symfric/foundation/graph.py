@@ -7,12 +7,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import LEAVES, applied, walk
 from symfric.foundation.variable import stacked
 
 SELECT = -1
 """Operation code of an `if_else` node, which CasADi writes as a sum of two halves."""
-
-LEAVES = frozenset({ca.OP_INPUT, ca.OP_CONST})
 
 
 @dataclass(frozen=True)
@@ -86,23 +85,16 @@ def graph(function: ca.Function) -> Graph:
     """
     _check(function)
     builder = _Builder()
-    slots: dict[int, int] = {}
-    rows: list[dict[int, int]] = [{} for _ in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        into, of = function.instruction_output(k), function.instruction_input(k)
-        if op == ca.OP_OUTPUT:
-            rows[into[0]][into[1]] = slots[of[0]]
-        elif op == ca.OP_ASSIGN:
-            slots[into[0]] = slots[of[0]]
-        elif op == ca.OP_INPUT:
-            slots[into[0]] = builder.add(Node(op, entry=(of[0], of[1])))
-        elif op == ca.OP_CONST:
-            slots[into[0]] = builder.add(Node(op, value=function.instruction_constant(k)))
-        else:
-            slots[into[0]] = builder.add(Node(op, tuple(slots[i] for i in of)))
-    results = [tuple(row[i] for i in range(len(row))) for row in rows]
-    return pruned(builder.nodes, results)
+
+    def made(k: int, operands: list[int]) -> int:
+        op, entry = function.instruction_id(k), function.instruction_input(k)
+        if op == ca.OP_INPUT:
+            return builder.add(Node(op, entry=(entry[0], entry[1])))
+        if op == ca.OP_CONST:
+            return builder.add(Node(op, value=function.instruction_constant(k)))
+        return builder.add(Node(op, tuple(operands)))
+
+    return pruned(builder.nodes, [tuple(row) for row in walk(function, made)])
 
 
 def _check(function: ca.Function) -> None:
@@ -165,10 +157,8 @@ def rebuild(
         elif node.op == SELECT:
             condition, yes, no = args
             found.append(ca.if_else(condition, yes, no))
-        elif len(args) == 1:
-            found.append(ca.SX.unary(node.op, *args))
         else:
-            found.append(ca.SX.binary(node.op, *args))
+            found.append(applied(node.op, args))
     return [stacked(found[i] for i in row) for row in source.results]
 
 

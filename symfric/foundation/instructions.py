@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import identity
+from symfric.foundation.numeric import applied, walk
 
 UNARY = (
     "neg", "exp", "log", "sqrt", "sq", "twice", "sin", "cos", "tan", "asin", "acos", "atan",
@@ -71,30 +72,26 @@ class Instructions:
         columns = [ca.vec(e.nz[:]) for e in expressions if e.nnz()]
         symbols: Any = ca.vertcat(ca.SX(0, 1), *(atom.symbol for atom in atoms))
         f = ca.Function("f", [symbols], [ca.vertcat(ca.SX(0, 1), *columns)])
-        slots: dict[int, int] = {}
-        constants, code, results = list[float](), list[tuple[int, int, int]](), dict[int, int]()
-        for k in range(f.n_instructions()):  # constants are -1, -2, ... until their count is known
-            op, of = f.instruction_id(k), f.instruction_input(k)
-            into = f.instruction_output(k)[0]
-            if op == ca.OP_OUTPUT:
-                results[f.instruction_output(k)[1]] = slots[of[0]]
-            elif op == ca.OP_ASSIGN:
-                slots[into] = slots[of[0]]
-            elif op == ca.OP_INPUT:
-                slots[into] = of[1]
-            elif op == ca.OP_CONST:
+        constants, code = list[float](), list[tuple[int, int, int]]()
+
+        def numbered(k: int, operands: list[int]) -> int:
+            op = f.instruction_id(k)
+            if op == ca.OP_INPUT:
+                return f.instruction_input(k)[1]
+            if op == ca.OP_CONST:  # -1, -2, ... until their count is known
                 constants.append(f.instruction_constant(k))
-                slots[into] = -len(constants)
-            elif op in NAMES:
-                code.append((op, slots[of[0]], slots[of[-1]]))
-                slots[into] = len(atoms) + len(code) - 1
-            else:
+                return -len(constants)
+            if op not in NAMES:
                 what = "a call of a Function that does not expand to SX, such as an interpolant"
                 what = what if op == ca.OP_CALL else f"CasADi's operation {op}"
                 raise ValueError(f"expected elementary operations, got {what}")
+            code.append((op, operands[0], operands[-1]))
+            return len(atoms) + len(code) - 1
+
+        (results,) = walk(f, numbered)
         used = sorted({op for op, _, _ in code})
         rows = np.array(code, dtype=np.int64).reshape(-1, 3)
-        numbers = np.array([results[i] for i in range(f.numel_out(0))], dtype=np.int64)
+        numbers = np.array(results, dtype=np.int64)
         for operands in (rows[:, 1], rows[:, 2], numbers):
             operands[operands >= len(atoms)] += len(constants)
             operands[operands < 0] = len(atoms) - 1 - operands[operands < 0]
@@ -121,12 +118,9 @@ class Instructions:
         atoms = identity.atoms_of(self.labels, self.names)
         nodes: list[Any] = [*(a.symbol for a in atoms), *map(ca.SX, self.constants.tolist())]
         code = [CODES[name] for name in self.operations]
-        unary = [name in UNARY for name in self.operations]
+        operands = [1 if name in UNARY else 2 for name in self.operations]
         for k, a, b in self.code.tolist():
-            one, other = nodes[a], nodes[b]
-            nodes.append(
-                ca.SX.unary(code[k], one) if unary[k] else ca.SX.binary(code[k], one, other)
-            )
+            nodes.append(applied(code[k], (nodes[a], nodes[b])[: operands[k]]))
         ends = np.searchsorted(self.entries[:, 0], np.arange(len(self.shapes) + 1))
         found = [
             _matrix(rows, columns, self.entries[begin:end, 1:], nodes)

@@ -17,26 +17,21 @@ class LazyPackage(ModuleType):
 
     def __getattr__(self, name: str) -> Any:
         """Import the public name or the submodule called `name`."""
-        place = self._places.get(name)
-        if place is not None:
-            found = getattr(import_module(place), name)
-        else:
-            found = None if name.startswith("_") else self._submodule(name)
-            if found is None:
-                raise AttributeError(
-                    f"module {self.__name__!r} has no attribute {name!r}", name=name, obj=self
-                )
+        found, submodule = None, f"{self.__name__}.{name}"
+        if name in self._places:
+            found = getattr(import_module(self._places[name]), name)
+        elif not name.startswith("_"):
+            try:
+                found = import_module(submodule)
+            except ModuleNotFoundError as error:
+                if error.name != submodule:
+                    raise
+        if found is None:
+            raise AttributeError(
+                f"module {self.__name__!r} has no attribute {name!r}", name=name, obj=self
+            )
         self.__dict__[name] = found
         return found
-
-    def _submodule(self, name: str) -> ModuleType | None:
-        whole = f"{self.__name__}.{name}"
-        try:
-            return import_module(whole)
-        except ModuleNotFoundError as error:
-            if error.name != whole:
-                raise
-            return None
 
     def __setattr__(self, name: str, value: object) -> None:
         """Set an attribute, unless it is a submodule with the name of a public object."""

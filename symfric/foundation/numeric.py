@@ -1,4 +1,5 @@
-"""Elementary functions that accept floats, NumPy arrays and CasADi SX, MX and DM.
+"""Elementary functions that accept floats, NumPy arrays and CasADi SX, MX and DM; evaluation of
+CasADi functions and walks through their instructions.
 
 CasADi's own functions turn an array into a DM column, and NumPy's turn a DM into an array; a law
 written with these keeps the type of its arguments.
@@ -9,7 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from math import erf as erf_of_float
 from numbers import Real
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import casadi as ca
 import numpy as np
@@ -156,7 +157,7 @@ def bound(
     for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
         for i, array in enumerate(arrays):
             if array.size:
-                place(i, flat_view(array))
+                place(i, memoryview(array.reshape(-1)))  # pyright: ignore
 
     def run(_alive: object = (function, buffer)) -> None:
         call()
@@ -171,8 +172,32 @@ def address(array: NDArray[np.float64]) -> int:
     return array.ctypes.data
 
 
-def flat_view(array: NDArray[np.float64]) -> Any:
-    """Return a flat memory view of a contiguous array for CasADi's buffers; keep the array
-    alive.
+LEAVES = frozenset({ca.OP_INPUT, ca.OP_CONST})
+
+Made = TypeVar("Made")
+
+
+def walk(function: ca.Function, made: Callable[[int, list[Made]], Made]) -> list[list[Made]]:
+    """Return the nonzeros of each result of an SX function, from its instructions in order.
+
+    Args:
+        function: of SX.
+        made: value of instruction k from those of its operands, none for inputs and constants.
     """
-    return memoryview(array.reshape(-1))  # pyright: ignore[reportArgumentType, reportCallIssue]
+    slots = dict[int, Made]()
+    results = [dict[int, Made]() for _ in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        op = function.instruction_id(k)
+        into, of = function.instruction_output(k), function.instruction_input(k)
+        if op == ca.OP_OUTPUT:
+            results[into[0]][into[1]] = slots[of[0]]
+        elif op == ca.OP_ASSIGN:
+            slots[into[0]] = slots[of[0]]
+        else:
+            slots[into[0]] = made(k, [] if op in LEAVES else [slots[i] for i in of])
+    return [[row[i] for i in range(len(row))] for row in results]
+
+
+def applied(operation: int, operands: Sequence[ca.SX]) -> ca.SX:
+    """Apply one CasADi operation."""
+    return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)

@@ -4,7 +4,7 @@ A pack is an archive of arrays (NPZ): one holds JSON, in which objects are given
 and expressions by number; the others are the arrays themselves. Numbers are restored bit for bit.
 
 A file cannot run code. Expressions are lists of instructions (`symfric.foundation.instructions`),
-arrays are never pickles (`symfric.foundation.archive`), and objects are of a fixed list of classes
+arrays are never pickles, and objects are of a fixed list of classes
 (`symfric.foundation.storable`) or of classes that the caller passes; their fields are checked
 against their annotations. A pickle is trusted, like all pickles: it may also hold other classes and
 CasADi's own serialization.
@@ -18,13 +18,13 @@ from enum import Enum
 from functools import partial
 from io import BytesIO
 from types import BuiltinFunctionType, FunctionType
-from typing import IO, Any, TypeVar, cast, final
+from typing import IO, Any, Self, cast, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import archive, checks, identity, storable
+from symfric.foundation import checks, identity, storable
 from symfric.foundation.instructions import Instructions
 
 FUNCTION = tuple[str, list[ca.SX], list[ca.SX], list[str], list[str]]
@@ -44,14 +44,18 @@ class Given:
         return self.value
 
 
-T = TypeVar("T")
+class Portable:
+    """Base of objects whose copies and pickles keep the identity of their symbols."""
 
+    def __copy__(self) -> Self:
+        """Return another object with the same fields and symbols."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        return made
 
-def shallow(thing: T) -> T:
-    """Return another object with the same fields."""
-    made = object.__new__(type(thing))
-    made.__dict__.update(vars(thing))
-    return made
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the pack."""
+        return loads, (dumps(self),)
 
 
 def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:
@@ -82,7 +86,7 @@ def dumps(thing: object) -> bytes:
 def holds(thing: object) -> bool:
     """Return True if a file can hold `thing`."""
     try:
-        _Writer(trusted=False).pack(BytesIO(), thing, "", 0)
+        dump(BytesIO(), thing)
     except ValueError:
         return False
     return True
@@ -105,7 +109,7 @@ def load(
             class or function.
     """
     try:
-        arrays = archive.read(file)
+        arrays = storable.arrays(file)
         if OLD in arrays:
             raise UnreadableError(
                 "expected a current file, got one of an older format, which could run code; repeat "
@@ -131,7 +135,7 @@ def load(
 
 def loads(data: bytes) -> Any:
     """Return the object that `dumps` wrote in a pickle, with any classes."""
-    arrays = archive.read(BytesIO(data))
+    arrays = storable.arrays(BytesIO(data))
     return _Reader(arrays, None).unpack(json.loads(arrays.pop(ABOUT).tobytes()))
 
 
@@ -234,7 +238,7 @@ class _Writer:
         raise checks.refused(f"pack{where}", what, value, hint)
 
     def _array(self, where: str, value: NDArray[Any]) -> Any:
-        if value.dtype.kind not in "biufU":
+        if value.dtype.kind not in storable.ARRAYS:
             raise checks.refused(f"pack{where}", "an array of numbers", value)
         self._arrays.append(value)
         return {"array": len(self._arrays) - 1}
@@ -276,19 +280,20 @@ class _Reader:
         self._arrays, self._own, self._reader = arrays, own, reader
         self._expressions: list[Any] = []
         self._known: list[object] = []
+        read = self.read
         self._ways: dict[str, Callable[[Any], Any]] = {
             "SX": lambda k: self._expressions[k],
             "DM": lambda k: ca.DM(self._expressions[k]),
-            "Function": lambda parts: self._of_expressions(self.read(parts)),
+            "Function": lambda parts: self._of_expressions(read(parts)),
             "serialized": self._serialized,
             "array": lambda k: self._arrays[f"a{k}"],
             "enum": lambda named: self._class(named[0], Enum)[named[1]],
-            "tuple": lambda several: tuple(map(self.read, several)),
-            "dict": lambda pairs: {self.read(name): self.read(value) for name, value in pairs},
+            "tuple": lambda several: tuple(map(read, several)),
+            "dict": lambda pairs: {read(name): read(value) for name, value in pairs},
             "same": self._same,
-            "was": lambda content: self.read(content).unpacked(),
+            "was": lambda content: read(content).unpacked(),
             "function": self._function,
-            "partial": lambda parts: self._partial(*map(self.read, parts)),
+            "partial": lambda parts: partial(read(parts[0]), *read(parts[1]), **read(parts[2])),
         }
 
     def unpack(self, about: Mapping[str, Any]) -> Any:
@@ -312,19 +317,15 @@ class _Reader:
 
     def _object(self, kind: type, has: Mapping[str, Any]) -> Any:
         """Build an object with these fields; for a file its own checks are applied."""
-        made, place = object.__new__(kind), len(self._known)
+        made, k = object.__new__(kind), len(self._known)
         self._known.append(None)
         values = {name: self.read(held) for name, held in has.items()}
         if self._own is not None and storable.path_of(kind).startswith(storable.OURS):
             values = storable.checked(kind, values)
         vars(made).update(values)
-        self._known[place] = made
-        check = getattr(made, "check_fields", getattr(made, "__post_init__", None))
-        if (
-            self._own is not None
-            and check is not None
-            and check.__module__.startswith(storable.OURS)
-        ):
+        self._known[k] = made
+        check: Any = getattr(made, "check_fields", getattr(made, "__post_init__", None))
+        if self._own is not None and getattr(check, "__module__", "").startswith(storable.OURS):
             check()
         return made
 
@@ -340,13 +341,9 @@ class _Reader:
         if self._own is not None and not storable.may_hold(path):
             raise _foreign()
         found = self._named(path, "classes")
-        if not (
-            isinstance(found, type)
-            and issubclass(found, wanted)
-            and storable.path_of(found) == path
-        ):
-            raise _foreign()
-        if not (is_dataclass(found) or hasattr(found, "to_pack") or issubclass(found, Enum)):
+        good = isinstance(found, type) and issubclass(found, wanted)
+        data = is_dataclass(found) or hasattr(found, "to_pack") or wanted is Enum
+        if not good or not data or storable.path_of(found) != path:
             raise _foreign()
         return found
 
@@ -368,27 +365,24 @@ class _Reader:
             raise self._unknown("functions", path)
         return self._named(path, "functions")
 
-    def _partial(self, function: Any, args: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
-        return partial(function, *args, **keywords)
-
     def _named(self, path: str, what: str) -> Any:
         """Return the object of this name, passed by the caller or of a known package."""
-        place, _, name = path.partition(":")
+        module, _, name = path.partition(":")
         if self._own is not None and path in self._own:
             return self._own[path]
-        if self._own is not None and place.split(".")[0] not in storable.OWN:
+        if self._own is not None and module.split(".")[0] not in storable.OWN:
             raise self._unknown(what, path)
         try:
             return storable.found_at(path)
         except (ImportError, AttributeError) as error:
             raise UnreadableError(
-                f"expected {what} that this version of symfric has, got {name} of {place}; it was "
+                f"expected {what} that this version of symfric has, got {name} of {module}; it was "
                 "written by another version"
             ) from error
 
     def _unknown(self, what: str, path: str) -> UnreadableError:
-        place, _, name = path.partition(":")
+        module, _, name = path.partition(":")
         return UnreadableError(
-            f"expected {what} of symfric, got {name} of {place}; pass it, as in "
+            f"expected {what} of symfric, got {name} of {module}; pass it, as in "
             f"{self._reader}(path, own=[{name}])"
         )

@@ -137,11 +137,8 @@ class Parametric:
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        take_si(
-            type(self).__name__,
-            self,
-            *(item.name for item in fields(self) if "unit" in item.metadata),
-        )
+        declared = (item.name for item in fields(self) if "unit" in item.metadata)
+        take_si(type(self).__name__, self, *declared)
         problems = list(_problems(self))
         if problems:
             raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))
@@ -264,19 +261,8 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
     own = {item.name: item for item in fields(obj)}
     for flat, (child, name) in _names(obj).items():
         if child is None:
-            meta = own[name].metadata
-            found[flat] = Parameter(
-                flat,
-                getattr(obj, name),
-                meta["unit"],
-                own[name].default,  # pyright: ignore[reportArgumentType]
-                meta["lower"],
-                meta["upper"],
-                meta["doc"],
-                meta["role"],
-                name,
-                meta["width"],
-            )
+            known: dict[str, Any] = {"default": own[name].default, **own[name].metadata}
+            found[flat] = Parameter(name=flat, value=getattr(obj, name), field=name, **known)
         else:
             found[flat] = replace(children[child][name], name=flat)
     return found
@@ -295,17 +281,12 @@ class Option:
 
 def options(obj: Parametric) -> dict[str, Option]:
     """Return the options of `obj` itself, by name."""
-    return {
-        item.name: Option(
-            item.name,
-            getattr(obj, item.name),
-            item.default,  # pyright: ignore[reportArgumentType]
-            item.metadata["choices"],
-            item.metadata["doc"],
-        )
-        for item in fields(obj)
-        if "choices" in item.metadata
-    }
+    found: dict[str, Option] = {}
+    for item in fields(obj):
+        if "choices" in item.metadata:
+            known: dict[str, Any] = {"default": item.default, **item.metadata}
+            found[item.name] = Option(name=item.name, value=getattr(obj, item.name), **known)
+    return found
 
 
 def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
@@ -354,16 +335,8 @@ def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
     known = parameters(obj)
     names = checks.names(type(obj).__name__, names, known)
     variables = tuple(
-        Variable(
-            name,
-            known[name].unit,
-            start=known[name].value,
-            nominal=_magnitude(known[name].value),
-            lower=known[name].lower,
-            upper=known[name].upper,
-            doc=known[name].doc,
-        )
-        for name in names
+        Variable(name, p.unit, p.value, _magnitude(p.value), p.lower, p.upper, p.doc)
+        for name, p in ((name, known[name]) for name in names)
     )
     return with_values(obj, {v.name: v.symbol for v in variables}), variables
 

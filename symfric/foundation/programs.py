@@ -244,17 +244,12 @@ def needed_compiler() -> Compiler:
     Raises:
         CompileError: not found.
     """
-    found = find_compiler()
-    if found is None:
-        raise no_compiler()
-    return found
-
-
-def no_compiler() -> CompileError:
-    """Return the error for a missing compiler."""
-    wanted = os.environ.get("CC")
-    found = f"$CC is {wanted!r}, which is not found" if wanted else "found none"
-    return CompileError(
-        f"compile: expected a C compiler ($CC, gcc, clang or cc), {found}; install one, or pass "
-        "backend='vm' to simulations"
-    )
+    compiler = find_compiler()
+    if compiler is None:
+        wanted = os.environ.get("CC")
+        found = f"$CC is {wanted!r}, which is not found" if wanted else "found none"
+        raise CompileError(
+            f"compile: expected a C compiler ($CC, gcc, clang or cc), {found}; install one, or "
+            "pass backend='vm' to simulations"
+        )
+    return compiler

@@ -1,18 +1,26 @@
-"""Classes that a file may name, and the check of their fields against their annotations."""
+"""Contents of untrusted files: arrays, classes that a file may name, and types of their fields."""
 
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, Field, fields
 from functools import cache, cached_property
 from importlib import import_module
+from io import BytesIO
+from math import prod
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import IO, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 OWN = ("symfric", "ocp", "identification")
 """Packages whose classes are known."""
+ARRAYS = "biufU"
+"""NumPy kinds of numbers and texts that an array may hold; objects, which are pickles, are
+refused."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
 
 
@@ -101,8 +109,6 @@ def fits(value: Any, hint: Any) -> bool:
         return any(fits(value, one) for one in of)
     if kind is Literal:
         return any(type(value) is type(one) and value == one for one in of)
-    if kind is None or kind is NoneType:
-        return value is None
     if kind is np.ndarray or get_origin(kind) is np.ndarray:
         return isinstance(value, np.ndarray) and _of_numbers(value, of)
     if kind is Callable or getattr(kind, "__name__", "") == "Callable":
@@ -111,21 +117,16 @@ def fits(value: Any, hint: Any) -> bool:
     if getattr(kind, "_is_protocol", False) and not issubclass(kind, Collection):
         has = {*dir(type(value)), *getattr(value, "__dict__", ())}
         return has.issuperset(name for name in vars(kind) if not name.startswith("_"))
-    if kind is float:
-        return isinstance(value, float | int) and not isinstance(value, bool)
-    if kind is int:
-        return isinstance(value, int) and not isinstance(value, bool)
+    if kind in (float, int):
+        wanted = float | int if kind is float else int
+        return isinstance(value, wanted) and not isinstance(value, bool)
     if not isinstance(value, kind):
         return False
     if issubclass(kind, tuple) and of and of[-1] is not Ellipsis:
         return len(value) == len(of) and all(map(fits, value, of))
     if issubclass(kind, Mapping) and of:
-        return _all(value, of[0]) and _all(value.values(), of[1])
-    return not (isinstance(value, Collection) and of) or _all(value, of[0])
-
-
-def _all(values: Iterable[Any], hint: Any) -> bool:
-    return all(fits(value, hint) for value in values)
+        return all(fits(key, of[0]) and fits(held, of[1]) for key, held in value.items())
+    return not (isinstance(value, Collection) and of) or all(fits(one, of[0]) for one in value)
 
 
 def _of_numbers(array: np.ndarray[Any, Any], of: tuple[Any, ...]) -> bool:
@@ -142,3 +143,43 @@ def agree(what: str, *conditions: bool) -> None:
     """
     if not all(conditions):
         raise ValueError(f"{what}: expected consistent fields, got contradictory ones")
+
+
+def arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
+    """Read the arrays of an archive that `numpy.savez` wrote, by their names.
+
+    The arrays together take no more memory than the file: compressed members, overlapping members
+    and headers that announce more data than follow are refused.
+
+    Args:
+        file: open for reading.
+
+    Raises:
+        ValueError: such a member, one that is not an array of numbers or texts, or not an archive.
+    """
+    try:
+        size = file.seek(0, 2)
+        with ZipFile(file) as archive:
+            members = archive.infolist()
+            if sum(member.file_size for member in members) > size:
+                raise ValueError("expected members that do not overlap")
+            if any(member.compress_type != ZIP_STORED for member in members):
+                raise ValueError("expected members that are not compressed")
+            return {m.filename.removesuffix(".npy"): _array(archive.read(m), size) for m in members}
+    except Exception as error:  # zipfile and NumPy raise various errors on damaged bytes
+        raise ValueError(f"expected an archive of arrays, got another file: {error}") from error
+
+
+def _array(content: bytes, most: int) -> NDArray[Any]:
+    """Return the array in a member; `most` bounds its dimensions if it is empty."""
+    stream = BytesIO(content)
+    if npy.read_magic(stream) != (1, 0):
+        raise ValueError("expected format 1.0 of NumPy's arrays")
+    shape, by_columns, dtype = npy.read_array_header_1_0(stream)
+    data = stream.read()
+    if dtype.kind not in ARRAYS or not dtype.itemsize or not all(0 <= n <= most for n in shape):
+        raise ValueError("expected an array of numbers or texts")
+    if prod(shape) * dtype.itemsize != len(data):
+        raise ValueError("expected an array as long as its header says")
+    array = np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
+    return array.astype(dtype.newbyteorder("="))

@@ -12,6 +12,7 @@ import numpy as np
 
 EXPRESSIONS = (ca.SX, ca.MX, ca.DM, int, float, np.generic, np.ndarray)
 """Types whose comparison for equality with a symbol is an expression."""
+ORDERS = (operator.lt, operator.le, operator.gt, operator.ge)
 
 
 T = TypeVar("T")
@@ -57,7 +58,8 @@ def _written(operate: Callable[..., Any], *operands: Any) -> Any:
             f"variable '{name}': expected SX or numbers as operands, got MX; models are written "
             "with casadi.SX, and Opti takes them through model.function(...), flow or stepper"
         )
-    return operate(*map(plain, operands))
+    found = operate(*map(plain, operands))
+    return Condition(found) if operate in ORDERS and type(found) is ca.SX else found
 
 
 @final
@@ -71,14 +73,6 @@ class Condition(ca.SX):
             f"expected a number, got the condition {self}, which is true or false only once its "
             "symbols have values; write casadi.if_else(condition, a, b)"
         )
-
-
-def _comparison(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
-    def forward(self: "Symbolic", other: Any) -> Any:
-        found = _written(operate, self, other)
-        return Condition(found) if type(found) is ca.SX else found
-
-    return forward
 
 
 def _operator(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
@@ -121,8 +115,8 @@ class Symbolic:
     __mod__, __rmod__ = _operator(operator.mod), _reflected(operator.mod)
     __pow__, __rpow__ = _operator(operator.pow), _reflected(operator.pow)
     __matmul__, __rmatmul__ = _operator(operator.matmul), _reflected(operator.matmul)
-    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
-    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
+    __lt__, __le__ = _operator(operator.lt), _operator(operator.le)
+    __gt__, __ge__ = _operator(operator.gt), _operator(operator.ge)
 
     def __neg__(self) -> ca.SX:
         return -self.symbol

@@ -1,14 +1,9 @@
-"""Signals in CSV files: a header with column names and units, rows of numbers, results in SI.
-
-The reader serves both identification records and simulation inputs.
-"""
+"""Signals in CSV files: a header with column names and units, rows of numbers, results in SI."""
 
 import csv
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from re import fullmatch
-from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,43 +22,15 @@ USUAL: Mapping[str, str] = {
 """SI unit -> its usual units, for messages; a column may have any unit of its dimension."""
 
 
-@final
-@dataclass(frozen=True)
-class Column:
-    """Column to look for.
-
-    Attributes:
-        names: possible names in the header, without or with the unit.
-        unit: SI unit of the result.
-        needed: True if it is required.
-        assumed: True if a header without a unit means the SI unit.
-    """
-
-    names: Collection[str]
-    unit: str
-    needed: bool = True
-    assumed: bool = False
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Table:
-    """Columns that were found.
-
-    Attributes:
-        columns: name -> values in SI units, shape (n,).
-        first_row: row of the file with the first numbers; 0 if there are none.
-    """
-
-    columns: dict[str, Array]
-    first_row: int
-
-
-def read_table(file: Path, wanted: Mapping[str, Column]) -> Table:
-    """Return the columns `wanted` of a CSV file.
+def read_columns(file: Path, wanted: Mapping[str, tuple[Collection[str], str]]) -> dict[str, Array]:
+    """Return columns of a CSV file in SI units, by key.
 
     Comma, semicolon or tab separates the cells; numbers may have a decimal comma if commas are not
-    the separator. Other columns are ignored.
+    the separator. A column without a unit in the header is in SI units. Other columns are ignored.
+
+    Args:
+        file: to read.
+        wanted: key -> possible names in the header, without or with the unit, and SI unit.
 
     Raises:
         ValueError: all problems of the header, or of the cells, at once, each with its place.
@@ -71,22 +38,27 @@ def read_table(file: Path, wanted: Mapping[str, Column]) -> Table:
     """
     rows, delimiter = _rows(file)
     header = [cell.strip() for cell in rows[0][1]]
-    found = _places(file.name, header, wanted)
-    columns: dict[str, Array] = {}
-    problems: list[str] = []
+    places, problems = dict[str, tuple[int, float]](), list[str]()
+    for key, (names, unit) in wanted.items():
+        try:
+            places[key] = _place(header, key, names, unit)
+        except ValueError as error:
+            problems.append(str(error))
+    _refuse(file.name, problems)
     long = [(n, row) for n, row in rows if any(map(str.strip, row[len(header) :]))]
     if long:
         problems.append(
             f"row {long[0][0]}: expected {len(header)} cells as in the header, got "
             f"{len(long[0][1])}" + "; write numbers with a decimal point" * (delimiter == ",")
         )
-    for key, (index, factor) in found.items():
+    columns: dict[str, Array] = {}
+    for key, (index, factor) in places.items():
         cells, bad = _numbers(rows[1:], index, "." if delimiter == "," else ",")
         columns[key] = factor * cells
         if bad:
             problems.append(f"column '{header[index]}', {bad}")
     _refuse(file.name, problems)
-    return Table(columns, rows[1][0] if len(rows) > 1 else 0)
+    return columns
 
 
 def _refuse(name: str, problems: Sequence[str]) -> None:
@@ -96,11 +68,10 @@ def _refuse(name: str, problems: Sequence[str]) -> None:
 
 def _rows(file: Path) -> tuple[Rows, str]:
     """Return non-empty rows with their number in the file, the header first, and the separator."""
-    if not file.exists():
-        raise ValueError(f"read '{file}': expected a file, got nothing there; check the path")
     if not file.is_file():
         kind = "a folder" if file.is_dir() else "something else"
-        raise ValueError(f"read '{file}': expected a file, got {kind}")
+        got = kind if file.exists() else "nothing there; check the path"
+        raise ValueError(f"read '{file}': expected a file, got {got}")
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
@@ -122,46 +93,32 @@ def _rows(file: Path) -> tuple[Rows, str]:
     return rows, delimiter
 
 
-def _places(
-    where: str, header: list[str], wanted: Mapping[str, Column]
-) -> dict[str, tuple[int, float]]:
-    """Return name -> index of its column and factor to SI."""
+def _place(header: list[str], key: str, names: Collection[str], unit: str) -> tuple[int, float]:
+    """Return the index of a column and its factor to SI.
+
+    Raises:
+        ValueError: no such column, several of them, or a unit of another dimension.
+    """
     labels = [_label(cell) for cell in header]
-    found: dict[str, tuple[int, float]] = {}
-    problems: list[str] = []
-    for key, column in wanted.items():
-        names = column.names
-        hits = [i for i, (name, _) in enumerate(labels) if name in names or header[i] in names]
-        if len(hits) > 1:
-            twice = ", ".join(f"'{header[i]}'" for i in hits)
-            problems.append(f"expected one column for {key}, got {twice}")
-        elif hits:
-            given = labels[hits[0]][1] or (column.unit if column.assumed else "")
-            factor = _factor(column.unit, given)
-            if factor is not None:
-                found[key] = hits[0], factor
-            else:
-                usual = USUAL.get(column.unit, column.unit)
-                problems.append(
-                    f"column '{header[hits[0]]}': expected a unit of {usual} in brackets, "
-                    f"got {given or 'none'}"
-                )
-        elif column.needed:
-            example = next(iter(names))
-            problems.append(
-                f"expected a column '{_label(example)[0]} [{column.unit}]', "
-                f"got {', '.join(header)}; check the header"
-            )
-    _refuse(where, problems)
-    return found
-
-
-def _factor(si: str, given: str) -> float | None:
-    """Return the factor from the unit `given` to `si`; None for another dimension."""
-    meant, wanted = parsed(given or "?"), parsed(si)
-    if meant is None or wanted is None or meant.powers != wanted.powers:
-        return 1.0 if given == si else None
-    return meant.factor / wanted.factor
+    hits = [i for i, (name, _) in enumerate(labels) if name in names or header[i] in names]
+    if not hits:
+        raise ValueError(
+            f"expected a column '{_label(next(iter(names)))[0]} [{unit}]', "
+            f"got {', '.join(header)}; check the header"
+        )
+    if len(hits) > 1:
+        twice = ", ".join(f"'{header[i]}'" for i in hits)
+        raise ValueError(f"expected one column for {key}, got {twice}")
+    written = labels[hits[0]][1] or unit
+    meant, si = parsed(written), parsed(unit)
+    if meant is not None and si is not None and meant.powers == si.powers:
+        return hits[0], meant.factor / si.factor
+    if written == unit:
+        return hits[0], 1.0
+    raise ValueError(
+        f"column '{header[hits[0]]}': expected a unit of {USUAL.get(unit, unit)} in brackets, "
+        f"got {written}"
+    )
 
 
 def _label(cell: str) -> tuple[str, str]:

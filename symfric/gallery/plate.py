@@ -1,4 +1,4 @@
-"""A plate: one figure of a paper computed again, and how far we are from it."""
+"""A plate: one figure of a paper, recomputed, with its distance from the paper."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ VERDICTS = {
     "Refuted": "explanation refuted",
     "Undecided": "not decidable from the text",
 }
-"""Section of a docstring -> kind of verdict on what the paper says; a figure has one at least."""
+"""Section of a docstring -> kind of verdict on the paper; a figure has at least one."""
 SECTIONS = ("Compared", "Distance", *VERDICTS)
 """Sections of the docstring of a figure."""
 SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
@@ -34,27 +34,27 @@ Drawn = tuple[Figure, float, Mapping[str, float], Mapping[str, Any]]
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Plate(Showing):
-    """One figure of a paper, computed again.
+    """One figure of a paper, recomputed.
 
-    The texts stand in the docstrings of its function and of its folder.
+    The texts are those of the docstrings of its function and of its folder.
 
     Attributes:
         paper: authors and title.
-        note: what was invented or reconstructed for all figures of the paper; may be empty.
-        figure: such as "Figure 7".
-        title: what it shows.
-        text: what else there is to say; may be empty.
-        compared: what is compared with what.
-        measure: what `distance` measures.
-        verdicts: kind of `VERDICTS` -> what falls under it, and by what evidence; empty at reduced
-            size, since verdicts rest on the full one.
-        distance: how far we are, in `unit`; `within` at most.
+        note: assumptions and reconstructions for all figures of the paper; may be empty.
+        figure: number, such as "Figure 7".
+        title: title of the figure.
+        text: further text; may be empty.
+        compared: compared quantities.
+        measure: definition of `distance`.
+        verdicts: kind of `VERDICTS` -> statements of this kind with their evidence; empty at
+            reduced size, as verdicts rest on the full one.
+        distance: distance from the paper or the reference, in `unit`; at most `within`.
         unit: SI, "1" for a ratio.
-        within: the largest distance at which the figure counts as computed again.
-        picture: made outside pyplot.
-        numbers: name with unit, such as "period [s]" -> value; what the verdicts stand on.
-        checked: sentences that were checked on these numbers; all of them hold.
-        quick: whether it is computed at reduced size.
+        within: largest distance of a figure that counts as recomputed.
+        picture: figure created without pyplot.
+        numbers: name with unit, such as "period [s]" -> value; the evidence of the verdicts.
+        checked: statements that were checked on these numbers and hold.
+        quick: True at reduced size.
     """
 
     paper: str
@@ -80,12 +80,12 @@ class Plate(Showing):
         return f"{self.distance:.2g}{unit} (at most {self.within:.2g}{unit})"
 
     def shown(self) -> Shown:
-        """Figure, what is compared, how far we are, and the numbers."""
+        """Return figure, compared quantities, distance, and numbers."""
         rows = tuple((name, f"{value:.6g}") for name, value in self.numbers.items())
         texts = (
             self.paper,
             f"compared: {self.compared}",
-            f"how far: {self.how_far}; {self.measure}",
+            f"distance: {self.how_far}; {self.measure}",
             *(f"{kind}: {text}" for kind, text in self.verdicts.items()),
             *(f"checked: {'; '.join(self.checked)}" for _ in self.checked[:1]),
         )
@@ -94,32 +94,24 @@ class Plate(Showing):
         return Shown(f"{self.figure}: {self.title}", lines, table)
 
     def thumbnail(self) -> Figure:
-        """The picture itself."""
+        """Return the picture."""
         return self.picture
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the picture as plain data."""
-        texts = ("paper", "note", "figure", "title", "text", "compared", "measure", "quick")
-        return {name: getattr(self, name) for name in texts} | {
-            "verdicts": dict(self.verdicts),
-            "distance": float(self.distance),
-            "within": float(self.within),
-            "unit": self.unit,
-            "how_far": self.how_far,
-            "numbers": {name: float(value) for name, value in self.numbers.items()},
-            "checked": [*self.checked],
-        }
+        """Return everything but the picture as plain data."""
+        fields = {n: v for n, v in vars(self).items() if n != "picture"}
+        return fields | {"how_far": self.how_far, "checked": [*self.checked]}
 
 
 def plate(
     unit: str, within: float | tuple[float, float], like: object = None
 ) -> Callable[[Callable[[bool], Drawn]], Callable[..., Plate]]:
-    """Let a function `fig_07_what_it_shows(quick)` that draws a figure give its `Plate`.
+    """Decorate a function `fig_07_what_it_shows(quick)` that draws a figure: it returns a `Plate`.
 
     Args:
-        unit: of the distance; "1" for a ratio.
+        unit: unit of the distance; "1" for a ratio.
         within: see `plate_of`; a pair for reduced and full size.
-        like: whose docstring says what several figures share; each section continues it.
+        like: function with a docstring that several figures share; each section continues it.
     """
     bounds = within if isinstance(within, tuple) else (within, within)
 
@@ -128,12 +120,11 @@ def plate(
         def computed(quick: bool = False) -> Plate:
             return plate_of(computed, *draw(quick), unit, within=bounds[not quick], quick=quick)
 
-        shared = sections(like.__doc__ or "") if like is not None else {}
-        said = sections(draw.__doc__ or "")
-        parts = {name: f"{shared.get(name, '')} {said.get(name, '')}".strip() for name in SECTIONS}
-        text = (said["title"], said["text"], shared.get("text", ""))
+        shared, own = sections(like.__doc__ if like else ""), sections(draw.__doc__)
+        parts = {name: f"{shared.get(name, '')} {own.get(name, '')}".strip() for name in SECTIONS}
+        texts = (own["title"], own["text"], shared["text"])
         named = (f"{name}: {part}" for name, part in parts.items() if part)
-        computed.__doc__ = "\n\n".join(filter(None, (*text, *named)))
+        computed.__doc__ = "\n\n".join(filter(None, (*texts, *named)))
         return computed
 
     return decorated
@@ -150,64 +141,66 @@ def plate_of(
     within: float,
     quick: bool,
 ) -> Plate:
-    """The plate of a function, its texts taken from its docstring.
+    """Return the plate of a function, with the texts of its docstring.
 
     Args:
-        function: that draws it; its folder names the paper.
-        picture: the figure.
-        distance: how far we are.
-        numbers: what the verdicts stand on.
-        claims: sentence -> whether the numbers bear it out. At reduced size these sentences are
-            all that is said; a plate whose text is untrue is not drawn.
-        unit: of the distance; "1" for a ratio.
-        within: the largest distance of a figure that is computed again; for the error of two
-            integrations four times what one machine gave, since steps depend on rounding.
-        quick: whether it is computed at reduced size.
+        function: function that draws it; its folder names the paper.
+        picture: figure.
+        distance: distance from the paper or the reference.
+        numbers: evidence of the verdicts, by names with units.
+        claims: statement -> True if it holds for the numbers. At reduced size these are the only
+            statements; a plate with an untrue text raises an error.
+        unit: unit of the distance; "1" for a ratio.
+        within: largest distance of a figure that counts as recomputed; for the error of two
+            integrations four times that of one machine, as steps depend on rounding.
+        quick: True at reduced size.
 
     Raises:
-        ValueError: a docstring without one of its sections, numbers that are not finite, a distance
-            beyond its bound, a claim that does not hold.
+        ValueError: a missing section of the docstring, numbers without a unit or not finite, a
+            distance above its bound, an untrue claim.
     """
     folder, name = function.__module__.rpartition(".")[0], function.__name__
     where = f"gallery '{folder.rpartition('.')[2]}/{name}'"
-    said = sections(function.__doc__ or "")
-    missing = [name for name in ("title", "Compared", "Distance") if not said.get(name)]
-    missing += [" or ".join(VERDICTS)] * (not said.keys() & VERDICTS.keys())
+    texts = sections(function.__doc__)
+    missing = [name for name in ("title", "Compared", "Distance") if not texts.get(name)]
+    missing += [" or ".join(VERDICTS)] * (not texts.keys() & VERDICTS.keys())
     if missing:
         raise ValueError(f"{where}: expected a docstring with {', '.join(missing)}, got none")
     odd = [name for name, v in {"distance": distance, **numbers}.items() if not isfinite(v)]
     if odd:
         raise ValueError(f"{where}: expected finite numbers, got {', '.join(odd)}")
+    bare = [name for name in numbers if not re.search(r" \[[^\]]+\]$", name)]
+    if bare:
+        raise ValueError(f"{where}: expected numbers with units, got {', '.join(bare)}")
     untrue = [f"'{sentence}'" for sentence, holds in claims.items() if not holds]
     if distance > within:
         untrue.append(f"a distance within {within:.2g} {unit}, {distance:.3g}")
     if untrue:
         raise ValueError(
-            f"{where}: expected numbers that bear out its text, got others for "
-            f"{', '.join(untrue)}; correct the text, or find what has changed"
+            f"{where}: expected numbers that support its text, got others for "
+            f"{', '.join(untrue)}; correct the text, or find the change that caused it"
         )
     return Plate(
-        paper=paper_of(folder),
-        note=note_of(folder),
+        **about_paper(folder),
         figure=figure_of(name),
-        title=said["title"],
-        text="" if quick else said["text"],
-        compared=said["Compared"],
-        measure=said["Distance"],
-        verdicts={} if quick else {VERDICTS[name]: said[name] for name in VERDICTS if name in said},
+        title=texts["title"],
+        text="" if quick else texts["text"],
+        compared=texts["Compared"],
+        measure=texts["Distance"],
+        verdicts={} if quick else {v: texts[k] for k, v in VERDICTS.items() if k in texts},
         distance=float(distance),
         unit=unit,
         within=float(within),
         picture=picture,
-        numbers=dict(numbers),
+        numbers={name: float(value) for name, value in numbers.items()},
         checked=tuple(claims),
         quick=quick,
     )
 
 
-def sections(doc: str) -> dict[str, str]:
-    """A docstring in parts: "title" (its first line), "text", and what follows each of SECTIONS."""
-    title, _, rest = cleandoc(doc).partition("\n")
+def sections(doc: str | None) -> dict[str, str]:
+    """Split a docstring into "title" (its first line), "text", and each of SECTIONS."""
+    title, _, rest = cleandoc(doc or "").partition("\n")
     found = {"title": title.rstrip("."), "text": ""}
     at = "text"
     for paragraph in re.split(r"\n\s*\n|\n(?=[A-Z][a-z]+:)", rest):
@@ -218,28 +211,22 @@ def sections(doc: str) -> dict[str, str]:
 
 
 def figure_of(name: str) -> str:
-    """The figure that a function is named after: fig_07_... is Figure 7, fig_3_2_... Figure 3.2."""
+    """Return the figure of a function: fig_07_... is Figure 7, fig_3_2_... Figure 3.2."""
     match = SCRIPT.fullmatch(name)
     if match is None:
         raise ValueError(f"gallery: expected a function fig_07_what_it_shows, got {name}")
     return "Figure " + ".".join(str(int(part)) for part in match.groups() if part)
 
 
-def paper_of(folder: str) -> str:
-    """Authors and title: the first paragraph of the folder's docstring."""
-    doc = cleandoc(import_module(folder).__doc__ or "")
-    return " ".join(doc.split("\n\n")[0].split()).rstrip(".")
-
-
-def note_of(folder: str) -> str:
-    """Inventions for all figures of a paper: the rest of the folder's docstring."""
-    _, _, rest = cleandoc(import_module(folder).__doc__ or "").partition("\n\n")
-    return " ".join(rest.split())
+def about_paper(folder: str) -> dict[str, str]:
+    """Return "paper", the first paragraph of the docstring of a folder, and "note", the rest."""
+    paper, _, note = cleandoc(import_module(folder).__doc__ or "").partition("\n\n")
+    return {"paper": " ".join(paper.split()).rstrip("."), "note": " ".join(note.split())}
 
 
 @cache
 def scripts() -> dict[str, str]:
-    """Name of every plate, such as self_tuning/fig_07_shape_factor -> its module."""
+    """Return the module of each figure by its name, such as self_tuning/fig_07_shape_factor."""
     found = {
         f"{path.parent.name}/{name}": f"symfric.gallery.{path.parent.name}.{path.stem}"
         for path in Path(__file__).parent.glob("*/*.py")
@@ -249,33 +236,33 @@ def scripts() -> dict[str, str]:
 
 
 def script(name: str) -> Callable[..., Plate]:
-    """The function that computes the plate `name`, of which only its module is imported."""
+    """Return the function that computes the figure `name`; only its module is imported."""
     return getattr(import_module(scripts()[name]), name.rpartition("/")[2])
 
 
 def plates() -> dict[str, Callable[..., Plate]]:
-    """Every figure of the gallery: name -> function (quick=False) that computes it.
+    """Return every figure of the gallery: name -> function (quick=False) that computes it.
 
-    With `quick` it is computed in a second at most: shorter, coarser, or with fewer laws.
+    With `quick` it takes about a second: shorter, coarser, or with fewer laws.
     """
     return {name: script(name) for name in scripts()}
 
 
 def short(name: str) -> str:
-    """A name without what the figure shows, such as self_tuning/fig_07; `chosen` takes it, too."""
+    """Return a name without the content of the figure, such as self_tuning/fig_07."""
     return re.sub(r"(fig_\d+(?:_\d+(?=_))?)_.*", r"\1", name)
 
 
 def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of all plates that begin with one of `names`, in the order of the gallery; () is all.
+    """Return the figures that begin with one of `names`, in the order of the gallery; () is all.
 
-    A figure without its paper, such as fig_07 or fig_7, is that of every paper that has one.
+    A figure without its paper, such as fig_07 or fig_7, selects that of every paper.
 
     Raises:
-        ValueError: a name that begins none.
+        ValueError: a name that begins no figure.
     """
     known, names = [*scripts()], tuple(name.rstrip("/") for name in names)
-    found = {name: beginning(known, name) for name in names}
+    found = {name: [one for one in known if begins(one, name)] for name in names}
     wrong = [name for name, hits in found.items() if not hits]
     folders = dict.fromkeys(name.partition("/")[0] for name in known)
     check_names("gallery", wrong, [*folders, *map(short, known)])
@@ -283,20 +270,17 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in known if name in wanted)
 
 
-def beginning(known: list[str], start: str) -> list[str]:
-    """Names that begin with `start`; fig_7 is fig_07."""
-    full = re.sub(r"fig_(\d)(?=_[^\d]|$)", r"fig_0\1", start)
-    return [name for name in known if name == start or begins(name, start) or begins(name, full)]
-
-
 def begins(name: str, start: str) -> bool:
-    """Test for `start` as the first words of a plate's name; fig_1 does not begin fig_10."""
-    stem = name.rpartition("/")[2]
-    return any(f"{one}/".startswith((f"{start}_", f"{start}/")) for one in (name, stem))
+    """Return True if `start` is the beginning of a name; fig_7 is fig_07, but not fig_70."""
+    full = re.sub(r"fig_(\d)(?=_[^\d]|$)", r"fig_0\1", start)
+    return any(
+        f"{one}/".startswith((f"{begin}_", f"{begin}/"))
+        for one in (name, name.rpartition("/")[2])
+        for begin in (start, full)
+    )
 
 
 def about(name: str) -> dict[str, str]:
-    """Texts of a plate, without computing it: paper, figure, title, sections."""
-    folder, said = scripts()[name].rpartition(".")[0], sections(script(name).__doc__ or "")
-    figure = figure_of(name.rpartition("/")[2])
-    return {"paper": paper_of(folder), "note": note_of(folder), "figure": figure} | said
+    """Return the texts of a figure without computing it: paper, figure, title, sections."""
+    figure, texts = figure_of(name.rpartition("/")[2]), sections(script(name).__doc__)
+    return about_paper(scripts()[name].rpartition(".")[0]) | {"figure": figure} | texts

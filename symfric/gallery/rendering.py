@@ -1,13 +1,12 @@
-"""Plates on disk: pictures and numbers, computed in parallel, also where one fails."""
+"""Compute figures in parallel and write their pictures and numbers."""
 
 import json
 import os
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Thread
-from time import perf_counter, time
+from time import perf_counter
 from typing import Any, final
 
 from symfric import __version__
@@ -15,25 +14,24 @@ from symfric.foundation.files import write_text
 from symfric.foundation.panels import save
 from symfric.gallery.pages import index_page
 from symfric.gallery.plate import chosen, script, scripts
-from symfric.stress.campaign import Crashed, TimedOut, WorkerPool
+from symfric.stress.workers import Crashed, TimedOut, outcomes
 
 LIMIT = 600.0
-"""Seconds that the figures of one process may take before they count as hanging."""
-
+"""Largest processor time [s] of the figures of one process."""
 Record = dict[str, Any]
-"""A plate as plain data, with its name, picture and seconds."""
+"""Figure as plain data, with its name, picture and seconds."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Gallery:
-    """Outcome of a rendering.
+    """Result of `render`.
 
     Attributes:
-        folder: where pictures, numbers and `index.html` are.
-        asked: names of the plates that were to be computed.
-        records: name -> plate as plain data, of what was computed now.
-        failures: name -> why it was not; neither is what an interrupt left undone.
+        folder: folder of pictures, numbers and `index.html`.
+        asked: names of the requested figures.
+        records: name -> figure as plain data, of those that were computed.
+        failures: name -> reason of a failure.
         seconds: wall time.
     """
 
@@ -45,7 +43,7 @@ class Gallery:
 
     @property
     def left(self) -> int:
-        """Number of plates that an interrupt left undone."""
+        """Number of figures that were not computed because of an interrupt."""
         return len(self.asked) - len(self.records) - len(self.failures)
 
 
@@ -55,104 +53,65 @@ def render(
     *,
     quick: bool = False,
     workers: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] = lambda fraction: None,
 ) -> Gallery:
-    """Compute plates and write a picture and a JSON file of each, and `index.html` of all there.
+    """Compute figures; write a picture and a JSON file of each, and `index.html` of all.
 
-    Plates of a module share a process and the runs in its cache. An interrupt (Ctrl-C) ends
-    with what there is.
+    Figures of a module share a process and its cached runs. An interrupt (Ctrl-C) returns the
+    finished figures.
 
     Args:
-        folder: what is written into.
-        names: of plates, or how their names begin, such as a paper; all if none is given.
-        quick: at reduced size.
-        workers: processes; default one a core.
+        folder: output folder.
+        names: names of figures, or their beginnings, such as a paper; default: all.
+        quick: compute at reduced size.
+        workers: number of processes; default: one per core.
         progress: called with the fraction done.
 
     Raises:
-        ValueError: a name that no plate has.
+        ValueError: an unknown name.
     """
-    asked = chosen(tuple(names))
-    began, groups = time(), together(asked)
-    for name in asked:  # what is there afterwards is of now
+    asked, began = chosen(tuple(names)), perf_counter()
+    groups = together(asked)
+    for name in asked:  # results of an earlier call
         for ending in (".json", ".png"):
-            with suppress(FileNotFoundError):
-                place(folder, name, ending).unlink()
+            (folder / f"{name}{ending}").unlink(missing_ok=True)
     tasks = ((i, (group, str(folder), quick)) for i, group in enumerate(groups))
     size = min(workers or os.cpu_count() or 1, len(groups))
-    pool = WorkerPool(_rendered, tasks, size, LIMIT)
-    failures = dict[str, str]()
-
-    def tell() -> None:
-        if progress is not None:
-            there = sum(place(folder, name, ".json").exists() for name in asked)
-            progress((there + len(failures)) / len(asked))
-
-    try:
-        with _repeated(tell):
-            for number, outcome in pool.outcomes():
-                failures |= _failures(groups[number], folder, outcome)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        pool.stop()
-    tell()
+    failures, done = dict[str, str](), 0
+    with closing(outcomes(_rendered, tasks, size, LIMIT)) as found, suppress(KeyboardInterrupt):
+        for number, outcome in found:
+            failures |= _failures(groups[number], folder, outcome)
+            done += len(groups[number])
+            progress(done / len(asked))
     there = read(folder)
     write_text(folder / "index.html", index_page([*there.values()]))
     records = {name: there[name] for name in asked if name in there}
-    fresh = {n: r for n, r in records.items() if place(folder, n, ".json").stat().st_mtime >= began}
-    return Gallery(folder, asked, fresh, failures, time() - began)
-
-
-@contextmanager
-def _repeated(tell: Callable[[], None], every: float = 0.5) -> Generator[None]:
-    """Call `tell` every so many seconds while the block runs: a process draws many plates."""
-    end = Event()
-
-    def watch() -> None:
-        while not end.wait(every):
-            tell()
-
-    watcher = Thread(target=watch, daemon=True)
-    watcher.start()
-    try:
-        yield
-    finally:
-        end.set()
-        watcher.join()
-
-
-def place(folder: Path, name: str, ending: str) -> Path:
-    """Path of a file of a plate."""
-    return folder / f"{name}{ending}"
+    return Gallery(folder, asked, records, failures, perf_counter() - began)
 
 
 def read(folder: Path) -> dict[str, Record]:
-    """The plates that were written into `folder`, in the order of the gallery."""
+    """Return the figures that were written into `folder`, in the order of the gallery."""
     found: dict[str, Record] = {}
     for name in scripts():
         with suppress(FileNotFoundError):
-            found[name] = json.loads(place(folder, name, ".json").read_text(encoding="utf-8"))
+            found[name] = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     return found
 
 
 def draw(name: str, folder: Path, quick: bool = False) -> Record:
-    """Compute one plate and write its picture and numbers.
-
-    Returns:
-        What its JSON file holds.
-    """
+    """Compute one figure, write its picture and numbers, and return the content of its file."""
     began = perf_counter()
     plate = script(name)(quick=quick)
-    save(plate.picture, place(folder, name, ".png"))
+    save(plate.picture, folder / f"{name}.png")
     about = {"name": name, "picture": f"{name}.png", "quick": quick, "symfric": __version__}
     record = about | {"seconds": round(perf_counter() - began, 2)} | plate.to_dict()
-    write_text(place(folder, name, ".json"), json.dumps(record, indent=2, allow_nan=False) + "\n")
+    text = json.dumps(record, indent=2, allow_nan=False) + "\n"
+    write_text(folder / f"{name}.json", text)
     return record
 
 
 def together(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Plates by process: those of a module share the runs in its cache."""
+    """Group figures by process: those of a module share its cached runs."""
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(scripts()[name], []).append(name)
@@ -160,7 +119,7 @@ def together(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
-    """Draw the plates of one process; why those that failed did."""
+    """Draw the figures of one process; return the reasons of failures."""
     names, folder, quick = task
     failures: dict[str, str] = {}
     for name in names:
@@ -176,10 +135,7 @@ def _failures(
 ) -> dict[str, str]:
     if isinstance(outcome, dict):
         return outcome
-    died = isinstance(outcome, Crashed)
-    why = (
-        f"its process died, {outcome.how}: {outcome.last_line}"
-        if died
-        else "no end within its time"
-    )
-    return {name: why for name in group if not place(folder, name, ".json").exists()}
+    why = "not finished within its time"
+    if isinstance(outcome, Crashed):
+        why = f"its process died, {outcome.how}: {outcome.last_line}"
+    return {name: why for name in group if not (folder / f"{name}.json").exists()}

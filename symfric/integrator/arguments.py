@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.methods.implicit import Radau
+from symfric.integrator.methods.families import Radau
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.integrator.running.run import MANY_STEPS, Tolerances

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import pickle
 import warnings
-from collections.abc import Callable, Mapping
-from concurrent.futures import BrokenExecutor, Executor
-from contextlib import closing
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from functools import lru_cache, partial
+from os import cpu_count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation import checks, packed
-from symfric.foundation.programs import CompileError
+from symfric.foundation import checks
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
@@ -28,30 +38,20 @@ from symfric.integrator.arguments import (
     tolerances,
 )
 from symfric.integrator.equations.initial import first_step
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import (
-    EXECUTORS,
     Chunk,
+    EventJob,
     Job,
-    Recipe,
+    Points,
     Solved,
+    Task,
     digest,
-    pool_of,
-    solve_chunk,
-    solve_elsewhere,
-    solve_one_by_one,
-    solved,
     suited,
 )
-from symfric.integrator.many.given import (
-    MemberInput,
-    Members,
-    all_later,
-    ends_of,
-    members_of,
-    units_of,
-)
+from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of, member_data
+from symfric.integrator.many.program import program
 from symfric.integrator.many.store import Store
-from symfric.integrator.methods.tableaux import key_of
 from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import Tolerances
@@ -65,7 +65,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
-RESULTS = 2
+EXECUTORS = ("serial", "threads", "processes")
+RESULTS = 3
 """Format of the result folders, raised with every change."""
 CHUNK = 500
 """Members of a CPU task."""
@@ -150,14 +151,18 @@ def simulate_many(
     check_flags("simulate_many", progress)
     ends = ends_of(t_end)
     t_start, last, rtol = check_span("simulate_many", model, t_start, float(np.max(ends)), rtol)
-    all_later(ends, t_start)
+    if np.min(ends) <= t_start:
+        raise ValueError(
+            f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
+            f"member {np.argmin(ends)}"
+        )
     formula = chosen("simulate_many", method, rtol)
     _check(model, backend, executor, real)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
     chunk = None if chunk is None else checks.count("simulate_many: chunk", chunk)
     if backend == CUDA:
         _devices().check(model, executor, workers, rtol, real)
-    given = members_of(model, (t_start, ends), x0, u, p)
+    given = member_data(model, (t_start, ends), x0, u, p)
     inputs = stopping("simulate_many", given.inputs, times, t_start, last)
     given, members = replace(given, inputs=inputs), given.count
     looks = np.zeros(0) if np.ndim(ends) else np.array([last])
@@ -167,27 +172,33 @@ def simulate_many(
     nominal = integrator.system.nominal
     allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
     points = _points(integrator, given)
-    integrator = suited(integrator, points, given.inputs)
-    way = _way(integrator, given, allowed, looks, (backend, real, executor))
-    size = chunk or way.chunk
+    integrator = suited(integrator, points, inputs)
+    device: OnDevice | None = None
+    if backend == CUDA:
+        device = _devices().OnDevice.of(integrator, inputs.breaks, looks, max_steps, real)
+    task = device or _task(integrator, inputs, allowed, points, looks, backend, executor)
+    size = chunk or (CHUNK if device is None else device.chunk(given))
+    prepare = partial(_chunk, integrator, given, allowed)
     picks = {first: slice(first, min(first + size, members)) for first in range(0, members, size)}
     folder = None
     if out is not None:
-        place = checks.path("simulate_many: out", out)
-        folder = place / _identity(way.job, integrator, allowed, given, picks)
+        chunks = tuple(digest(prepare(pick)) for pick in picks.values())
+        folder = checks.path("simulate_many: out", out) / _identity(
+            task, integrator, allowed, looks, chunks
+        )
     store = Store(folder, model.signals, members, max(1, looks.size), len(model.x))
     todo = {first: picks[first] for first in store.left(picks)}
-    done, ended = members - sum(_size(pick) for pick in todo.values()), None
-    if way.device is not None and progress is not None:
-        way.device.report(progress, lambda: done, members)
+    done, ended = members - sum(pick.stop - pick.start for pick in todo.values()), None
+    if device is not None and progress is not None:
+        device.report(progress, lambda: done, members)
     try:
         with (
-            pool_of("serial" if way.device else executor, workers) as pool,
-            closing(solved(pool, workers, way.solve, way.prepare, todo)) as results,
+            pool_of("serial" if device else executor, workers) as pool,
+            closing(solved(pool, workers, task, prepare, todo)) as results,
         ):
             for first, result in results:
                 store.put(first, result)
-                done += _size(picks[first])
+                done += result.attempts.size
                 if progress is not None:
                     progress(done / members)
     except (KeyboardInterrupt, BrokenExecutor) as error:
@@ -199,10 +210,12 @@ def simulate_many(
 
 
 def _ensemble(
-    model: Model, looks: Array, given: Members, store: Store, ended: BaseException | None
+    model: Model, looks: Array, given: MemberData, store: Store, ended: BaseException | None
 ) -> Ensemble:
     """Return the ensemble of the stored members."""
-    units = {n: unit for n, unit in units_of(model).items() if n in (given.varied | given.fixed)}
+    units = {v.name: v.unit for v in model.p} | {"t_end": "s"}
+    for what, group in (("x0", model.x), ("u", model.u)):
+        units |= {f"{what}.{v.name}": v.unit for v in group}
     reach = {
         v.name: in_results(v.kind, ends)
         for v, ends in zip(model.x, store.reach.transpose(2, 1, 0), strict=True)
@@ -218,12 +231,12 @@ def _ensemble(
         Status.SUCCESS if ended is None else Status.INTERRUPTED,
         given.varied,
         given.fixed,
-        units,
+        {n: unit for n, unit in units.items() if n in given.varied or n in given.fixed},
         reach,
     )
 
 
-def _doubted(found: Ensemble, model: Model, given: Members) -> Ensemble:
+def _doubted(found: Ensemble, model: Model, given: MemberData) -> Ensemble:
     """Return the result with its doubtful members, and issue one warning about all of them."""
     p = np.tile(model.values("p"), (given.count, 1))
     for k, v in enumerate(model.p):
@@ -232,23 +245,19 @@ def _doubted(found: Ensemble, model: Model, given: Members) -> Ensemble:
     doubtful = {m: why for m, why in doubtful.items() if m not in found.failed}
     for first, why in list(doubtful.items())[:1]:
         count = f"{len(doubtful)} of {given.count} members, the first is {first}"
-        said = f"simulate_many '{model.name}': friction is overloaded in {count}: {why}"
-        warnings.warn(said, OverloadWarning, stacklevel=3)
+        message = f"simulate_many '{model.name}': friction is overloaded in {count}: {why}"
+        warnings.warn(message, OverloadWarning, stacklevel=3)
     return replace(found, doubtful=doubtful)
 
 
 def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
     """Return the error for a pool that lost a worker process."""
     how = "the same call continues" if kept else "out=FOLDER keeps finished members"
-    said = (
+    message = (
         f"simulate_many of '{found.scene}': a worker process ended after {done} of {len(found)} "
         f"members (killed, or out of memory); {how}, fewer workers need less memory"
     )
-    return SolveError(said, found.status, found)
-
-
-def _size(pick: slice) -> int:
-    return pick.stop - pick.start
+    return SolveError(message, found.status, found)
 
 
 def _check(model: Model, backend: str, executor: object, real: str) -> None:
@@ -266,63 +275,16 @@ def _check(model: Model, backend: str, executor: object, real: str) -> None:
         checks.choice("simulate_many: executor", executor, EXECUTORS)
 
 
-def _points(integrator: Integrator, given: Members) -> tuple[tuple[Array, Array], ...]:
+def _points(integrator: Integrator, given: MemberData) -> Points:
     """Return (y, d) at the start of the first, the middle and the last member."""
     if not integrator.has_pivots:
         return ()
     points = list[tuple[Array, Array]]()
     for m in sorted({0, given.count // 2, given.count - 1}):
-        y, p, data, _ = (rows[0] for rows in _alone(integrator, given, slice(m, m + 1)))
-        points.append((y, np.concatenate([p, data[:, 0]])))
-    return tuple(points)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """Method by which chunks are solved.
-
-    Attributes:
-        job: data shared by the chunks.
-        prepare: members -> their chunk.
-        solve: chunk -> its results.
-        chunk: default number of members of a chunk.
-        device: the graphics processor used; None for CPUs.
-    """
-
-    job: Job
-    prepare: Callable[[slice], Any]
-    solve: Callable[[Any], Solved]
-    chunk: int = CHUNK
-    device: OnDevice | None = None
-
-
-def _way(
-    integrator: Integrator,
-    given: Members,
-    allowed: Tolerances,
-    looks: Array,
-    wanted: tuple[str, str, str | Executor],
-) -> _Way:
-    """Return the method to solve the members for a backend, a precision and an executor."""
-    (backend, real, executor), most = wanted, allowed.max_steps
-    model, inputs = integrator.model, given.inputs
-    if backend == CUDA:
-        device = _devices().OnDevice.of(integrator, inputs.breaks, looks, most, real)
-        own = inputs.values.size if given.own else 0
-        solve = partial(solve_chunk, device.job, runner=device.members)
-        prepare = partial(_chunk, integrator, given, allowed)
-        return _Way(device.job, prepare, solve, device.chunk(own), device)
-    here = isinstance(executor, str) and not model.events
-    job = _job(partial(Job.of, integrator, inputs.breaks, looks), backend, most, here)
-    if model.events:
-        alone = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
-        if executor not in ("serial", "threads"):
-            points, method = _points(integrator, given), key_of(integrator.tableau)
-            recipe = Recipe(model, inputs, method, points, allowed, backend, looks)
-            alone = partial(solve_elsewhere, packed.dumps(recipe))
-        return _Way(job, partial(_alone, integrator, given), alone)
-    return _Way(job, partial(_chunk, integrator, given, allowed), partial(solve_chunk, job))
+        pick = slice(m, m + 1)
+        (y,), (p,) = given.starts(integrator.system, pick)
+        points.append((y, np.concatenate([p, given.data(pick)[0, :, 0]])))
+    return points
 
 
 def _devices() -> Any:
@@ -331,30 +293,34 @@ def _devices() -> Any:
     return on_device
 
 
-def _job(make: Callable[[str, int], Job], backend: str, max_steps: int, here: bool) -> Job:
-    """Return the job of the workers; if they are `here`, it is compiled once before they start."""
-    job = make(backend, max_steps)
-    if here:
+def _task(
+    integrator: Integrator,
+    inputs: InputData,
+    allowed: Tolerances,
+    points: Points,
+    looks: Array,
+    backend: str,
+    executor: str | Executor,
+) -> Task:
+    """Return the task of the workers; for those on this machine its C is compiled before."""
+    if integrator.model.events:
+        parts = integrator.tableau, tuple(points), allowed, backend, looks
+        return EventJob(integrator.model, inputs, *parts)
+    compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
+    if compiled and isinstance(executor, str):
         try:
-            job.program.load()
+            _ = program(integrator, True).members
         except CompileError:
             if backend == "compiled":
                 raise
-            job = make("vm", max_steps)  # simulate in the VM if the compiler is broken
-    return job
+            compiled = False  # simulate in the VM if the compiler is broken
+    return Job(program(integrator, compiled), inputs.breaks, looks, allowed.max_steps)
 
 
-def _alone(
-    integrator: Integrator, given: Members, pick: slice
-) -> tuple[Array, Array, Array, Array]:
-    """Return start values, parameters, input data and ends of members."""
-    y, p = given.starts(integrator.system, pick)
-    return y, p, given.data(pick), given.ends[pick]
-
-
-def _chunk(integrator: Integrator, given: Members, tolerances: Tolerances, pick: slice) -> Chunk:
+def _chunk(integrator: Integrator, given: MemberData, tolerances: Tolerances, pick: slice) -> Chunk:
     """Return start columns and run data of members, and their inputs and ends."""
-    y, p, data, ends = _alone(integrator, given, pick)
+    y, p = given.starts(integrator.system, pick)
+    data, ends = given.data(pick), given.ends[pick]
     t_start = float(given.inputs.breaks[0])
     S = np.ascontiguousarray(State.at(t_start, 0.0, y))
     h = np.minimum(first_step(ends - t_start, t_start), tolerances.max_step)
@@ -365,20 +331,64 @@ def _chunk(integrator: Integrator, given: Members, tolerances: Tolerances, pick:
 
 
 def _identity(
-    job: Job,
-    integrator: Integrator,
-    tolerances: Tolerances,
-    given: Members,
-    picks: dict[int, slice],
+    task: Task, integrator: Integrator, allowed: Tolerances, looks: Array, chunks: tuple[str, ...]
 ) -> str:
     """Return a hash of everything that the results depend on, and of the division into chunks."""
-    parts: list[Any] = [RESULTS, job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
-    parts.append(tolerances.max_step)
-    for event in integrator.model.events:
-        parts += [event.name, event.direction, event.terminal, tolerances.event, list(event.reset)]
-    if integrator.crossings is not None:
-        parts.append(str(integrator.crossings.jump.serialize()))
-    parts.append(str(integrator.events.serialize()))
-    for pick in picks.values():
-        parts.append(digest(*_alone(integrator, given, pick)))
-    return digest(*parts)[:16]
+    events = [
+        (e.name, e.direction, e.terminal, e.at_start, *e.reset) for e in integrator.model.events
+    ]
+    jump = () if integrator.crossings is None else (integrator.crossings.jump, integrator.events)
+    return digest(RESULTS, task.program, allowed, looks, chunks, tuple(events), jump)[:16]
+
+
+def solved(
+    pool: Executor | None,
+    workers: int | None,
+    task: Task,
+    prepare: Callable[[slice], Chunk],
+    todo: dict[int, slice],
+) -> Generator[tuple[int, Solved]]:
+    """Yield results as they are completed; only a few chunks are in progress at once."""
+    if pool is None:
+        for first, pick in todo.items():
+            yield first, task.solve(prepare(pick))
+        return
+    solve = task.solve
+    if not isinstance(pool, ThreadPoolExecutor):
+        solve = partial(_solve_pickled, pickle.dumps(task))
+    waiting: dict[Future[Solved], int] = {}
+    left, most = iter(todo.items()), 2 * (workers or cpu_count() or 1)
+    try:
+        while True:
+            while len(waiting) < most and (item := next(left, None)) is not None:
+                waiting[pool.submit(solve, prepare(item[1]))] = item[0]
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                yield waiting.pop(future), future.result()
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _solve_pickled(task: bytes, chunk: Chunk) -> Solved:
+    """Integrate the members of a chunk by a task that a process reads once."""
+    return _task_of(task).solve(chunk)
+
+
+@lru_cache(4)
+def _task_of(task: bytes) -> Task:
+    return pickle.loads(task)
+
+
+@contextmanager
+def pool_of(executor: str | Executor, workers: int | None) -> Generator[Executor | None]:
+    """Yield the executor of this name, None for "serial"; a given executor is not shut down."""
+    if isinstance(executor, Executor):
+        yield executor
+    elif executor == "serial":
+        yield None
+    else:
+        kind = ThreadPoolExecutor if executor == "threads" else ProcessPoolExecutor
+        with kind(workers or cpu_count() or 1) as pool:
+            yield pool

@@ -1,6 +1,7 @@
 """Builder: collects bodies, joints and forces, checks them and writes the model."""
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,7 @@ from symfric.multibody.prepare import (
     without_inertia,
     written,
 )
-from symfric.multibody.results import sketch, thumbnail
+from symfric.multibody.results import sketch
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.start import following, project
 from symfric.multibody.topology import Topology, spanning_tree
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Mechanism(Showing):
+class Mechanism(packed.Portable, Showing):
     """Mechanism of bodies, joints, forces and constraints; `build` writes the `Model`.
 
     Example:
@@ -93,24 +94,18 @@ class Mechanism(Showing):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small figure of the machine at its start; None if it cannot be built yet."""
+        from symfric.results.animation import still  # noqa: PLC0415  (matplotlib is slow to import)
+
         try:
             made = self.prepare()
         except ValueError:
             return None
         drawn = sketch(made.eq, {})
-        return thumbnail(drawn, made.numbers(drawn.places)[0])
+        return still(drawn, made.numbers(drawn.places)[0])
 
     def to_pack(self) -> dict[str, Any]:
         """Return all added parts."""
         return vars(self)
-
-    def __copy__(self) -> "Mechanism":
-        """Return a mechanism with the same symbols."""
-        return packed.shallow(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle all added parts; symbols keep their identity."""
-        return packed.loads, (packed.dumps(self),)
 
     def body(
         self,
@@ -284,8 +279,8 @@ class Mechanism(Showing):
         _, J, phi_t = at(near)
         rates = following(J, made.qd0, phi_t)
         links = made.eq.kin.topology.link_of
-        copy = packed.shallow(self)
-        copy.joints = [
+        placed = copy(self)
+        placed.joints = [
             replace(
                 joint,
                 start=tuple(near[links[joint.name].rows].tolist()),
@@ -295,4 +290,4 @@ class Mechanism(Showing):
             else joint
             for joint in self.joints
         ]
-        return copy
+        return placed

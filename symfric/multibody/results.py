@@ -1,15 +1,11 @@
-"""Results of a mechanism: its outputs, its sketch and a small figure."""
+"""Results of a mechanism: its outputs and its sketch."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation.numeric import equals
-from symfric.foundation.style import EDGE, colour
 from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
@@ -21,9 +17,6 @@ from symfric.multibody.joints import Distance
 from symfric.multibody.kinematics import Motion
 from symfric.multibody.spatial import GROUND
 from symfric.multibody.topology import body_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Put = Callable[[Sequence[ca.SX]], list[ca.SX]]
 """Expressions in accelerations and friction forces -> the same in the symbols of the model."""
@@ -126,12 +119,7 @@ def constraint_units(units: list[str]) -> tuple[str, str, str]:
     return (unit, f"{unit}/s", f"{unit}/s^2") if unit else ("", "", "")
 
 
-Array = NDArray[np.float64]
 SPRING, DAMPER = (Symbol(line=line, anchored=True) for line in ("spring", "damper"))
-SIZE = 2.6
-"""Size of the small figure [inch]."""
-AWAY = 1e-6
-"""Extent across a plane, relative to that in it, below which all lies in the plane."""
 
 
 def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
@@ -186,59 +174,3 @@ def _mark(
 def _column(motion: Motion, R: ca.SX, offset: ca.SX) -> ca.SX:
     """Return axes and position of a place on a body, shape (12, 1)."""
     return ca.densify(ca.vertcat(ca.vec(motion.R @ R), motion.point(offset)[0]))
-
-
-def thumbnail(drawn: Sketch, places: Array) -> "Figure":
-    """Draw bodies as lines to their frames, joints as dots.
-
-    Args:
-        drawn: the sketch of a mechanism.
-        places: its places as numbers, shape (12, k).
-    """
-    from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
-
-    at = places[9:].T
-    across, up = _view(drawn, places)
-    flat = np.column_stack([at @ across, at @ up])
-    figure = Figure(figsize=(SIZE, SIZE), layout="constrained")
-    axis = figure.subplots()
-    for k, part in enumerate(drawn.parts):
-        if not part.fixed:
-            for place in (*part.corners, *part.ends):
-                axis.plot(*flat[[part.centre, place]].T, color=colour(k), linewidth=2.2)
-            axis.plot(*flat[part.centre], "s", color=colour(k), markersize=4)
-    for mark in drawn.marks:
-        if mark.symbol.line:
-            axis.plot(*flat[[mark.a, mark.b]].T, color="0.35", linewidth=1.0, linestyle="--")
-        face = EDGE if mark.grounded else "white"
-        axis.plot(*flat[mark.b], "o", markersize=5, markerfacecolor=face, color=EDGE)
-    axis.set_aspect("equal", "datalim")
-    axis.margins(0.15)
-    axis.tick_params(labelsize=6)
-    axis.set_xlabel(f"{_called(across)} [m]", fontsize=7)
-    axis.set_ylabel(f"{_called(up)} [m]", fontsize=7)
-    axis.grid(alpha=0.3)
-    return figure
-
-
-def _view(drawn: Sketch, places: Array) -> tuple[Array, Array]:
-    """Return directions to the right and upwards: of the plane of the hinges, or an oblique
-    view.
-    """
-    hinges = [places[6:9, mark.b] for mark in drawn.marks if mark.symbol.hinge]
-    normal = hinges[0] if hinges else np.array([0.0, 1.0, 0.0])
-    if any(np.linalg.norm(np.cross(normal, other)) > AWAY for other in hinges):
-        normal = np.array([0.45, -0.8, 0.4]) / np.linalg.norm([0.45, -0.8, 0.4])
-    upwards = np.eye(3)[1 if abs(normal[2]) > 0.99 else 2]
-    up = upwards - (upwards @ normal) * normal
-    up /= np.linalg.norm(up)
-    across = np.cross(up, normal)
-    return (across if across.sum() > 0 else -across), up
-
-
-def _called(direction: Array) -> str:
-    """Return the name of the world axis along a direction."""
-    k = int(np.argmax(np.abs(direction)))
-    if abs(direction[k]) < 1 - AWAY:
-        return "oblique view"
-    return ("" if direction[k] > 0 else "-") + "xyz"[k]

@@ -303,9 +303,10 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
         ends.append("" if end is None else end.get("link", ""))
         if not ends[-1]:
             notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
+    parent, child = ends
     R, p = notes.pose(where, tag)
     return UrdfJoint(
-        name, kind, *ends, R, p, axis / (length or 1.0), damping, friction,
+        name, kind, parent, child, R, p, axis / (length or 1.0), damping, friction,
         {key: notes.number(f"{where} > limit", limit, key) for key in LIMITS
          if limit is not None and key in limit.attrib},
         _mimic(where, mimic, notes),

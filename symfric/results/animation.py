@@ -1,6 +1,6 @@
 """Moving pictures of mechanisms."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -28,6 +28,8 @@ ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
 """Motions between BRIEF and LONG [s] are shown as fast as they are, others in SHOWN."""
+SIZE, SMALL = 6.4, 3.2
+"""Larger sides of the panels of films and of small figures [inch]."""
 PATH = 1001
 """Points of the path of a centre of mass."""
 STICKS, SLIDES = colour(1), "white"
@@ -131,11 +133,8 @@ def picture(
     centres = sketch.places[9:, [part.centre for part in sketch.parts]]
     fine = np.linspace(times[0], times[-1], PATH)
     paths = trajectory.of(centres, fine).reshape(-1, 3, PATH)
-    poses = Poses(columns[:, :9].reshape(-1, 3, 3, times.size), columns[:, 9:], paths)
     sticks = _sticks(trajectory, sketch, times)
-    view = look(sketch, poses)
-    figure, axes = _flat(view) if view.planar else _spatial(view)
-    drawn = [_added(figure, axes, stroke) for stroke in strokes(sketch, poses, view, sticks)]
+    figure, drawn = _drawn(sketch, columns, paths, sticks)
     title = figure.axes[0].set_title("", loc="left", fontsize="medium")
     factor = "" if abs(speed - 1) < 1e-9 else f"  ({speed:.3g} x)"
     if sticks:
@@ -151,6 +150,34 @@ def picture(
         figure.draw_without_rendering()
     figure.set_layout_engine("none")  # every picture has the layout of the first one
     return figure, show
+
+
+def still(sketch: Sketch, places: Array) -> Figure:
+    """Return a small figure of a machine with these places, shape (12, k)."""
+    columns = places.T[:, :, None]
+    centres = columns[[part.centre for part in sketch.parts], 9:]
+    figure, drawn = _drawn(sketch, columns, centres, {}, SMALL)
+    for put in drawn:
+        put(0)
+    return figure
+
+
+def _drawn(
+    sketch: Sketch, columns: Array, paths: Array, sticks: Mapping[str, Flags], size: float = SIZE
+) -> tuple[Figure, list[Callable[[int], None]]]:
+    """Return a figure, and functions that show each of its strokes in picture k.
+
+    Args:
+        sketch: places, parts and marks.
+        columns: axes and positions of the places in each picture, shape (places, 12, pictures).
+        paths: centres of the parts, shape (parts, 3, times).
+        sticks: joint -> True if its contacts stick, per picture.
+        size: larger side of the panel [inch].
+    """
+    poses = Poses(columns[:, :9].reshape(-1, 3, 3, columns.shape[2]), columns[:, 9:], paths)
+    view = look(sketch, poses)
+    figure, axes = _flat(view, size) if view.planar else _spatial(view, size)
+    return figure, [_added(figure, axes, s) for s in strokes(sketch, poses, view, sticks)]
 
 
 def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flags]:
@@ -180,18 +207,18 @@ def _legend(figure: Figure) -> None:
     )  # fmt: skip
 
 
-def _flat(view: View) -> tuple[Figure, Array]:
+def _flat(view: View, size: float) -> tuple[Figure, Array]:
     """Return axes that show a plane along its normal, and the projection on them."""
     axes = np.stack([view.right, view.up])
     low, high = axes @ view.low, axes @ view.high
     low, high = np.minimum(low, high), np.maximum(low, high)
-    size = high - low
-    more = np.maximum(FLATTEST * size.max() - size, 0) / 2
+    extent = high - low
+    more = np.maximum(FLATTEST * extent.max() - extent, 0) / 2
     low, high = low - more, high + more
     width, height = high - low
     factor, unit = readable("m", [low, high])
     low, high = factor * low, factor * high
-    scale = 6.4 / max(width, height)
+    scale = size / max(width, height)
     figure, ((ax,),) = grid(1, 1, scale * width + 0.9, scale * height + 0.9)
     ax.set_aspect("equal")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -199,19 +226,19 @@ def _flat(view: View) -> tuple[Figure, Array]:
     return figure, factor * axes
 
 
-def _spatial(view: View) -> tuple[Figure, Array]:
+def _spatial(view: View, size: float) -> tuple[Figure, Array]:
     """Return axes with three directions of one scale, and the projection on them."""
-    figure = blank(7.2, 6.4, free=True)
+    figure = blank(1.125 * size, size, free=True)
     ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
-    size = view.high - view.low
-    size = np.maximum(size, 0.15 * size.max())
+    extent = view.high - view.low
+    extent = np.maximum(extent, 0.15 * extent.max())
     middle = (view.low + view.high) / 2
     for k, axis in enumerate("xyz"):
-        ticks = MaxNLocator(max(2, round(6 * size[k] / size.max())))
-        getattr(ax, f"set_{axis}lim")(middle[k] - size[k] / 2, middle[k] + size[k] / 2)
+        ticks = MaxNLocator(max(2, round(6 * extent[k] / extent.max())))
+        getattr(ax, f"set_{axis}lim")(middle[k] - extent[k] / 2, middle[k] + extent[k] / 2)
         getattr(ax, f"set_{axis}label")(f"{axis} [m]")
         getattr(ax, f"{axis}axis").set_major_locator(ticks)
-    ax.set_box_aspect(size, zoom=1.12)
+    ax.set_box_aspect(extent, zoom=1.12)
     figure.subplots_adjust(left=0.0, right=0.95, bottom=0.04, top=0.93)
     ax.view_init(ELEVATION, AZIMUTH)
     return figure, np.eye(3)
@@ -237,7 +264,7 @@ def _direction(axis: Array) -> str:
     k = int(np.argmax(np.abs(axis)))
     if abs(abs(axis[k]) - 1) < 1e-9:
         return "xyz"[k] if axis[k] > 0 else f"-{'xyz'[k]}"
-    return "({:.2g}, {:.2g}, {:.2g})".format(*axis)
+    return "({:.2g}, {:.2g}, {:.2g})".format(*(axis.round(9) + 0.0))
 
 
 def _style(stroke: Stroke) -> dict[str, Any]:

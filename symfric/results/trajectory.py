@@ -100,7 +100,7 @@ class Kept(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Signals):
+class Trajectory(packed.Portable, Signals):
     """Named signals of a simulated model.
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
@@ -270,14 +270,6 @@ class Trajectory(Signals):
         if self.keep is None:
             raise ValueError(f"{self._where}: expected one of simulate, got another")
         return self.keep(self)
-
-    def __copy__(self) -> "Trajectory":
-        """Return a copy with the same symbols."""
-        return packed.shallow(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return a pickle holds what a file does."""
-        return packed.loads, (packed.dumps(self),)
 
     def to_csv(self, path: str | Path, *names: str) -> None:
         """Write signals as columns with units in the header, such as `v [m/s]`.

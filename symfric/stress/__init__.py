@@ -1,4 +1,4 @@
-"""Random campaigns: cases drawn, each judged against another method. May import everything."""
+"""Random campaigns: each case is compared with a reference. May import every other package."""
 
 from typing import TYPE_CHECKING
 

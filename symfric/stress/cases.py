@@ -1,6 +1,6 @@
-"""Random cases: laws x scenes x parameters x tolerances x methods x inputs x start values.
+"""Random cases: laws, scenes, parameters, tolerances, methods, inputs and start values.
 
-A case is plain data: a file of a few lines reproduces it on another machine.
+A case is plain data; a file of a few lines reproduces it on another machine.
 """
 
 import json
@@ -18,48 +18,31 @@ from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
 from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
 from symfric.stress.referee import scenes as referee_scenes
 from symfric.stress.referee.laws import LAWS
-from symfric.stress.referee.solve import knows
+from symfric.stress.referee.solve import Signal, knows
 
 T = TypeVar("T")
 
 SCENES = ("rabinowicz",) * 6 + ("drive",) * 6 + ("quarter_car",) * 2 + tuple(MECHANISMS)
-"""Scenes as often as they are drawn: those of one contact find most for their cost."""
+"""Scenes, repeated by their weight: those of one contact find most for their cost."""
 
 REFEREED = 0.5
-"""Share of the cases that are drawn from what the referee knows."""
+"""Share of the cases with laws and scenes of the reference solver."""
 
 OFFERED: dict[str, set[str]] = {
     "quarter_car": {"F_e", "x_rel", "v_rel"},
     **{scene: {"F_e"} for scene in ("rabinowicz", "drive", *MECHANISMS)},
 }
-"""What scenes offer to laws besides v and N."""
+"""Inputs of laws besides v and N that scenes provide."""
 
 WRAPPED = ("{}+viscous", "asymmetric({})", "lagged({})", "load_dependent({})",
            "temperature_dependent({})")  # fmt: skip
 METHODS = ("auto",) * 3 + ("rodas5p", "radau5") * 2 + ("rodas4p", "rodas3", "dopri5")
 ADAPTED = METHODS[:-1]
-"""Without dopri5, which takes no algebraic unknowns, and refuses mechanisms."""
+"""Methods for mechanisms: dopri5 has no algebraic unknowns."""
 LOOPS = ("four_mass", "slider_crank", "four_bar")
-"""Scenes whose start values must fit each other: few of them are drawn."""
+"""Scenes whose start values must be consistent: few are drawn."""
 SPREADS = (0.3, 1.0, 2.5)
-"""Decades by which the parameters of a case are off their defaults."""
-
-
-@final
-@dataclass(frozen=True)
-class Signal:
-    """An input in a file: its kind and the numbers that the kind needs (`machines.signal`).
-
-    Attributes:
-        kind: constant (c), hold and linear (values at t), sine (amplitude, rate [rad/s], offset)
-            or pulse (height, start [s], width [s]).
-        values: what stands in parentheses above.
-        t: sample times [s] of hold and linear.
-    """
-
-    kind: str
-    values: tuple[float, ...]
-    t: tuple[float, ...] = ()
+"""Largest distances of the parameters of a case from their defaults [decades]."""
 
 
 @final
@@ -68,14 +51,14 @@ class Case:
     """One simulation, as data.
 
     Attributes:
-        seed, number: what it was drawn from.
+        seed, number: seed of the campaign, and number of the case.
         law, scene: names, as on the command line.
-        values: parameters of scene and law that are off their defaults.
+        values: parameters of scene and law that differ from their defaults.
         forms: options of the law.
         free: those of `values` that are given at run time, `simulate(p=...)`.
         x0: start values of states.
         inputs: input -> signal.
-        t_start, t_end: span [s].
+        t_start, t_end: start and end [s].
         rtol, method, backend: as in `simulate`.
     """
 
@@ -95,15 +78,15 @@ class Case:
     backend: str = "vm"
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return plain data for JSON."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Case":
-        """The case that `to_dict` wrote.
+        """Restore a case from `to_dict`.
 
         Raises:
-            ValueError: a field too many, too few or of another kind.
+            ValueError: unknown, missing or wrong fields.
         """
         known, needed = {item.name for item in fields(cls)}, {"seed", "number", "scene", "law"}
         if not needed <= data.keys() <= known:
@@ -187,7 +170,7 @@ def rounded(value: float) -> float:
 
 
 def draw(seed: int, number: int) -> Case:
-    """Case `number` of the campaign `seed`; each case has a sequence of its own."""
+    """Draw case `number` of the campaign `seed` from a random sequence of its own."""
     rng = Draws(seed, number)
     refereed = rng.chance(REFEREED)
     scene = rng.pick(tuple(referee_scenes.SCENES) if refereed else SCENES)
@@ -227,7 +210,7 @@ def _of_the_referee(rng: Draws, scene: str) -> tuple[str, Law]:
 
 
 def _law(rng: Draws, scene: str) -> tuple[str, Law]:
-    """A law, one in six of them in a wrapper or a sum; few that the scene has no inputs for."""
+    """Draw a law, one in six in a wrapper or a sum; few need inputs that the scene lacks."""
     name = rng.pick(list(ALL_LAWS))
     while not {i.name for i in ALL_LAWS[name]().inputs} <= OFFERED.get(scene, set()):
         if rng.chance(0.1):
@@ -241,7 +224,7 @@ def _law(rng: Draws, scene: str) -> tuple[str, Law]:
 
 
 def _values(rng: Draws, machine: Scene) -> dict[str, float]:
-    """Numbers of law and scene; few that they refuse, such as mu_d > mu_s."""
+    """Draw numbers of law and scene; they refuse few of them, such as mu_d > mu_s."""
     while True:
         found = _numbers(rng, parameters(machine))
         try:
@@ -269,7 +252,7 @@ def _numbers(rng: Draws, known: Mapping[str, Parameter]) -> dict[str, float]:
 
 
 def _starts(rng: Draws, scene: str, law: Law, values: Mapping[str, float]) -> dict[str, float]:
-    """Start values of some states: rest, almost rest, fast; a block may sit right on its belt."""
+    """Draw start values of some states: rest, almost rest, fast, or the velocity of the belt."""
     found: dict[str, float] = {}
     share = 0.05 if scene in LOOPS else 0.4
     for name, unit, start in _states(scene):
@@ -287,7 +270,7 @@ def _starts(rng: Draws, scene: str, law: Law, values: Mapping[str, float]) -> di
 
 
 def _signal(rng: Draws, span: float, t_start: float) -> Signal:
-    """An input of decades in size: constant, samples, a sine or a short pulse."""
+    """Draw an input over decades in size: constant, samples, a sine or a short pulse."""
     kind = rng.pick(("constant", "hold", "linear", "sine", "sine", "pulse"))
     size = rng.signed(-1.5, 1.5)
     if kind == "constant":
@@ -304,7 +287,7 @@ def _signal(rng: Draws, span: float, t_start: float) -> Signal:
 
 @cache
 def _states(scene: str) -> tuple[tuple[str, str, float], ...]:
-    """Names, units and starts of the states of a scene without those of its law."""
+    """Return names, units and starts of the states of a scene without those of its law."""
     states = ALL_SCENES[scene](Viscous()).model().x
     return tuple((v.name, v.unit, float(v.start)) for v in states)
 

@@ -3,14 +3,13 @@
     tolerance of a state = rtol max|x| + atol,   error = max over states and times of
                                                          |run - truth| / tolerance
 
-is at most RIGHT tolerances where a run is right. The truth is the referee's motion where it knows
-law and scene and its own error, the difference of two of its solves, is small; else that of two of
-symfric's other methods at a hundredth and a thousandth of the tolerance, which must agree. A larger
-error is not yet the run's fault: the problem may turn a tolerance at some time into much more at a
-later one (a block at the edge of sticking, a chaotic pendulum), and a method that allows a
-tolerance in each step may be off by all of them together where nothing damps: the error then falls
-with rtol. What no reference can tell is "undecided", never "right". A run that says itself that its
-steps were used up is refused, and what it hands out is compared.
+The error of a right run is at most RIGHT tolerances. The truth is the motion of the referee if it
+knows law and scene and its own error, the difference of two of its solves, is small; otherwise that
+of two other methods of symfric at a hundredth and a thousandth of the tolerance, which must agree.
+A larger error may have reasons other than the run: the problem may amplify a tolerance (a block at
+the edge of sticking, a chaotic pendulum), and without damping the errors of all steps add up; the
+error then falls with rtol. A case that no reference decides is "undecided", never "right". A run
+that reports that its steps were used up is refused, and its partial result is compared.
 """
 
 from collections.abc import Mapping
@@ -45,48 +44,48 @@ from symfric.stress.problem import (
 )
 
 CLASSES = {
-    "right": "as the reference, within ten tolerances",
-    "refused": "an error in a sentence: bad input, or a solve that failed",
-    "loose": "off by up to a hundred tolerances, or what those of all steps add up to",
+    "right": "equal to the reference within ten tolerances",
+    "refused": "an error message: bad input, or a solve that failed",
+    "loose": "off by up to a hundred tolerances, or by the sum of those of all steps",
     "undecided": "references disagree, fail or are too sensitive, and steps cannot be judged",
-    "silent": "success, and wrong",
-    "nan": "success, and a signal is not finite",
+    "silent": "status of success, and wrong",
+    "nan": "status of success, and a signal is not finite",
     "crash": "a foreign exception, or the process died",
     "hang": "no end within the limit",
 }
-"""Name -> what it means, in the order of the table."""
+"""Name -> meaning, in the order of the table."""
 
 FAILING = ("silent", "nan", "crash", "hang")
 """Classes that must be empty."""
 
 LOOSE = 100.0
 SENSITIVE = 1e-2
-"""Relative error above which what steps add up to is no longer small, so that each is judged; and
-relative size of what becomes of one tolerance, above which a step that is off proves nothing."""
+"""Relative error above which the sum of errors is not small and each step is judged; and relative
+growth of one tolerance above which the error of a step proves nothing."""
 SUSPECT = "adds up over steps"
-"""The group of undecided runs that are silently wrong if a single step is off."""
+"""Group of undecided runs that are silently wrong if a single step is wrong."""
 LADDER, FINEST = (1e-2, 1e-5, 1e-1), 1e-13
-"""Tolerances of the references over that of the case, and the smallest one."""
+"""Tolerances of the references relative to that of the case, and the smallest tolerance."""
 DOUBT = RIGHT / 3
-"""Own error [tolerances] of the referee up to which it judges."""
+"""Largest error [tolerances] of the referee with which it judges."""
 CHECKED = 3000
-"""Steps of which a run that was stopped is compared."""
+"""Number of steps of a stopped run that are compared."""
 RAW = ("Traceback", ".cpp:", "casadi::", "Assertion")
-"""What no sentence for users contains."""
+"""Texts that no message to users contains."""
 
 
 @final
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on a case.
+    """Verdict on a case.
 
     Attributes:
         kind: one of `CLASSES`.
-        reason: a sentence; empty where the run is right.
-        group: what the reason is called in a table.
+        reason: explanation; empty for a right run.
+        group: short name of the reason for the table.
         error: error [tolerances], or None.
-        steps: steps taken.
-        by: who judged: the referee, which shares no code with symfric, or its other methods.
+        steps: number of steps.
+        by: "referee", which shares no code with symfric, or "methods" of symfric.
     """
 
     kind: str
@@ -97,7 +96,7 @@ class Verdict:
     by: str = "methods"
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return plain data for JSON."""
         return asdict(self)
 
     @classmethod
@@ -107,11 +106,12 @@ class Verdict:
 
 
 def judge(case: Case, work: int = WORK) -> Verdict:
-    """Run a case and its references; a defect in symfric comes out as the exception it is.
+    """Run a case and its references; exceptions of defects in symfric are not caught.
 
     Args:
-        work: attempts that a run may take, times its unknowns; a reference has ten times what the
-            run took, and as many on top.
+        case: case.
+        work: largest number of attempts of a run times its unknowns; a reference may take this
+            number and ten times the attempts of the run.
     """
     try:
         ready = problem(case, work)
@@ -137,19 +137,19 @@ def _refused(group: str, sentence: str, steps: int = 0) -> Verdict:
 
 
 def _failed(ready: Problem, error: SolveError) -> Verdict:
-    """A solve that says it failed; the group says whether another method goes through."""
+    """Judge a solve that reports a failure; the group states if another method succeeds."""
     if error.status is Status.MAX_STEPS:
         return _stopped(ready, error)
     steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0
     case = ready.case
     other = attempt(ready, case.rtol, other_method(case), ready.attempts)
     through = isinstance(other, Trajectory)
-    group = f"{error.status.name}{', another method goes through' if through else ''}"
+    group = f"{error.status.name}{', another method succeeds' if through else ''}"
     return _refused(group, str(error), steps)
 
 
 def _stopped(ready: Problem, error: SolveError) -> Verdict:
-    """A run whose steps were used up: refused, if the beginning that it hands out is right."""
+    """Judge a run whose steps were used up: refused if its partial result is right."""
     run, case = error.partial, ready.case
     if not isinstance(run, Trajectory) or run.step_times.size < 2:
         return _refused("too many steps", str(error))
@@ -168,7 +168,7 @@ def _stopped(ready: Problem, error: SolveError) -> Verdict:
 
 
 def _compared(ready: Problem, run: Trajectory) -> Verdict:
-    """The verdict of the referee or of other methods; where they do not know, that on each step."""
+    """Judge by the referee or by other methods; if they cannot decide, by each step."""
     answer = answered(ready, lambda y, states: apart(ready, y, states).max(0))
     if answer is None or answer.doubt[1:].min() > DOUBT:
         verdict = by_methods(ready, run)
@@ -179,7 +179,7 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
     steps = run.statistics.steps
     limit = 10 * (steps + run.statistics.rejections) + ready.attempts
     step = worst_step(ready, run, tolerances(ready, table(run, ready.times)), limit)
-    text = f"{verdict.reason}, and a single step is off by up to {step:.3g}"
+    text = f"{verdict.reason}, and the error of a single step is up to {step:.3g}"
     if step > RIGHT:
         kind = "silent" if verdict.group == SUSPECT else "undecided"
         return replace(verdict, kind=kind, reason=text)
@@ -187,7 +187,7 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
 
 
 def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
-    """The referee's verdict, as far as its own error is small; beyond that of other methods."""
+    """Judge by the referee while its own error is small, and by other methods after that."""
     sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
     over_time = apart(ready, table(run, ready.times), answer.states).max(0)
     error, steps = float(over_time[:sure].max()), run.statistics.steps
@@ -203,7 +203,7 @@ def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
 
 
 def by_methods(ready: Problem, run: Trajectory) -> Verdict:
-    """The verdict of symfric's own methods of other families, at smaller and smaller tolerances."""
+    """Judge by methods of other families at decreasing tolerances."""
     verdicts = list[Verdict]()
     for factor in LADDER:
         verdicts.append(_by_two(ready, run, max(factor * ready.case.rtol, FINEST)))
@@ -213,7 +213,7 @@ def by_methods(ready: Problem, run: Trajectory) -> Verdict:
 
 
 def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
-    """The verdict of two methods, one at `rtol` and, where needed, the other at a tenth of it."""
+    """Judge by two methods, one at `rtol` and, if needed, the other at a tenth of it."""
     case, steps = ready.case, run.statistics.steps
     limit = 10 * (steps + run.statistics.rejections) + ready.attempts
     reference = attempt(ready, rtol, other_method(case), limit)
@@ -247,10 +247,10 @@ def _graded(
     limit: int,
     answer: Answer | None = None,
 ) -> Verdict:
-    """Loose or silently wrong, by what the problem itself makes of a tolerance."""
+    """Decide between loose and silently wrong by the growth of a tolerance in the problem."""
     steps, y = run.statistics.steps, truth(ready.times)
     grown = amplification(ready, y, limit, answer)
-    text = f"{error:.3g} tolerances off; the problem makes {grown:.3g} of one"
+    text = f"{error:.3g} tolerances off; the problem amplifies one to {grown:.3g}"
     if error <= LOOSE or at_steps(ready, run, truth) <= LOOSE:
         return _explained(ready, run, truth, Verdict("loose", text, "", error, steps), grown)
     if error <= max(LOOSE, steps) * grown:
@@ -264,21 +264,21 @@ def _graded(
 def _explained(
     ready: Problem, run: Trajectory, truth: States, loose: Verdict, grown: float
 ) -> Verdict:
-    """A loose verdict with the reason that a measurement gives for its error."""
+    """Return a loose verdict with the measured reason of its error."""
     error, text = loose.error or 0.0, loose.reason
     if error <= RIGHT * grown:
         return replace(loose, group="the problem amplifies tolerances")
     if (between := at_steps(ready, run, truth)) <= RIGHT:
-        text += f", and the ends of its steps are off by {between:.3g}"
+        text += f", and the ends of its steps by {between:.3g}"
         return replace(loose, reason=text, group="between steps only")
-    # Errors of single corners scatter by an order of magnitude with the steps that hit them.
+    # the error of a corner scatters by an order of magnitude with the steps at it
     for divisor, share in ((10, 3), (100, 9)):
         rtol = max(ready.case.rtol / divisor, FINEST)
         finer = attempt(ready, rtol, ready.case.method, divisor * ready.attempts)
         if isinstance(finer, SolveError):
             break
         less = distance(ready, finer, truth)
-        text += f", and {less:.3g} are left at rtol/{divisor}"
+        text += f", and {less:.3g} at rtol/{divisor}"
         if less <= error / share:
             return replace(loose, reason=text, group="adds up over steps, falls with rtol")
     return replace(loose, reason=text, group="unexplained")

@@ -1,4 +1,4 @@
-"""The model of a case, the referee's answer to it, and the measures of the judge."""
+"""Model of a case, its reference solution, and the errors that the judge measures."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -18,9 +18,8 @@ from symfric.laws import law_from_text
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
-from symfric.stress.cases import Case, Signal
-from symfric.stress.referee.solve import NO_FORCE, SINE, Question, knows, solve
-from symfric.stress.referee.solve import Signal as RefereeSignal
+from symfric.stress.cases import Case
+from symfric.stress.referee.solve import NO_FORCE, SINE, Question, Signal, knows, solve
 
 Array = NDArray[np.float64]
 WORK = 120_000
@@ -31,14 +30,14 @@ TIMES = 101
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A case made ready to run.
+    """Case that is ready to run.
 
     Attributes:
-        model: the equations.
-        inputs: as `simulate` takes them.
+        case: data of the case.
+        model: equations.
+        inputs: arguments of `simulate`.
         p: parameters given at run time.
-        work: attempts that a run may take, times its unknowns: large machines have fewer, of which
-            each costs more.
+        work: largest number of attempts times unknowns; attempts of large machines cost more.
     """
 
     case: Case
@@ -49,7 +48,7 @@ class Problem:
 
     @property
     def attempts(self) -> int:
-        """Attempts that a run may take."""
+        """Largest number of attempts of a run."""
         return self.work // (len(self.model.x) + len(self.model.z))
 
     @property
@@ -68,7 +67,7 @@ class Problem:
         t_eval: NDArray[np.float64] | None = None,
         **options: Any,
     ) -> Trajectory:
-        """One simulation; raises what `simulate` raises. Warnings are for users, not for judges."""
+        """Simulate once, without warnings; errors are those of `simulate`."""
         times = self.times if t_eval is None else t_eval
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
@@ -92,13 +91,13 @@ def problem(case: Case, work: int = WORK) -> Problem:
     """Build the model of a case.
 
     Raises:
-        ValueError: numbers that the law, the scene or the equations refuse.
+        ValueError: the law, the scene or the equations refuse the numbers.
     """
     law = law_from_text(case.law)
     law = replace(law, **case.forms) if case.forms else law
     scene = with_values(ALL_SCENES[case.scene](law), case.values)
     p = {name: case.values[name] for name in case.free}
-    if p:  # the model starts at the defaults, and the numbers come at run time
+    if p:  # the model has the defaults; the numbers are given at run time
         known = parameters(ALL_SCENES[case.scene](law))
         scene = with_values(scene, {name: known[name].value for name in p})
     inputs = {name: signal(s) for name, s in case.inputs.items()}
@@ -106,10 +105,10 @@ def problem(case: Case, work: int = WORK) -> Problem:
 
 
 def signal(s: Signal) -> Input:
-    """An input as `simulate` takes it.
+    """Return an input for `simulate`.
 
     Raises:
-        ValueError: a kind that there is not, or another count of values.
+        ValueError: an unknown kind, or a wrong number of values.
     """
     if s.kind in ("hold", "linear"):
         return (Hold if s.kind == "hold" else Linear)(s.t, s.values)
@@ -127,30 +126,28 @@ def signal(s: Signal) -> Input:
 
 
 States = Callable[[Array], Array]
-"""From times to states, shape (nx, times)."""
+"""Function from times to states, shape (nx, times)."""
 RTOL, ENOUGH = 1e-10, 0.3
-"""Tolerance of the referee, and the own error [tolerances] that needs no smaller one."""
+"""Tolerance of the reference solver, and its largest accepted error [tolerances]."""
 GAVE_UP = (ArithmeticError, ValueError)
 
 
 def question(ready: Problem, times: Array) -> Question | None:
-    """The case at `times`, the first of which is its start; None where the referee has no answer.
+    """Return the case at `times`, which begin at its start; None if the referee does not know it.
 
-    Start values are those of the model: a bristle starts at its steady state there.
+    Start values are those of the model: a bristle starts at its steady state.
     """
     case, model = ready.case, ready.model
     if not knows(case.law, case.scene) or any(name.endswith("mode") for name in case.x0):
         return None
     scene = with_values(ALL_SCENES[case.scene](law_from_text(case.law)), case.values)
     numbers = {name: float(known.value) for name, known in parameters(scene).items()}
-    given = case.inputs.get("force")
-    signal = SINE if case.scene == "drive" else NO_FORCE
     return Question(
         law=case.law,
         scene=case.scene,
         p=numbers,
         forms=case.forms,
-        signal=signal if given is None else RefereeSignal(given.kind, given.values, given.t),
+        signal=case.inputs.get("force", SINE if case.scene == "drive" else NO_FORCE),
         y=model.initial_state(case.x0, ready.p, case.t_start),
         scale=model.nominal("x"),
         times=times,
@@ -160,11 +157,11 @@ def question(ready: Problem, times: Array) -> Question | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The referee's motion of a case.
+    """Motion of a case by the reference solver.
 
     Attributes:
-        asked: the case.
-        rtol: at which SciPy solved it.
+        asked: case.
+        rtol: relative tolerance of SciPy.
         doubt: difference [tolerances] from another solve, at the requested times.
     """
 
@@ -173,12 +170,12 @@ class Answer:
     doubt: Array
 
     def states(self, times: Array) -> Array:
-        """States at times within the span, shape (nx, times)."""
+        """Return states at times between start and end, shape (nx, times)."""
         at, back = np.unique([self.asked.times[0], *times], return_inverse=True)
         return solve(replace(self.asked, times=at), self.rtol)[:, back[1:]]
 
     def onward(self, times: Array, start: Array) -> Array | None:
-        """States at `times` of the motion that begins at the first of them with `start`."""
+        """Return states at `times` of the motion that begins at the first with `start`."""
         try:
             return solve(replace(self.asked, times=times, y=start), self.rtol)
         except GAVE_UP:
@@ -186,10 +183,10 @@ class Answer:
 
 
 def answered(ready: Problem, distance: Callable[[Array, States], Array]) -> Answer | None:
-    """The referee's answer, or None where it has none.
+    """Return the reference solution, or None if there is none.
 
-    `distance` is that of a table of states at the problem's times from others, over time. The
-    solve at 1e-10 is compared with one at 1e-9, and where that says too little with one at 1e-12.
+    The solve at 1e-10 is compared with one at 1e-9 and, if they differ too much, with one at 1e-12.
+    `distance` returns the difference of states at the times of the problem from others, over time.
     """
     asked = question(ready, ready.times)
     if asked is None:
@@ -207,11 +204,11 @@ def answered(ready: Problem, distance: Callable[[Array, States], Array]) -> Answ
 
 
 RIGHT = 10.0
-"""Tolerances up to which a run is right."""
+"""Largest error [tolerances] of a right run."""
 STATIONS = (0, TIMES // 3, 2 * TIMES // 3)
-"""Times, by number, at which a tolerance is put in."""
+"""Numbers of the times at which a tolerance is added."""
 STRIDES = 100
-"""Steps that a reference takes at least: what a run may leap over, a reference must not."""
+"""Least number of steps of a reference, which must not leap over events."""
 
 
 def attempt(
@@ -222,10 +219,14 @@ def attempt(
     x0: Mapping[str, float] | None = None,
     times: Array | None = None,
 ) -> Trajectory | SolveError:
-    """One run as a reference, in short steps; a failure is returned.
+    """Run a reference in short steps; a failure is returned.
 
     Args:
-        limit: of attempts.
+        ready: problem.
+        rtol, method: as in `simulate`.
+        limit: largest number of attempts.
+        x0: start values; default: those of the case.
+        times: times of the results; default: those of the problem.
     """
     try:
         span = ready.case.t_end - ready.case.t_start
@@ -237,25 +238,24 @@ def attempt(
 
 
 def other_method(case: Case) -> str:
-    """A method of another family than that of the case."""
+    """Return a method of another family than that of the case."""
     return "rodas5p" if chosen("case", case.method, case.rtol).name == "radau5" else "radau5"
 
 
 def third_method(case: Case) -> str:
-    """The method that is not the reference's."""
+    """Return the method of the second reference."""
     return "radau5" if other_method(case) == "rodas5p" else "rodas5p"
 
 
 def distance(ready: Problem, run: Trajectory, truth: States) -> float:
-    """Largest difference of a state [tolerances], see `apart`."""
+    """Return the largest difference of a state [tolerances], see `apart`."""
     return float(apart(ready, table(run, ready.times), truth).max())
 
 
 def at_steps(ready: Problem, run: Trajectory, truth: States) -> float:
-    """Largest difference at times [tolerances] where the run's own steps end.
+    """Return the largest difference [tolerances] at the ends of the steps of the run.
 
-    An implicit step may go over a fast transient and end right, and its polynomial leads there by
-    another way.
+    An implicit step over a fast transient may end right although its polynomial is off in between.
     """
     times = run.step_times[run.step_times <= ready.case.t_end]
     times = times[:: 1 + times.size // TIMES]
@@ -264,9 +264,9 @@ def at_steps(ready: Problem, run: Trajectory, truth: States) -> float:
 
 
 def apart(ready: Problem, y: Array, truth: States) -> Array:
-    """Differences of states y at the times of the problem [tolerances], shape (nx, times).
+    """Return differences of states y at the times of the problem [tolerances], shape (nx, times).
 
-    Where the model has events y may be early or late by rtol of the span: regimes jump.
+    In a model with events y may be early or late by rtol of the duration, as regimes jump.
     """
     if not ready.model.events:
         z = truth(ready.times)
@@ -279,24 +279,24 @@ def apart(ready: Problem, y: Array, truth: States) -> Array:
 
 
 def of(run: Trajectory) -> States:
-    """The states of a run over time."""
+    """Return the states of a run as a function of time."""
     return lambda times: table(run, times)
 
 
 def tolerances(ready: Problem, z: Array) -> Array:
-    """Tolerances rtol max|x| + atol of each state, shape (nx, 1); z (nx, times) are the states."""
+    """Return rtol max|x| + atol of each state, shape (nx, 1), from states z (nx, times)."""
     rtol, nominal = ready.case.rtol, ready.model.nominal("x")[:, None]
     return rtol * np.abs(z).max(1, keepdims=True) + 0.1 * rtol * nominal
 
 
 def table(run: Trajectory, times: Array) -> Array:
-    """States over time, shape (nx, times)."""
+    """Return states at `times`, shape (nx, times)."""
     values = run.states(times)
     return np.stack([values[v.name] for v in run.model.x])
 
 
 def amplification(ready: Problem, y: Array, limit: int, answer: Answer | None = None) -> float:
-    """Growth of one tolerance [tolerances] that is added at the start or on the way of y."""
+    """Return the growth of one tolerance [tolerances] that is added at a station of y."""
     size, worst = tolerances(ready, y), 1.0
     for k in STATIONS:
         times, ends = ready.times[k:], list[Array]()
@@ -314,22 +314,21 @@ def amplification(ready: Problem, y: Array, limit: int, answer: Answer | None = 
 
 
 def onward(ready: Problem, times: Array, y: Array, limit: int) -> Array | None:
-    """States at `times` of the motion that begins at the first of them with y, if it ends."""
+    """Return states at `times` of the motion that begins at the first with y; None if it fails."""
     start = dict(zip((v.name for v in ready.model.x), y.tolist(), strict=True))
     try:
         run = attempt(ready, ready.case.rtol / 100, third_method(ready.case), limit, start, times)
-    except ValueError:  # no algebraic unknowns found for the states on the way
+    except ValueError:  # no algebraic unknowns found for these states
         return None
     return None if isinstance(run, SolveError) else table(run, times)
 
 
 def worst_step(ready: Problem, run: Trajectory, size: Array, limit: int) -> float:
-    """Largest error of a single step [tolerances], from where the run stood at its start.
+    """Return the largest error of a single step [tolerances] from its own start.
 
-    Stretches of steps are followed by another method, and those off by more than `RIGHT` halved
-    until one step is left; the first such step is returned, or else the largest error of a
-    stretch. Infinite where no other method can start or go on. What is damped within a stretch
-    is not seen: it adds nothing to the error of the run.
+    Another method follows stretches of steps. Those with an error above `RIGHT` are halved until
+    one step is left, whose error is returned; otherwise the largest error of a stretch. Infinite if
+    the other method fails. Errors that are damped within a stretch do not affect the run.
     """
     t = run.step_times[run.step_times <= ready.case.t_end]
     y = table(run, t)
@@ -344,7 +343,7 @@ def worst_step(ready: Problem, run: Trajectory, size: Array, limit: int) -> floa
             other = attempt(
                 part, ready.case.rtol / 100, other_method(ready.case), limit, start, span
             )
-        except ValueError:  # no algebraic unknowns found for the states on the way
+        except ValueError:  # no algebraic unknowns found for these states
             return float("inf")
         if isinstance(other, SolveError):
             return float("inf")

@@ -1,66 +1,93 @@
-"""Pages that are made of the code hold all of it."""
+"""Pages made from the code are complete; results of the build are kept until the code changes."""
 
+import json
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-from docs.machine import items, lists, measure
-from docs.machine.generated import stale, write
-from docs.machine.lists import place, reference_pages
-from docs.machine.names import FRONTS, catalogue, known, linked
+from docs.machine import build, items, lists, measure
+from docs.machine.lists import MODULES, catalogue, known, place, reference_pages
+from docs.machine.markdown import block, cell, directive, plain, table
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
-from symfric.cli.app import COMMANDS, prose_and_examples
+from symfric.bench.interop import MOVES, RUNS
+from symfric.bench.report import Report
+from symfric.cli.app import COMMANDS
+from symfric.gallery import scripts
+from symfric.gallery.rendering import Gallery, Record
 from symfric.scenes import ALL_SCENES
 
+needs_sphinx = pytest.mark.skipif(find_spec("sphinx") is None, reason="needs Sphinx (extra docs)")
 
-def test_every_package_has_a_page_or_stands_on_that_of_its_parent() -> None:
-    pages = reference_pages()
-    for front in FRONTS:
-        found = place(front)
-        assert found is not None
-        assert found[2].removeprefix("/reference/") in pages
+
+def test_pieces_of_markdown() -> None:
+    assert plain("a * b `x*y` [1] $") == r"a \* b `x*y` \[1] \$"
+    shown = [cell(x) for x in ("", "- a", "1. b", 2, "a\nb")]
+    assert shown == [r"\-", r"\- a", r"1\. b", "2", "a b"]
+    shown = table(["a", "b"], [["x", 1.5]], "numbers")
+    assert ":header-rows: 1" in shown and ":class: numbers" in shown and "* - x\n  - 1.5" in shown
+    assert ":stub-columns: 1" in table((), [["x", "y"]]) and ":class: facts" in table((), [["x"]])
+    assert table((), []) == ""
+    assert directive("note", "", block("x")).startswith("````{note}\n```text")
 
 
 def test_every_law_has_a_page_with_formula_picture_and_parameters() -> None:
     pages = items.law_pages()
     assert {*ALL_LAWS, *POPULATIONS, *items.MADE_OF_LAWS, "index"} == {*pages}
     for name in ALL_LAWS:
-        assert ".. math::" in pages[name], name
+        assert f".. autoclass:: symfric.{ALL_LAWS[name].__name__}\n" in pages[name]
         assert f"/made/laws/{name}.png" in pages[name]
-        assert f".. py:class:: symfric.{ALL_LAWS[name].__name__}(" in pages[name]
-    assert all(f"``{p}``" in pages["lugre"] for p in parameters(LuGre()))
-    families = items.every().values()
-    assert {items.family(law) for law in families} == {*items.FAMILIES} - {"Made of laws and data"}
+    assert all(f"`{p}`" in pages["lugre"] for p in parameters(LuGre()))
+    assert r"$\sigma_{0}$" in pages["lugre"]
+    families = {items.family(law) for law in items.every().values()}
+    assert families == {*items.FAMILIES} - {items.WITH_DATA}
+    assert items.signature(LuGre).startswith("(mu_s=")
+    assert [items.bounds(*b) for b in ((0, 1), (0, float("inf")), (-float("inf"), 2))] == [
+        "0 ... 1", "≥ 0", "≤ 2"
+    ]  # fmt: skip
 
 
-def test_every_scene_has_a_page_with_its_parameters_and_presets() -> None:
+def test_every_scene_has_a_page_with_its_presets() -> None:
     pages = items.scene_pages()
     assert {*ALL_SCENES, "index"} == {*pages}
     for name, kind in ALL_SCENES.items():
-        assert all(f"``{preset}``" in pages[name] for preset in kind.presets)
-        assert f".. py:class:: symfric.scenes.{kind.__name__}(" in pages[name]
+        assert all(f"`{preset}`" in pages[name] for preset in kind.presets)
+        assert f".. autoclass:: symfric.scenes.{kind.__name__}\n" in pages[name]
 
 
-def test_every_command_stands_with_its_options() -> None:
-    page = lists.command_page()
-    assert all(f"\nsymfric {name}\n" in page for name in COMMANDS)
-    assert "``--law NAME``" in page and "required" in page
-    assert prose_and_examples("A.\n\nExample: x y\nz") == ("A.", ["x y z"])
+@needs_sphinx
+def test_every_public_name_is_documented_once() -> None:
+    pages = reference_pages()
+    text = "".join(pages[module] for module in MODULES if module in pages)
+    for public in (p for names in catalogue().values() for p in names):
+        kinds = ("autoclass", "autofunction", "autoexception", "py:data")
+        entries = sum(text.count(f"{kind}:: {public.full}\n") for kind in kinds)
+        assert entries == (not public.page), public.full
+    page = pages["commands"]
+    assert all(f"(symfric-{name})=\n## symfric {name}\n" in page for name in COMMANDS)
+    assert "* `--law NAME[,NAME]`" in page and "```console\n$ symfric run rabinowicz" in page
+    assert "Laws made of laws" in text or "ALL_LAWS" in text
+    assert "drifts under vibration" in pages["limits"]
+    assert all(f"[{name}](../laws/{name}.md)" in pages["limits"] for name in ALL_LAWS)
+    assert "Jing and Mi, Investigation of Selection Mechanism" in pages["literature"]
+    assert "@software" in pages["literature"]
 
 
-def test_every_public_name_stands_once() -> None:
-    pages = "".join(reference_pages().values())
-    for names in catalogue().values():
-        for public in names:
-            entries = [f"{kind}:: {public.full}\n" for kind in ("autoclass", "autofunction")]
-            at_all = sum(pages.count(e) for e in [*entries, f"autoexception:: {public.full}\n"])
-            own = f":doc:`{public.name} <" in pages or f"py:data:: {public.full}\n" in pages
-            assert at_all == 1 or own, public.full
-
-
-def test_names_are_linked_where_they_are_documented() -> None:
-    assert linked("simulate") == ":py:obj:`simulate <symfric.simulate>`"
-    assert linked("mu_s") == "``mu_s``"
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("simulate", ("py", "obj", "symfric.simulate")),
+        ("ocp.solve()", ("py", "obj", "ocp.solve")),
+        ("LuGre", ("std", "doc", "/laws/lugre")), ("lugre", ("std", "doc", "/laws/lugre")),
+        ("symfric bench ivp --quick", ("std", "ref", "symfric-bench")),
+        ("rabinowicz", ("std", "doc", "/scenes/rabinowicz")),
+        ("symfric.codegen", ("std", "doc", "/reference/symfric.codegen")),
+        ("mu_s", None), ("symfric -h", None), ("simulate(x)", None),
+    ],
+)  # fmt: skip
+def test_names_lead_to_their_documentation(name: str, expected: object) -> None:
+    assert place(name) == expected
     assert known()["Problem"].full == "ocp.Problem"
 
 
@@ -71,69 +98,180 @@ def test_every_example_has_its_docstring_and_code() -> None:
     assert "def problem()" in pages["out_and_back"]
 
 
-def test_stored_measurements_say_by_what_where_and_when() -> None:
+def test_publications_are_collected() -> None:
+    doc = "T.\n\nSource: A, J. X 1(2), 1999, p. 3; B,\nThesis 2001 (part); with words.\n\nMore: C."
+    assert [*lists.sources(doc)] == [
+        "A, J. X 1(2), 1999, p. 3", "B, Thesis 2001 (part); with words"
+    ]  # fmt: skip
+    assert any(where.startswith("symfric.integrator.") for _, where in lists.methods())
+    named = [name for names in lists.laws().values() for name in names]
+    assert sorted(named) == sorted(ALL_LAWS | POPULATIONS)
+
+
+# ---- measurements ----
+
+
+def test_stored_measurements_are_complete() -> None:
     stored = measure.stored()
     assert {"integrator", "ivp", "ensemble", "multibody", "ocp", "interop"} <= {*stored}
     for name, found in stored.items():
-        measured = {"tables"} <= {*found}
-        keys = {*measure.KEYS} if measured else {"title", "about"}
-        assert {*found} - {"short"} == keys and (measured or "short" in found), name
+        keys = {*measure.KEYS} if "tables" in found else {"title", "about"}
+        assert {*found} - {"short"} == keys and ("tables" in found or "short" in found), name
         short = found.get("short", dict.fromkeys(measure.SHORT, "-") | {"tables": []})
         assert {*short} == {*measure.SHORT} and all(short[k] or k == "tables" for k in short)
-        for table in [*found.get("tables", ()), *short["tables"]]:
-            assert all({*row} == {*table["rows"][0]} for row in table["rows"]), name
-    assert "symfric bench ivp" in measure.page()
+        for one in [*found.get("tables", ()), *short["tables"]]:
+            assert all({*row} == {*one["rows"][0]} for row in one["rows"]), name
+    page = measure.page()
+    assert "symfric bench ivp" in page and "Summarised by hand" in page and "; load " in page
 
 
-def test_tools_stand_side_by_side_as_they_were_measured() -> None:
+def test_tools_are_compared_in_columns() -> None:
     shown = measure.tables()
     moves = measure.stored()["interop"]["tables"][0]["rows"]
-    for line in moves:
-        if not line["status"]:
-            miss = f"{float(line['miss [m]']):.1e}".replace("e-0", "e-")
-            said = f"{miss}, {line['iterations']}, {line['processor time [s]']} s"
-            assert said in shown["interop_moves"], line
+    for row in moves:
+        if not row["status"]:
+            miss = f"{float(row['miss [m]']):.1e}".replace("e-0", "e-")
+            text = f"{miss}, {row['iterations']}, {row['processor time [s]']} s"
+            assert text in shown["interop_moves"], row
     late = sum(m["status"] == "out of time" for m in moves)
     assert shown["interop_moves"].count("out of time") == late
-    assert "``cvodes``" in shown["interop_integrators"]
+    assert "`cvodes`" in shown["interop_integrators"] and "stops" in shown["interop_integrators"]
     assert "symfric bench interop" in shown["interop_by"]
 
 
-def test_names_in_pages_lead_to_where_they_are_documented() -> None:
-    assert place("simulate") == ("py", "obj", "symfric.simulate")
-    assert place("ocp.solve()") == ("py", "obj", "ocp.solve")
-    assert place("LuGre") == place("lugre") == ("std", "doc", "/laws/lugre")
-    assert place("symfric bench ivp --quick") == ("std", "ref", "symfric-bench")
-    assert place("rabinowicz") == ("std", "doc", "/scenes/rabinowicz")
-    assert place("symfric.codegen") == ("std", "doc", "/reference/symfric.codegen")
-    assert place("mu_s") is place("symfric -h") is place("simulate(x)") is None
+def test_a_measurement_is_stored_with_machine_load_and_commit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    move = {"tool": "opti", "route": "flow", "law": "lugre", "cost J [N^2 s]": 1.11449}
+    result = Report(tables={MOVES: [move], RUNS: [{"integrator": "cvodes", "law": "lugre"}]})
+    monkeypatch.setattr(measure, "STORED", tmp_path)
+    monkeypatch.setattr("symfric.bench.measure", lambda subject, quick: result)
+    monkeypatch.setattr(measure, "commit", lambda: "abc")
+    path = tmp_path / "interop.json"
+    short = dict.fromkeys(measure.SHORT, "-") | {"tables": []}
+    path.write_text(json.dumps({"title": "T", "about": "A.", "short": short}), "utf-8")
+    assert measure.main(["--quick", "interop"]) == 0
+    found = json.loads(path.read_text("utf-8"))
+    assert {*found} == {*measure.KEYS, "short"}
+    assert (found["title"], found["about"], found["short"]) == ("T", "A.", short)
+    assert found["command"] == "symfric bench interop --quick"
+    assert all(float(load) >= 0 for load in found["load"].split(" to "))
+    assert found["tables"][0] == {"title": MOVES, "rows": [move | {"cost J [N^2 s]": "1.11"}]}
+    assert measure.main(["nothing"]) == measure.main([]) == 2
+    assert "expected some of integrator" in capsys.readouterr().out
 
 
-def test_publications_are_gathered_from_where_they_are_used() -> None:
-    said = "T.\n\nSource: A, J. X 1(2), 1999, p. 3; B,\nThesis 2001 (part); with words.\n\nMore: C."
-    assert [*lists.sources(said)] == [
-        "A, J. X 1(2), 1999, p. 3",
-        "B, Thesis 2001 (part); with words",
-    ]
-    methods = dict(lists.methods())
-    assert any(where == "symfric.integrator.step.tangent" for where in methods.values())
-    named = [name for names in lists.laws().values() for name in names]
-    assert sorted(named) == sorted(ALL_LAWS | POPULATIONS)
-    page = lists.literature_page()
-    assert "Jing and Mi, Investigation of Selection Mechanism" in page and "@software" in page
+# ---- results that are kept ----
 
 
-def test_limits_of_laws_are_gathered() -> None:
-    assert "drifts under vibration" in lists.limits(LuGre)
-    page = lists.limit_page()
-    assert all(f":doc:`{name} </laws/{name}>`" in page for name in ALL_LAWS)
+def test_docstrings_and_comments_are_no_code(tmp_path: Path) -> None:
+    texts = {
+        "one": '"""A."""\n\n\ndef f(x):\n    """B."""\n    return x + 1  # so\n',
+        "same": "def f(x):\n    '''C.'''\n\n    return (x + 1)\n",
+        "other": "def f(x):\n    return x + 2\n",
+        "empty": 'def f(x):\n    """B."""\n',
+    }
+    found = dict[str, str]()
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8")
+        found[name] = build.code_of(tmp_path / name)
+    assert found["one"] == found["same"]
+    assert len({*found.values()}) == 3
+    bare = "def f(x):\n    return x\n"
+    documented = (
+        '"""M."""\n\ndef f(x):\n    """Title.\n\n    More.\n    """\n    return x\n\ny = 1\n'
+    )
+    assert build.without_docstring(documented, "f") == bare
+    assert build.without_docstring(f"{bare}\ny = 1\n", "f") == bare
 
 
-def test_pages_that_are_none_any_more_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("docs.machine.generated.DOCS", tmp_path)
-    write("room", {"a": "A", "b/c": "C"})
-    before = (tmp_path / "room" / "a.rst").stat().st_mtime_ns
-    assert stale(tmp_path / "room", {"a": "A"}) == [tmp_path / "room" / "b" / "c.rst"]
-    write("room", {"a": "A"})
-    assert [p.name for p in (tmp_path / "room").rglob("*.rst")] == ["a.rst"]
-    assert (tmp_path / "room" / "a.rst").stat().st_mtime_ns == before
+def test_results_with_another_key_are_stale(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SYMFRIC_DOCS", raising=False)
+    assert not build.is_fresh(tmp_path, "a")
+    (tmp_path / ".key").write_text("a")
+    assert build.is_fresh(tmp_path, "a")
+    assert not build.is_fresh(tmp_path, "b")
+    assert not build.is_fresh(tmp_path, "a", ["missing.png"])
+    monkeypatch.setenv("SYMFRIC_DOCS", "keep")
+    assert build.is_fresh(tmp_path, "b")
+    assert not build.is_fresh(tmp_path, "a", ["missing.png"])
+
+
+def test_pages_of_an_earlier_build_are_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "DOCS", tmp_path)
+    build.write("folder", {"a": "A", "b/c": "C"})
+    before = (tmp_path / "folder" / "a.md").stat().st_mtime_ns
+    build.write("folder", {"a": "A"})
+    assert [p.name for p in (tmp_path / "folder").rglob("*.md")] == ["a.md"]
+    assert (tmp_path / "folder" / "a.md").stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize(
+    ("changed", "stale"),
+    [
+        ("symfric/gallery/shared.py", lambda name: True),
+        ("symfric/gallery/self_tuning/machines.py", lambda name: name.startswith("self_tuning/")),
+        ("symfric/gallery/self_tuning/__init__.py", lambda name: name.startswith("self_tuning/")),
+        ("symfric/gallery/pages.py", lambda name: False),
+    ],
+)
+def test_a_figure_depends_on_its_paper_and_on_shared_code(
+    changed: str, stale: Callable[[str], bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "code_key", lambda: "")
+    before, place = build.keys(), build.ROOT / changed
+    assert place.is_file()
+    read, of = Path.read_text, build.code_of
+
+    def edited(path: Path, *how: str) -> str:
+        return read(path, *how) + ("\nCHANGED = 1\n" if path == place else "")
+
+    monkeypatch.setattr(Path, "read_text", edited)
+    monkeypatch.setattr(
+        build, "code_of", lambda path: of.__wrapped__(path) if path == place else of(path)
+    )
+    after = build.keys()
+    assert {name for name in before if before[name] != after[name]} == {*filter(stale, scripts())}
+
+
+def test_a_figure_that_failed_is_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SYMFRIC_DOCS", raising=False)
+    monkeypatch.setattr(build, "GALLERY", tmp_path)
+    monkeypatch.setattr(build, "KEYS", tmp_path / "keys.json")
+    monkeypatch.setattr(build, "keys", lambda: {"good": "1", "bad": "2"})
+    there = dict[str, object]()
+    monkeypatch.setattr(build, "read", lambda _: there)
+    asked = list[list[str]]()
+
+    def render(folder: Path, names: list[str], **_: object) -> Gallery:
+        asked.append(names)
+        there["good"] = {}
+        made: dict[str, Record] = {name: {} for name in names if name == "good"}
+        return Gallery(folder, tuple(names), made, {"bad": "no"}, 0.0)
+
+    monkeypatch.setattr(build, "render", render)
+    assert build.make_gallery(lambda _: None) == ["gallery 'bad': no"]
+    assert json.loads((tmp_path / "keys.json").read_text("utf-8")) == {"good": "1"}
+    build.make_gallery(lambda _: None)
+    assert asked == [["good", "bad"], ["bad"]]
+
+
+@needs_sphinx
+def test_formulas_and_signatures_of_sphinx() -> None:
+    from docutils import nodes  # noqa: PLC0415
+
+    from docs.machine.sphinx_pages import mathml, short  # noqa: PLC0415
+
+    for written in (r"|a| + |b|", r"\lvert a\rvert + \lvert b \rvert"):
+        found = mathml(nodes.math(written, written), as_block=False)
+        assert found.count('lspace="0" rspace="0">|</mo>') == 4, found
+    array = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
+    given, back = short(None, "", "", None, None, f"(t: {array}, n: int)", array)
+    assert (given, back) == ("(t: NDArray[float64], n: int)", "NDArray[float64]")
+    assert short(None, "", "", LuGre, None, "(x: int)", None)[0] == items.signature(LuGre)

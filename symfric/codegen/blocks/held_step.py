@@ -12,7 +12,7 @@ from symfric.foundation.graph import LEAVES, graph, rebuild
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
-from symfric.integrator.methods.explicit import exp_phi1_phi2
+from symfric.integrator.methods.families import exp_phi1_phi2
 from symfric.laws import Law, Sum
 from symfric.laws.base.law import chosen
 

@@ -10,8 +10,7 @@ from textwrap import dedent
 from typing import NamedTuple
 
 from symfric.foundation.parameters import Option, Parametric, options
-from symfric.integrator.methods.explicit import Exponential
-from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock
+from symfric.integrator.methods.families import BackwardEuler, Exponential, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
 
 SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))

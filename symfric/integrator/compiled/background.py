@@ -2,63 +2,121 @@
 
 One compiler runs at a time, at low priority, and is polled whenever compiled code is requested: no
 thread waits for it. Results never depend on when it finishes, since both engines give the same
-bits.
-At exit a running compiler is stopped, and leaves no file. A forked process leaves its parent's
-compiler alone and starts none in the background, since it may end without these exit handlers.
+bits. At exit a running compiler is stopped, and leaves no file. A forked process leaves the one
+of its parent alone and starts none, since it may end without these exit handlers.
 """
 
 import atexit
 import os
+import subprocess
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from time import sleep
+from pathlib import Path
+from tempfile import TemporaryFile
+from time import perf_counter, sleep
 from typing import final
 
-from symfric.foundation.programs import CompileError, find_compiler
-from symfric.integrator.compiled.compiler import Unfinished, begun, compiled_before
+from symfric.foundation.programs import (
+    CompileError,
+    ProgramError,
+    end,
+    find_compiler,
+    needed_compiler,
+    patience,
+    started,
+)
+from symfric.integrator.compiled.compiler import (
+    FLAGS,
+    Cache,
+    caches,
+    call_of,
+    compiled_before,
+    key_of,
+    opened,
+)
 
+NICENESS = 10
+"""Niceness of a background compiler."""
 _OWNER = os.getpid()
-_row: list["Making"] = []
-"""Queue of libraries; the first one is being compiled."""
+_queue: list["Making"] = []
+"""Libraries to compile; the first one is being compiled."""
 
 
 @final
 @dataclass(eq=False)
 class Making:
-    """Library being compiled; mutable in its progress only.
+    """Library to be compiled; mutable in its progress only.
 
     Attributes:
         source, names: as in `library`.
         done: True if it is in a cache or has failed.
-        failed: True if the compiler rejected it.
+        failed: True if no compiler or cache can be used, or the compiler rejected it.
     """
 
     source: str
     names: tuple[str, ...]
     done: bool = False
     failed: bool = False
-    _unfinished: Unfinished | None = None
+    _process: subprocess.Popen[bytes] | None = None
+    _file: tuple[Cache, str, Path] | None = None
+    _limit: float = 0.0
 
     def look(self) -> None:
-        """Start the compiler, or store its result."""
+        """Start the compiler, or store its result if it has finished."""
         if self.done:
             return
         try:
-            if self._unfinished is None:
-                self._unfinished = begun(self.source, self.names)
-            else:
-                self.done = self._unfinished.finish()
-        except CompileError:
-            self.done = self.failed = True
+            if self._process is None or self._file is None:
+                self._start()
+                return
+            status = self._process.poll()
+            if status is None and perf_counter() < self._limit:
+                return
+            if status != 0:
+                raise CompileError(f"compile: status {status}")
+            place, key, path = self._file
+            opened(path, self.names)
+            place.keep(key, path)
+            place.evict()
+        except (ProgramError, OSError):
+            self.failed = True
+        self.done = True
+        self.stop()
 
-    def end(self) -> None:
-        """Store the library if it is ready, otherwise stop its compiler."""
-        self.look()
-        if self._unfinished is not None and not self.done:
-            self._unfinished.stop()
+    def _start(self) -> None:
+        """Start the compiler at low priority, in the first cache that can be written.
+
+        Raises:
+            ProgramError: no compiler, no writable cache, or it does not start.
+        """
+        compiler = needed_compiler()
+        key = key_of(self.source, compiler, FLAGS)
+        for place in caches():
+            with suppress(OSError), TemporaryFile() as text:
+                text.write(self.source.encode())
+                text.seek(0)
+                self._file = place, key, place.begin(key)
+                arguments, variables = call_of(compiler, FLAGS, self._file[2])
+                command = (*compiler.command, *arguments)
+                self._process = started(command, stdin=text, variables=variables)
+                if hasattr(os, "setpriority"):
+                    with suppress(OSError):
+                        os.setpriority(os.PRIO_PGRP, self._process.pid, NICENESS)
+                self._limit = perf_counter() + patience(self.source)
+                return
+        raise CompileError("compile: expected a folder for compiled code, found none")
+
+    def stop(self) -> None:
+        """Stop the compiler if it still runs, and delete its output unless that was stored."""
+        if self._process is not None:
+            end(self._process)
+        if self._file is not None:
+            with suppress(OSError):
+                self._file[2].unlink()
 
 
-def beside() -> bool:
+def possible() -> bool:
     """Return True if a background compiler may run and will be stopped at exit."""
     return processors() > 1 and os.getpid() == _OWNER
 
@@ -66,32 +124,33 @@ def beside() -> bool:
 def make(source: str, *names: str) -> Making:
     """Queue a library for compilation."""
     making = Making(source, names)
-    _row.append(making)
+    _queue.append(making)
     _advance()
     return making
 
 
 def _advance() -> None:
     """Poll the first library of the queue, and the next one if it is done."""
-    while _row and os.getpid() == _OWNER:
-        _row[0].look()
-        if not _row[0].done:
+    while _queue and os.getpid() == _OWNER:
+        _queue[0].look()
+        if not _queue[0].done:
             return
-        del _row[0]
+        del _queue[0]
 
 
 def wait() -> None:
     """Wait until the queue is empty: for measurements and tests."""
-    while _row and os.getpid() == _OWNER:
+    while _queue and os.getpid() == _OWNER:
         _advance()
         sleep(1e-3)
 
 
 @atexit.register
 def _close() -> None:
-    if _row and os.getpid() == _OWNER:
-        _row[0].end()
-    _row.clear()
+    if _queue and os.getpid() == _OWNER:
+        _queue[0].look()
+        _queue[0].stop()
+    _queue.clear()
 
 
 def processors() -> int:
@@ -149,7 +208,7 @@ class Prospect:
                 return True
         if expected < compiling / 2:
             return False
-        if not beside():
+        if not possible():
             return expected > 2 * compiling
         self.source = self.write()
         self._making = make(self.source, *self.names)

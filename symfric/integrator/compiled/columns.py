@@ -25,119 +25,6 @@ Array = NDArray[np.float64]
 Row = Array | tuple[Array, NDArray[np.intp]]
 """Arguments, one per row; or a table and the row number for each of them."""
 NAME = "symfric_rows"
-NUMBER = np.dtype(np.float64).itemsize
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Compiled Function with dense results.
-
-    Attributes:
-        library: contains `symfric_rows`.
-        sizes: of its arguments and of its results.
-        chained: the first result of a row is the first argument of the next one.
-    """
-
-    library: ctypes.CDLL
-    sizes: tuple[tuple[int, ...], tuple[int, ...]]
-    chained: bool
-
-    @classmethod
-    def of(cls, function: ca.Function, chained: bool, source: str = "") -> "Rows":
-        """Compile `source`, by default `rows_source`, or load it from the cache.
-
-        Raises:
-            CompileError: no compiler was found, or it failed.
-        """
-        library = load(source or rows_source(function), NAME)
-        library.symfric_rows.restype = None
-        library.symfric_rows.argtypes = [ctypes.c_longlong, ctypes.c_int, *[ctypes.c_void_p] * 2]
-        into = tuple(function.numel_in(i) for i in range(function.n_in()))
-        out = tuple(function.numel_out(i) for i in range(function.n_out()))
-        return cls(library, (into, out), chained)
-
-    def __call__(self, rows: Sequence[Row], first: Array | None = None) -> list[Array]:
-        """Return the results of all rows; see `Columns`."""
-        into, out = self.sizes
-        begin = int(self.chained)
-        count = next(a.shape[0] for a in rows if isinstance(a, np.ndarray))
-        tables = [a[0] if isinstance(a, tuple) else a for a in rows]
-        arrays = [_in_rows(a, size) for a, size in zip(tables, into[begin:], strict=True)]
-        numbers = [np.ascontiguousarray(a[1]) if isinstance(a, tuple) else None for a in rows]
-        if first is not None:
-            arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
-            numbers.insert(0, None)
-        results = [np.empty((count, size)) for size in out]
-        # address of the first row, distance of rows, address of the row numbers
-        of = [0 if a is None else _address(a) for a in (*numbers, *(None for _ in results))]
-        every = zip((*arrays, *results), of, strict=True)
-        places = np.array([(_address(a), a.strides[0], numbers) for a, numbers in every])
-        here = _address(places)
-        self.library.symfric_rows(count, begin, here, here + len(arrays) * places.strides[0])
-        return results
-
-
-def _address(array: NDArray[Any]) -> int:
-    """Return the address of an array; faster than its `ctypes`."""
-    return array.__array_interface__["data"][0]
-
-
-def _in_rows(array: Array, size: int) -> Array:
-    """Return an array whose rows are `size` contiguous numbers; itself if they are already.
-
-    Raises:
-        ValueError: rows of another size, beyond whose end the loop in C would read.
-    """
-    flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
-    if flat.shape[1] != size:
-        raise ValueError(f"expected rows of {size} numbers, got {flat.shape[1]}")
-    beside = size <= 1 or flat.strides[1] == NUMBER
-    return flat if beside and flat.dtype == np.float64 else np.ascontiguousarray(flat, dtype=float)
-
-
-def rows_source(function: ca.Function) -> str:
-    """Return the CasADi C of `function`, with the loop over rows."""
-    generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
-    generator.add(function)
-    return generator.dump() + filled(
-        _LOOP, function, name=function.name(), arguments=function.n_in(), results=function.n_out()
-    )
-
-
-def filled(template: str | Path, *called: ca.Function, **values: object) -> str:
-    """Return the C of a template, or of a file of one, with `values` substituted.
-
-    `arg`, `res`, `iw` and `w` are the work sizes of the Functions that it calls.
-    """
-    text = template.read_text(encoding="utf-8") if isinstance(template, Path) else template
-    for name in ("arg", "res", "iw", "w") if called else ():
-        values[name] = max(1, *(getattr(function, f"sz_{name}")() for function in called))
-    return Template(text).substitute(values)
-
-
-_LOOP = """
-typedef struct { char *at; long long apart; const long long *of; } symfric_place;
-
-/* Evaluates row after row; if chained, the first result is the next first argument. */
-void symfric_rows(long long count, int chained, const symfric_place *in, const symfric_place *out)
-{
-  const double *arg[$arg];
-  double *res[$res], w[$w];
-  casadi_int iw[$iw];
-  long long k;
-  int i;
-  for (k = 0; k < count; ++k) {
-    for (i = 0; i < $arguments; ++i)
-      arg[i] = (const double *)(in[i].at + (in[i].of ? in[i].of[k] : k) * in[i].apart);
-    if (chained) arg[0] = (const double *)(k ? out[0].at + (k - 1) * out[0].apart : in[0].at);
-    for (i = 0; i < $results; ++i) res[i] = (double *)(out[i].at + k * out[i].apart);
-    $name(arg, res, iw, w, 0);
-  }
-}
-"""
-
-
 CHAINED, SIDE_BY_SIDE = 16, 32
 """Columns per call of the virtual machine; the last call repeats its last column."""
 PER_INSTRUCTION = 3e-9
@@ -185,23 +72,23 @@ class Columns:
         return Prospect(self.source or (lambda: rows_source(self._dense)), (NAME,), n)
 
     @cached_property
-    def _compiled(self) -> Rows:
-        return Rows.of(self._dense, self.chained, self._prospect.written())
+    def _loop(self) -> Callable[..., None]:
+        """Compiled loop; raises CompileError without a working compiler."""
+        loop = load(self._prospect.written(), NAME).symfric_rows
+        loop.restype = None
+        loop.argtypes = [ctypes.c_longlong, ctypes.c_int, *[ctypes.c_void_p] * 2]
+        return loop
 
-    def _choose(self, backend: str, count: int) -> Rows | None:
-        """Return compiled code or None; "auto" compiles if that is expected to save time."""
-        if backend == "compiled":
-            return self._compiled
-        if backend == "vm":
-            return None
-        if "_compiled" in self.__dict__:
-            return self._compiled
+    def _compiled(self, backend: str, count: int) -> bool:
+        """Return True to run compiled code; "auto" compiles if that is expected to save time."""
+        if backend != "auto" or "_loop" in self.__dict__:
+            return backend != "vm"
         if self._prospect.pays(self.spent + PER_INSTRUCTION * self._prospect.instructions * count):
             try:
-                return self._compiled
+                return bool(self._loop)
             except CompileError:  # evaluate in the VM if the compiler is broken
                 self._prospect.hopeless = True
-        return None
+        return False
 
     def __call__(
         self, rows: Sequence[Row], first: Array | None = None, backend: str = "vm"
@@ -214,12 +101,16 @@ class Columns:
             first: if `chained`, the first argument of the first row.
             backend: "vm", "compiled" or "auto".
         """
-        most, began = self.size, perf_counter()
         count = next(a.shape[0] for a in rows if isinstance(a, np.ndarray))
-        compiled = self._choose(backend, count)
-        if compiled is not None:
-            return compiled(rows, first)
-        batch = self._batch
+        if self._compiled(backend, count):
+            return self._in_c(rows, first, count)
+        began = perf_counter()
+        results = self._in_vm(rows, first, count)
+        self.spent += perf_counter() - began
+        return results
+
+    def _in_vm(self, rows: Sequence[Row], first: Array | None, count: int) -> list[Array]:
+        batch, most = self._batch, self.size
         arguments = [np.zeros(batch.numel_in(i)) for i in range(batch.n_in())]
         results = [np.zeros((most, batch.numel_out(i) // most)) for i in range(batch.n_out())]
         found = [np.empty((count, result.shape[1])) for result in results]
@@ -241,8 +132,63 @@ class Columns:
                 whole[begin : begin + size] = result[:size]
             if self.chained:
                 arguments[0][:] = results[0][-1]
-        self.spent += perf_counter() - began
         return found
+
+    def _in_c(self, rows: Sequence[Row], first: Array | None, count: int) -> list[Array]:
+        function, begin = self._dense, int(self.chained)
+        tables = [a[0] if isinstance(a, tuple) else a for a in rows]
+        arrays = [_in_rows(a, function.numel_in(begin + i)) for i, a in enumerate(tables)]
+        numbers = [np.ascontiguousarray(a[1]) if isinstance(a, tuple) else None for a in rows]
+        if first is not None:
+            arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
+            numbers.insert(0, None)
+        results = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
+        # address of the first row, distance of rows, address of the row numbers
+        of = [0 if a is None else _address(a) for a in (*numbers, *(None for _ in results))]
+        every = zip((*arrays, *results), of, strict=True)
+        places = np.array([(_address(a), a.strides[0], numbers) for a, numbers in every])
+        here = _address(places)
+        self._loop(count, begin, here, here + len(arrays) * places.strides[0])
+        return results
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Return the address of an array; faster than its `ctypes`."""
+    return array.__array_interface__["data"][0]
+
+
+def _in_rows(array: Array, size: int) -> Array:
+    """Return an array whose rows are `size` contiguous numbers; itself if they are already.
+
+    Raises:
+        ValueError: rows of another size, beyond whose end the loop in C would read.
+    """
+    flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
+    if flat.shape[1] != size:
+        raise ValueError(f"expected rows of {size} numbers, got {flat.shape[1]}")
+    adjacent = size <= 1 or flat.strides[1] == flat.itemsize
+    return (
+        flat if adjacent and flat.dtype == np.float64 else np.ascontiguousarray(flat, dtype=float)
+    )
+
+
+def rows_source(function: ca.Function) -> str:
+    """Return the CasADi C of `function`, with the loop over rows."""
+    generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
+    generator.add(function)
+    numbers = {"arguments": function.n_in(), "results": function.n_out()}
+    loop = filled(Path(__file__).with_name("rows.c"), function, name=function.name(), **numbers)
+    return f"{generator.dump()}\n{loop}"
+
+
+def filled(template: Path, *called: ca.Function, **values: object) -> str:
+    """Return the C of a template file with `values` substituted.
+
+    `arg`, `res`, `iw` and `w` are the work sizes of the Functions that it calls.
+    """
+    for name in ("arg", "res", "iw", "w") if called else ():
+        values[name] = max(1, *(getattr(function, f"sz_{name}")() for function in called))
+    return Template(template.read_text(encoding="utf-8")).substitute(values)
 
 
 def densified(function: ca.Function) -> ca.Function:

@@ -11,7 +11,6 @@ import hashlib
 import os
 import platform
 import stat
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,21 +20,15 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryFile
-from time import perf_counter
 from typing import final
 
 from symfric.foundation.programs import (
     CompileError,
     Compiler,
-    ProgramError,
-    end,
     find_compiler,
     first_error,
     is_clang,
     needed_compiler,
-    patience,
-    started,
 )
 
 MOST_BYTES = 256 * 2**20
@@ -54,22 +47,15 @@ def caches() -> Iterator["Cache"]:
         yield Cache(Path(chosen))
         return
     with suppress(RuntimeError):  # the user has no home folder
-        yield Cache(users_folder() / "symfric")
+        if sys.platform == "win32":
+            folder = Path(os.environ.get("LOCALAPPDATA") or Path.home())
+        elif sys.platform == "darwin":
+            folder = Path.home() / "Library" / "Caches"
+        else:
+            folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        yield Cache(folder / "symfric")
     user = str(os.getuid()) if hasattr(os, "getuid") else "user"
     yield Cache(Path(tempfile.gettempdir()) / f"symfric-{user}")
-
-
-def users_folder() -> Path:
-    """Return the system's cache folder of the user.
-
-    Raises:
-        RuntimeError: the user has no home.
-    """
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home())
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
 
 def trusted(found: os.stat_result) -> bool:
@@ -108,8 +94,7 @@ class Cache:
             yield temporary
             self.keep(key, temporary)
         finally:
-            with suppress(FileNotFoundError):
-                temporary.unlink()
+            temporary.unlink(missing_ok=True)
 
     def begin(self, key: str) -> Path:
         """Create an empty temporary file in the folder; raises as `new` does."""
@@ -173,18 +158,13 @@ FLAGS = (
     "-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse", "-fPIC", "-shared",
 )  # fmt: skip
 """No flag lets the compiler round differently from CasADi's virtual machine, so results do not
-depend
-on the engine: no fused multiply-add, no reciprocals (repeated divisions are taken out of the graph
-instead), no reordering. Common subexpressions have been removed already; searching for them would
-take
-a third of the compile time.
+depend on the engine: no fused multiply-add, no reciprocals (repeated divisions are taken out of the
+graph instead), no reordering. Common subexpressions have been removed already; searching for them
+would take a third of the compile time.
 """
 
 OF_GCC = ("-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse")
 """Flags of gcc only; clang rejects them."""
-NICENESS = 10
-"""Niceness of a background compiler."""
-
 _close: Callable[[int], None] | None = getattr(sys.modules["_ctypes"], "dlclose", None)
 
 
@@ -235,12 +215,22 @@ def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
     compiler = needed_compiler()
     key, problems = key_of(source, compiler, flags), list[str]()
     for place in caches():
-        known = place.find(key)
         try:
-            if known is None:
-                known = _made(place, key, source, (compiler, flags), names)
-            opened(known, names)
-            return known
+            path = place.find(key)
+            if path is None:
+                with place.new(key) as temporary:
+                    arguments, variables = call_of(compiler, flags, temporary)
+                    try:
+                        compiler.run(*arguments, code=source, variables=variables)
+                    except CompileError as error:
+                        raise CompileError(f"compile: {first_error(str(error))}") from None
+                    opened(temporary, names)  # do not keep an unusable library
+                place.evict()
+                path = place.find(key)
+            if path is None:
+                raise OSError(0, "the stored file differs from the one written")
+            opened(path, names)
+            return path
         except OSError as error:
             problems.append(f"{place.folder} ({error.strerror or error})")
     raise CompileError(
@@ -250,118 +240,17 @@ def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
     )
 
 
-def _made(
-    place: Cache,
-    key: str,
-    source: str,
-    how: tuple[Compiler, tuple[str, ...]],
-    names: tuple[str, ...],
-) -> Path:
-    """Compile `source` into a cache with a compiler and its flags; return the library."""
-    compiler, flags = how
-    with place.new(key) as temporary:
-        try:
-            compiler.run(
-                *_arguments(compiler, flags, temporary), code=source, variables=_folders(place)
-            )
-        except CompileError as error:
-            raise CompileError(f"compile: {first_error(str(error))}") from None
-        opened(temporary, names)  # do not keep an unusable library
-    place.evict()
-    found = place.find(key)
-    if found is None:
-        raise OSError(0, "the stored file differs from the one written")
-    return found
+def call_of(
+    compiler: Compiler, flags: tuple[str, ...], path: Path
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return arguments and environment variables to compile standard input to the file `path`.
 
-
-def _arguments(compiler: Compiler, flags: tuple[str, ...], path: Path) -> tuple[str, ...]:
+    Temporary files of the compiler are in the folder of that file.
+    """
     if is_clang(compiler):
         flags = tuple(flag for flag in flags if flag not in OF_GCC)
-    return (*flags, "-x", "c", "-", "-o", str(path), "-lm")
-
-
-def _folders(place: Cache) -> dict[str, str]:
-    """Return environment variables for the compiler's temporary files."""
-    return {name: str(place.folder) for name in ("TMPDIR", "TMP", "TEMP")}
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Unfinished:
-    """Library whose compiler runs in the background.
-
-    Attributes:
-        process: the compiler.
-        path: of the temporary file that it writes.
-        place, key: cache and key of the library.
-        names: that it defines.
-        limit: time [s] at which it is given up, on the clock of `perf_counter`.
-    """
-
-    process: subprocess.Popen[bytes]
-    path: Path
-    place: Cache
-    key: str
-    names: tuple[str, ...]
-    limit: float
-
-    def finish(self) -> bool:
-        """Return True if the compiler has finished, after storing the library in the cache.
-
-        Raises:
-            CompileError: an error in the source, a timeout, or an unusable library.
-        """
-        status = self.process.poll()
-        if status is None and perf_counter() < self.limit:
-            return False
-        try:
-            if status != 0:
-                raise CompileError(f"compile: status {status}")
-            opened(self.path, self.names)
-            self.place.keep(self.key, self.path)
-        except OSError as error:
-            raise CompileError(f"compile: {error}") from None
-        finally:
-            self.stop()
-        self.place.evict()
-        return True
-
-    def stop(self) -> None:
-        """Stop the compiler if it still runs, and delete its output."""
-        end(self.process)
-        with suppress(OSError):
-            self.path.unlink()
-
-
-def begun(source: str, names: tuple[str, ...]) -> Unfinished:
-    """Start compiling `source`, which defines `names`, at low priority.
-
-    Raises:
-        CompileError: no compiler, no writable cache, or it does not start.
-    """
-    compiler = needed_compiler()
-    key = key_of(source, compiler, FLAGS)
-    for place in caches():
-        with suppress(OSError), TemporaryFile() as text:
-            text.write(source.encode())
-            text.seek(0)
-            path = place.begin(key)
-            try:
-                process = started(
-                    (*compiler.command, *_arguments(compiler, FLAGS, path)),
-                    stdin=text,
-                    variables=_folders(place),
-                    name=str(compiler),
-                )
-            except ProgramError as error:
-                path.unlink()
-                raise CompileError(str(error)) from None
-            if hasattr(os, "setpriority"):
-                with suppress(OSError):
-                    os.setpriority(os.PRIO_PGRP, process.pid, NICENESS)
-            limit = perf_counter() + patience(source)
-            return Unfinished(process, path, place, key, names, limit)
-    raise CompileError("compile: expected a place to keep compiled code, found none")
+    arguments = (*flags, "-x", "c", "-", "-o", str(path), "-lm")
+    return arguments, dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(path.parent))
 
 
 def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:

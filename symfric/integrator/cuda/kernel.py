@@ -6,9 +6,7 @@ arithmetic is tested without a graphics processor.
 
 from dataclasses import dataclass
 from pathlib import Path
-from string import Template
 from typing import final
-from weakref import WeakKeyDictionary
 
 from symfric.emitter.c99 import DOUBLE, Real
 from symfric.integrator.compiled.columns import densified
@@ -16,47 +14,28 @@ from symfric.integrator.equations.blocks import DONE, ROUNDS
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
-from symfric.integrator.step.pieces import Written, in_c, macros
-
-BLOCK = 64
-"""Threads of a block: few, since each holds hundreds of numbers."""
+from symfric.integrator.step.pieces import in_c, macros
 
 NAME = "symfric_launch"
-
 DONE_IN_SINGLE = 1e-5
-"""Value of `following.DONE` in single precision: beyond it is rounding."""
+"""Value of `blocks.DONE` in single precision: beyond it is rounding."""
 
-ON_DEVICE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
+BEFORE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
 #define HUGE_VALF __int_as_float(0x7f800000)
 #define DEVICE __device__
 #define BESIDE __device__ __noinline__
 #define TICKET(count) atomicAdd(count, 1)
 """
-"""Prefix for NVRTC, which has no header; functions of math.h are built in."""
+"""Lines for NVRTC before the text. It has no header; functions of math.h are built in."""
 
-LAUNCH_ON_DEVICE = Template("""
-extern "C" __global__ void $name(const Many *all)
-{
+AFTER = f"""
+extern "C" __global__ void {NAME}(const Many *all)
+{{
     symfric_thread(all);
-}
-""")
+}}
+"""
 """Launch without `__launch_bounds__`: with it, the assembler left a six-joint arm 32 registers of
 255."""
-
-ON_HOST = """#include <math.h>
-#include <stdbool.h>
-#define DEVICE inline
-#define BESIDE
-#define TICKET(count) ((*(count))++)
-"""
-
-LAUNCH_ON_HOST = Template("""
-/* Runs the threads one after another. */
-void $name(const Many *all, long long threads)
-{
-    for (long long i = 0; i < threads; ++i) symfric_thread(all);
-}
-""")
 
 
 @final
@@ -82,23 +61,9 @@ class Kernel:
     signals: int
     operations: int
 
-    @property
-    def on_device(self) -> str:
-        """CUDA C++ for NVRTC; the kernel is `symfric_launch(const Many *)`."""
-        end = LAUNCH_ON_DEVICE.substitute(name=NAME)
-        return f"{ON_DEVICE}{self.text}{end}"
-
-    @property
-    def on_host(self) -> str:
-        """C99 that does the same on this machine, `symfric_launch(const Many *, long long)`."""
-        return f"{ON_HOST}{self.text}{LAUNCH_ON_HOST.substitute(name=NAME)}"
-
-
-_KNOWN: WeakKeyDictionary[Integrator, dict[tuple[bool, str], Kernel]] = WeakKeyDictionary()
-
 
 def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE) -> Kernel:
-    """Return the kernel of an integrator's attempt, written once and cached during its lifetime.
+    """Return the kernel of an integrator's attempt, written once and cached with it.
 
     Args:
         integrator: of a model without events.
@@ -108,7 +73,7 @@ def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE)
     Raises:
         ValueError: an operation that C does not have.
     """
-    known = _KNOWN.setdefault(integrator, {})
+    known: dict[tuple[bool, str], Kernel] = integrator.memory.setdefault("kernels", {})
     key = between, real.name
     if key not in known:
         known[key] = _written(integrator, between, real)
@@ -138,20 +103,10 @@ def _written(integrator: Integrator, between: bool, real: Real) -> Kernel:
         }  # fmt: skip
         places = ("y", "d"), ("after", "look")
         functions.append(in_c(follow.round, "symfric_round", *places, real, head))
-    return Kernel(
-        _text(functions, sizes, real),
-        real,
-        step.numel_in(0),
-        step.numel_in(1),
-        system.nx,
-        signals.numel_out(0),
-        functions[0].operations,
-    )
-
-
-def _text(functions: list[Written], sizes: dict[str, object], real: Real) -> str:
     written = "\n".join(one.text for one in functions)
     defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
     loop = Path(__file__).with_name("members.h").read_text(encoding="utf-8")
     # define sizes after the written functions, whose arguments may have the same names
-    return f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n{defined}\n{loop}"
+    text = f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n{defined}\n{loop}"
+    numbers = step.numel_in(0), step.numel_in(1), system.nx, signals.numel_out(0)
+    return Kernel(text, real, *numbers, functions[0].operations)

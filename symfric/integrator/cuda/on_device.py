@@ -1,6 +1,5 @@
-"""Members of an ensemble on a graphics processor: the job of their chunks, and their launches."""
+"""Members of an ensemble on a graphics processor: the task of their chunks, and their launches."""
 
-import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -10,17 +9,19 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda.device import CupyDevice, Device, Held, Loaded
+from symfric.integrator.cuda.device import Device, Loaded
 from symfric.integrator.cuda.kernel import Kernel, kernel_of
-from symfric.integrator.many.chunk import Job
-from symfric.integrator.many.members import Advanced, Counts, Stretch
-from symfric.integrator.many.program import program
+from symfric.integrator.many.chunk import Chunk, Job, Solved
+from symfric.integrator.many.member_data import MemberData
+from symfric.integrator.many.members import Advanced, Counts, Stretch, struct
+from symfric.integrator.many.program import Program, program
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import State
 from symfric.model import Model
 
 Array = NDArray[np.float64]
+WHERE = "simulate_many: backend='cuda'"
 FRESH = 8
 """Reason of a member that was not started (`members.h`)."""
 FIRST, LAUNCH = 32, 0.25
@@ -31,192 +32,6 @@ FASTER = 4.0
 """Largest ratio of the budget of a launch to the one before."""
 SHARE = 0.8
 """Fraction of the free memory of a device that members may take."""
-
-_POINTER, _COUNT = ctypes.c_void_p, ctypes.c_longlong
-
-
-class Many(ctypes.Structure):
-    """Struct `Many` of members.h."""
-
-    _fields_ = (
-        ("S", _POINTER), ("R", _POINTER), ("t", _POINTER), ("members", _COUNT),
-        ("breaks", _POINTER), ("intervals", _COUNT),
-        ("data", _POINTER), ("n_data", _COUNT), ("data_step", _COUNT),
-        ("ends", _POINTER), ("h_min", _POINTER),
-        ("times", _POINTER), ("n_times", _COUNT), ("times_step", _COUNT), ("max_attempts", _COUNT),
-        ("follow", _COUNT),
-        ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("reach", _POINTER),
-        ("interval", _POINTER), ("next", _POINTER),
-        ("todo", _POINTER), ("n_todo", _COUNT), ("budget", _COUNT), ("ticket", _POINTER),
-    )  # fmt: skip
-
-
-@final
-@dataclass(eq=False)
-class DeviceMembers:
-    """Members on a device, one per thread; see `symfric.integrator.many.members.Members`.
-
-    Mutable in its counters, for reports and tests.
-
-    Attributes:
-        kernel: source and sizes.
-        device: that runs it.
-        loaded: the kernel on the device.
-        tell: called between launches with the number of finished members of this call.
-        launches: number of launches.
-        budget: attempts of a thread in the next launch.
-    """
-
-    kernel: Kernel
-    device: Device
-    loaded: Loaded
-    tell: Callable[[int], None] | None = None
-    launches: int = 0
-    budget: int = FIRST
-
-    @classmethod
-    def of(cls, kernel: Kernel, device: Device) -> "DeviceMembers":
-        """Compile a kernel for its members; raises as `Device.load`."""
-        return cls(kernel, device, device.load(kernel))
-
-    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
-        """Advance members over a stretch, as many at once as fit in the device memory.
-
-        Raises:
-            DeviceError: an error of the device.
-            MemoryError: not enough memory for a single member.
-            KeyboardInterrupt: Ctrl-C, between two launches.
-        """
-        count = S.shape[0]
-        shape = (count, stretch.times.shape[1], self.kernel.signals)
-        found, reason = np.empty(shape), np.empty(count, dtype=np.int64)
-        reach = np.stack([S[:, State.Y]] * 2, axis=1)
-        first, most = 0, self._most(stretch)
-        while first < count:
-            pick = slice(first, min(first + most, count))
-            try:
-                part = _Part.of(self, pick, (S, R, made, reach), stretch)
-            except MemoryError:
-                if most == 1:
-                    raise
-                most = (most + 1) // 2  # another process took some memory
-                continue
-            part.whole()
-            found[pick], reason[pick] = part.results(S[pick], made[pick], reach[pick])
-            first = pick.stop
-        return found, reason, reach
-
-    def _most(self, stretch: Stretch) -> int:
-        """Return the number of members that fit in memory."""
-        return max(1, int(SHARE * self.device.free / member_bytes(self.kernel, stretch)))
-
-    def launched(self, spent: float) -> None:
-        """Count a launch that took `spent` seconds, and set the budget of the next one."""
-        self.launches += 1
-        factor = LAUNCH / max(spent, LAUNCH / FASTER)
-        self.budget = max(1, int(self.budget * min(factor, FASTER)))
-
-
-def member_bytes(kernel: Kernel, stretch: Stretch) -> int:
-    """Return the memory of a member on a device [bytes]."""
-    numbers = kernel.rows + kernel.given + 2 * kernel.states
-    numbers += stretch.times.shape[1] * kernel.signals
-    numbers += stretch.data[0].size if stretch.data.shape[0] > 1 else 0
-    doubles = 3 + (stretch.times.shape[1] if stretch.times.shape[0] > 1 else 0)
-    return kernel.real.size * numbers + 8 * (doubles + 1) + 4 * 4
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """Members that are on the device together.
-
-    Attributes:
-        of_all: runs them.
-        count: number of members.
-        held: their arrays there, by the names of the struct.
-        numbers: its other fields.
-    """
-
-    of_all: DeviceMembers
-    count: int
-    held: dict[str, Held]
-    numbers: dict[str, int]
-
-    @classmethod
-    def of(
-        cls,
-        members: DeviceMembers,
-        pick: slice,
-        columns: tuple[Array, Array, Counts, Array],
-        stretch: Stretch,
-    ) -> "_Part":
-        """Copy members to the device; raises MemoryError."""
-        device, kernel = members.device, members.kernel
-        real: DTypeLike = np.float32 if kernel.real.size < 8 else np.float64
-        S, R, made, reach = (column[pick] for column in columns)
-        data = stretch.data[pick] if stretch.data.shape[0] > 1 else stretch.data
-        times = stretch.times[pick] if stretch.times.shape[0] > 1 else stretch.times
-        count = S.shape[0]
-        given: dict[str, tuple[NDArray[Any], DTypeLike]] = {
-            "S": (S.T, real), "R": (R.T, real), "t": (S[:, State.T], float),
-            "breaks": (stretch.breaks, float), "data": (data, real),
-            "ends": (stretch.ends[pick], float), "h_min": (stretch.h_min[pick], float),
-            "times": (times, float), "made": (made, np.int64),
-            "reach": (reach[:, :, : kernel.states].transpose(1, 2, 0), real),
-        }  # fmt: skip
-        held: dict[str, Held] = {
-            name: device.put(np.ascontiguousarray(array, dtype=kind))
-            for name, (array, kind) in given.items()
-        }
-        shape = (count, times.shape[1], kernel.signals)
-        held["out"] = device.full(shape, np.nan, real)
-        held["reason"] = device.full((count,), FRESH, np.int32)
-        held["interval"] = device.full((count,), 0, np.int32)
-        held["next"] = device.full((count,), 0, np.int32)
-        numbers = {
-            "members": count, "intervals": data.shape[2], "n_data": data.shape[1],
-            "data_step": data[0].size if data.shape[0] > 1 else 0, "n_times": times.shape[1],
-            "times_step": times.shape[1] if times.shape[0] > 1 else 0,
-            "max_attempts": stretch.max_steps, "follow": int(stretch.follow),
-        }  # fmt: skip
-        return cls(members, count, held, numbers)
-
-    def whole(self) -> None:
-        """Launch until all members are finished.
-
-        Unfinished members are regrouped: a warp with one member left would run for it alone.
-        """
-        all_, device, loaded = self.of_all, self.of_all.device, self.of_all.loaded
-        todo = np.arange(self.count, dtype=np.int32)
-        while todo.size:
-            own = {"todo": device.put(todo), "ticket": device.full((1,), 0, np.int32)}
-            many = Many(
-                **{name: array.address for name, array in (self.held | own).items()},
-                **self.numbers,
-                n_todo=todo.size,
-                budget=all_.budget,
-            )
-            began = perf_counter()
-            loaded(bytes(many), min(todo.size, loaded.threads))
-            all_.launched(perf_counter() - began)
-            reason = self.held["reason"].get()
-            begun, waiting = np.flatnonzero(reason == Stop.FULL), np.flatnonzero(reason == FRESH)
-            todo = np.concatenate([begun, waiting]).astype(np.int32)
-            if all_.tell is not None:
-                all_.tell(self.count - todo.size)
-
-    def results(self, S: Array, made: Counts, reach: Array) -> tuple[Array, Counts]:
-        """Return signals and reasons; overwrite S, made and reach."""
-        S[:] = self.held["S"].get().T
-        S[:, State.T] = self.held["t"].get()
-        made[:] = self.held["made"].get()
-        kept = self.held["reach"].get().transpose(2, 0, 1)
-        reach[:, :, : kept.shape[2]] = kept
-        return self.held["out"].get(), self.held["reason"].get().astype(np.int64)
-
-
-WHERE = "simulate_many: backend='cuda'"
 OPERATIONS, BYTES = 2**30, 2**30
 """Limits on the operations of one attempt of all members of a chunk, and on their results and data
 [bytes]: small members fill all threads of the largest devices several times, and chunks of large
@@ -224,15 +39,11 @@ ones are small enough to keep results after an interrupt.
 """
 LOOSEST = 1e-5
 """Smallest relative tolerance that single precision meets."""
-
-
-def find_device() -> Device:
-    """Return the graphics processor of this machine.
-
-    Raises:
-        DeviceError: no device, or no CuPy.
-    """
-    return CupyDevice.found()
+Many = struct(
+    "S R t members breaks intervals data n_data data_step ends h_min times n_times times_step "
+    "max_attempts follow out reason made reach interval next todo n_todo budget ticket"
+)
+"""Struct `Many` of members.h."""
 
 
 def check(model: Model, executor: object, workers: object, rtol: float, real: str) -> None:
@@ -258,17 +69,24 @@ def check(model: Model, executor: object, workers: object, rtol: float, real: st
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class OnDevice:
-    """Ensemble on a device.
+    """Task on a device, and runner of its members, one per thread; mutable in its progress.
 
     Attributes:
         job: data shared by all chunks.
-        members: that run them.
+        kernel: source and sizes.
+        device, loaded: that runs the members, and the kernel on it.
+        tell: called between launches with the number of finished members of this call.
+        budget: attempts of a thread in the next launch.
     """
 
     job: Job
-    members: DeviceMembers
+    kernel: Kernel
+    device: Device
+    loaded: Loaded
+    tell: Callable[[int], None] | None = None
+    budget: int = FIRST
 
     @classmethod
     def of(
@@ -280,16 +98,30 @@ class OnDevice:
             DeviceError: there is no device, or it rejects the kernel.
             ValueError: an operation that C does not have.
         """
-        device = find_device()
+        device = Device.found()
         between = not np.isin(times, breaks).all()
         kernel = kernel_of(integrator, between, REALS[real])
         # the results depend on the code of the kernel
         own = replace(program(integrator, False), code=kernel.text)
-        return cls(Job(own, breaks, times, max_steps), DeviceMembers.of(kernel, device))
+        return cls(Job(own, breaks, times, max_steps), kernel, device, device.load(kernel))
 
-    def chunk(self, own_data: int) -> int:
-        """Return the number of members of a chunk with this many input data per member."""
-        return chunk_of(self.members.kernel, max(1, self.job.times.size), own_data)
+    @property
+    def program(self) -> Program:
+        """Equations that the results depend on."""
+        return self.job.program
+
+    def solve(self, chunk: Chunk) -> Solved:
+        """Integrate the members of a chunk."""
+        return self.job.solve(chunk, self)
+
+    def chunk(self, given: MemberData) -> int:
+        """Return the number of members of a chunk; equal on all devices, so that stored results are
+        found again.
+        """
+        kernel, own = self.kernel, given.inputs.values.size if given.own else 0
+        numbers = kernel.rows + kernel.given + max(1, self.job.times.size) * kernel.signals + own
+        size = kernel.real.size * numbers
+        return max(1, min(OPERATIONS // kernel.operations, BYTES // size))
 
     def report(self, progress: Callable[[float], None], done: Callable[[], int], of: int) -> None:
         """Report progress between launches; `done()` counts the members in finished chunks."""
@@ -302,12 +134,94 @@ class OnDevice:
                 most = fraction
                 progress(fraction)
 
-        self.members.tell = tell
+        self.tell = tell
+
+    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
+        """Advance members over a stretch, as many at once as fit in the device memory.
+
+        Raises:
+            DeviceError: an error of the device.
+            MemoryError: not enough memory for a single member.
+            KeyboardInterrupt: Ctrl-C, between two launches.
+        """
+        count = S.shape[0]
+        shape = (count, stretch.times.shape[1], self.kernel.signals)
+        found, reason = np.empty(shape), np.empty(count, dtype=np.int64)
+        reach = np.stack([S[:, State.Y]] * 2, axis=1)
+        first, most = 0, max(1, int(SHARE * self.device.free / member_bytes(self.kernel, stretch)))
+        while first < count:
+            pick = slice(first, min(first + most, count))
+            try:
+                columns = S[pick], R[pick], made[pick], reach[pick]
+                self._run(columns, stretch[pick], found[pick], reason[pick])
+            except MemoryError:
+                if most == 1:
+                    raise
+                most = (most + 1) // 2  # another process took some memory
+                continue
+            first = pick.stop
+        return found, reason, reach
+
+    def _run(
+        self, columns: tuple[Array, Array, Counts, Array], stretch: Stretch, found: Array,
+        reason: Counts,
+    ) -> None:  # fmt: skip
+        """Run members that are on the device together; overwrites all but the run data R.
+
+        Raises:
+            MemoryError: the members do not fit; nothing has changed then.
+        """
+        (S, R, made, reach), cupy, states = columns, self.device.cupy, self.kernel.states
+        real: DTypeLike = np.float32 if self.kernel.real.size < 8 else np.float64
+        given: dict[str, tuple[NDArray[Any], DTypeLike]] = {
+            "S": (S.T, real), "R": (R.T, real), "t": (S[:, State.T], float),
+            "breaks": (stretch.breaks, float), "data": (stretch.data, real),
+            "ends": (stretch.ends, float), "h_min": (stretch.h_min, float),
+            "times": (stretch.times, float), "made": (made, np.int64),
+            "reach": (reach[:, :, :states].transpose(1, 2, 0), real),
+        }  # fmt: skip
+        held: dict[str, Any] = {
+            name: cupy.asarray(np.ascontiguousarray(array, dtype=kind))
+            for name, (array, kind) in given.items()
+        }
+        held["out"] = cupy.full(found.shape, np.nan, real)
+        held["reason"] = cupy.full(reason.shape, FRESH, np.int32)
+        held |= {name: cupy.full(reason.shape, 0, np.int32) for name in ("interval", "next")}
+        self._launch(held, stretch.numbers | {"members": reason.size})
+        S[:] = held["S"].get().T
+        S[:, State.T], made[:] = held["t"].get(), held["made"].get()
+        reach[:, :, :states] = held["reach"].get().transpose(2, 0, 1)
+        found[:], reason[:] = held["out"].get(), held["reason"].get()
+
+    def _launch(self, held: dict[str, Any], numbers: dict[str, int]) -> None:
+        """Launch until all members are finished.
+
+        Unfinished members are regrouped: a warp with one member left would run for it alone.
+        """
+        cupy, todo = self.device.cupy, np.arange(numbers["members"], dtype=np.int32)
+        while todo.size:
+            own = {"todo": cupy.asarray(todo), "ticket": cupy.full((1,), 0, np.int32)}
+            addresses = {name: int(array.data.ptr) for name, array in (held | own).items()}
+            many = Many(**addresses, **numbers, n_todo=todo.size, budget=self.budget)
+            began = perf_counter()
+            self.loaded(bytes(many), todo.size)
+            self.launched(perf_counter() - began)
+            reason = held["reason"].get()
+            begun, waiting = np.flatnonzero(reason == Stop.FULL), np.flatnonzero(reason == FRESH)
+            todo = np.concatenate([begun, waiting]).astype(np.int32)
+            if self.tell is not None:
+                self.tell(numbers["members"] - todo.size)
+
+    def launched(self, spent: float) -> None:
+        """Set the budget of the launch after one that took `spent` seconds."""
+        factor = LAUNCH / max(spent, LAUNCH / FASTER)
+        self.budget = max(1, int(self.budget * min(factor, FASTER)))
 
 
-def chunk_of(kernel: Kernel, times: int, own_data: int) -> int:
-    """Return the members of a chunk; equal on all devices, so that stored results are found
-    again.
-    """
-    size = kernel.real.size * (kernel.rows + kernel.given + times * kernel.signals + own_data)
-    return max(1, min(OPERATIONS // kernel.operations, BYTES // size))
+def member_bytes(kernel: Kernel, stretch: Stretch) -> int:
+    """Return the memory of a member on a device [bytes]."""
+    numbers = kernel.rows + kernel.given + 2 * kernel.states
+    numbers += stretch.times.shape[1] * kernel.signals
+    numbers += stretch.data[0].size if stretch.data.shape[0] > 1 else 0
+    doubles = 3 + (stretch.times.shape[1] if stretch.times.shape[0] > 1 else 0)
+    return kernel.real.size * numbers + 8 * (doubles + 1) + 4 * 4

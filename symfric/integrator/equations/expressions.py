@@ -28,7 +28,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import reciprocal
+from symfric.foundation.numeric import applied, reciprocal, walk
 from symfric.integrator.compiled.columns import Columns
 
 Rule = Callable[[int, list[ca.SX]], ca.SX | None]
@@ -40,29 +40,21 @@ def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list
     `rule`.
     """
     symbols = [ca.vertsplit(ca.vec(argument)) for argument in arguments]
-    found = [[ca.SX(0)] * function.nnz_out(i) for i in range(function.n_out())]
-    work: dict[int, ca.SX] = {}
-    for k in range(function.n_instructions()):
+
+    def made(k: int, operands: list[ca.SX]) -> ca.SX:
         operation = function.instruction_id(k)
-        at, to = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            found[to[0]][to[1]] = work[at[0]]
-        elif operation == ca.OP_INPUT:
-            work[to[0]] = symbols[at[0]][at[1]]
-        elif operation == ca.OP_CONST:
-            work[to[0]] = ca.SX(function.instruction_constant(k))
-        else:
-            operands = [work[i] for i in at]
-            value = rule(k, operands)
-            work[to[0]] = applied(operation, operands) if value is None else value
+        if operation == ca.OP_INPUT:
+            argument, row = function.instruction_input(k)
+            return symbols[argument][row]
+        if operation == ca.OP_CONST:
+            return ca.SX(function.instruction_constant(k))
+        value = rule(k, operands)
+        return applied(operation, operands) if value is None else value
+
     return [
-        ca.SX(function.sparsity_out(i), ca.vertcat(ca.SX(0, 1), *v)) for i, v in enumerate(found)
+        ca.SX(function.sparsity_out(i), ca.vertcat(ca.SX(0, 1), *v))
+        for i, v in enumerate(walk(function, made))
     ]
-
-
-def applied(operation: int, operands: list[ca.SX]) -> ca.SX:
-    """Apply one CasADi operation."""
-    return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
 
 
 MIDDLE = 0.7

@@ -4,7 +4,7 @@ Both advance the members' columns S in place and return their signals; no steps 
 """
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, final
 
 import casadi as ca
@@ -44,6 +44,9 @@ MOST_INSTRUCTIONS = 10_000
 """Steps with more instructions take compilers too long as vectors."""
 
 
+Advanced = tuple[Array, Counts, Array]
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Stretch:
@@ -67,9 +70,21 @@ class Stretch:
     max_steps: int
     follow: bool = False
 
+    def __getitem__(self, pick: slice) -> "Stretch":
+        data, times = (a[pick] if a.shape[0] > 1 else a for a in (self.data, self.times))
+        ends, h_min = self.ends[pick], self.h_min[pick]
+        return replace(self, data=data, times=times, ends=ends, h_min=h_min)
 
-Follow = tuple[str, float] | tuple[()]
-Advanced = tuple[Array, Counts, Array]
+    @property
+    def numbers(self) -> dict[str, int]:
+        """Numbers of the struct `Many` in C; a step of 0 is common data."""
+        data, times = self.data, self.times
+        return {
+            "intervals": data.shape[2], "n_data": data.shape[1],
+            "data_step": data[0].size if data.shape[0] > 1 else 0,
+            "n_times": times.shape[1], "times_step": times.shape[1] if times.shape[0] > 1 else 0,
+            "max_attempts": self.max_steps, "follow": self.follow,
+        }  # fmt: skip
 
 
 class Members(Protocol):
@@ -86,8 +101,8 @@ class Members(Protocol):
 
         Returns:
             Signals (members, times, signals), NaN after a member stopped; reasons to stop
-            (members,);
-            least and greatest unknowns at the start and the ends of steps (members, 2, n).
+            (members,); least and greatest unknowns at the start and the ends of steps (members, 2,
+            n).
         """
         ...
 
@@ -101,67 +116,44 @@ class VmMembers:
     signals: Columns
     follow: Following | None
 
-    @classmethod
-    def of(cls, step: str, signals: str, follow: Follow) -> "VmMembers":
-        """Build from the serialised Functions of the step, the signals and the update after
-        jumps.
-        """
-        engine = VmEngine(ca.Function.deserialize(step), follows=bool(follow))
-        how = None
-        if follow and follow[0]:
-            how = Following(ca.Function.deserialize(follow[0]), follow[1])
-        return cls(engine, Columns(ca.Function.deserialize(signals)), how)
-
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch."""
-        members, n = S.shape[0], S.shape[1] - State.MEMORY
-        step, n_d = self.engine.step, self.signals.function.numel_in(2)
-        found = np.full(
-            (members, stretch.times.shape[1], self.signals.function.numel_out(0)), np.nan
-        )
+        members, n, signals = S.shape[0], S.shape[1] - State.MEMORY, self.signals.function
+        step, n_d, breaks = self.engine.step, signals.numel_in(2), stretch.breaks
+        found = np.full((members, stretch.times.shape[1], signals.numel_out(0)), np.nan)
         reason, reach = np.zeros(members, dtype=np.int64), np.stack([S[:, State.Y]] * 2, axis=1)
         work = Work(n, step.numel_in(1), step.numel_out(1) // n, ROWS)
-        for m in range(members):
+        for m, end in enumerate(stretch.ends.tolist()):
+            times, data = (rows[m % rows.shape[0]] for rows in (stretch.times, stretch.data))
+            first = int(np.searchsorted(times, breaks[0]))
+            own = np.concatenate([breaks[:1], breaks[1:][breaks[1:] < end], [end]])
             work.S[:], work.R[:] = S[m], R[m]
-            at, y, made[m], reason[m] = self._member(work, stretch, m, int(made[m]), reach[m])
-            S[m] = work.S
+            work.want(Outputs.at(times[first:], n), None)
+            work.over(own, data[:, : own.size - 1])
+            work.loop.h_min = stretch.h_min[m]
+            made[m], reason[m] = self._advance(work, stretch, int(made[m]), reach[m])
+            S[m], outputs = work.S, work.outputs
+            at = outputs.times[: outputs.found]
             d = np.tile(work.R[work.R.size - n_d :], (at.size, 1))
             d[:, n_d - work.data.shape[0] :] = work.data[:, work.interval(at)].T
-            first = int(
-                np.count_nonzero(stretch.times[m % stretch.times.shape[0]] < stretch.breaks[0])
-            )
-            found[m, first : first + at.size] = self.signals([at, y, d])[0]
+            found[m, first : first + at.size] = self.signals([at, outputs.reached.T, d])[0]
         return found, reason, reach
 
-    def _member(
-        self, work: Work, stretch: Stretch, m: int, made: int, reach: Array
-    ) -> tuple[Array, Array, int, Stop]:
-        """Advance a member.
-
-        Returns:
-            Times that it reached, unknowns there, attempts made, reason to stop.
-        """
-        breaks, end = stretch.breaks, stretch.ends[m]
-        breaks = np.concatenate([breaks[:1], breaks[1:][breaks[1:] < end], [end]])
-        times, data = (rows[m % rows.shape[0]] for rows in (stretch.times, stretch.data))
-        outputs = Outputs.at(times[times >= breaks[0]], work.n)
-        work.want(outputs, None)
-        work.over(breaks, data[:, : breaks.size - 1])
-        work.loop.h_min = stretch.h_min[m]
+    def _advance(self, work: Work, stretch: Stretch, made: int, reach: Array) -> tuple[int, Stop]:
+        """Advance a member; return attempts made and the reason to stop."""
         stop = Stop.SEARCH if stretch.follow else Stop.FULL
         while stop in (Stop.SEARCH, Stop.FULL) or (
             stop is Stop.ATTEMPTS and made < stretch.max_steps
         ):
             if stop is Stop.SEARCH and not self._follows(work):
-                break
+                return made, stop
             allowed = min(ATTEMPTS, stretch.max_steps - made)
             records, count, stop = self.engine.march(work, allowed)
             ends, made = Dense.of(records, work.n).y1, made + count
             reach[0] = np.minimum(reach[0], ends.min(axis=0, initial=np.inf))
             reach[1] = np.maximum(reach[1], ends.max(axis=0, initial=-np.inf))
-        if stop is not Stop.SEARCH:
-            outputs.stand(work.S[State.T], work.S[State.Y])
-        return outputs.times[: outputs.found], outputs.reached.T, made, stop
+        work.outputs.stand(work.S[State.T], work.S[State.Y])
+        return made, stop
 
     def _follows(self, work: Work) -> bool:
         """Update the algebraic unknowns after a jump of data; return False if that fails."""
@@ -174,21 +166,21 @@ class VmMembers:
         return found is not None
 
 
-_POINTER, _COUNT = ctypes.c_void_p, ctypes.c_longlong
+def struct(names: str) -> type[ctypes.Structure]:
+    """Return a struct of C with fields of these names: `NUMBERS`, and addresses."""
+    kinds = [(n, ctypes.c_longlong if n in NUMBERS else ctypes.c_void_p) for n in names.split()]
+    return type("Many", (ctypes.Structure,), {"_fields_": kinds})
 
 
-class _Many(ctypes.Structure):
-    """Struct `Many` of loop.h."""
-
-    _fields_ = (
-        ("S", _POINTER), ("R", _POINTER), ("members", _COUNT),
-        ("breaks", _POINTER), ("intervals", _COUNT),
-        ("data", _POINTER), ("n_data", _COUNT), ("data_step", _COUNT),
-        ("ends", _POINTER), ("h_min", _POINTER),
-        ("times", _POINTER), ("n_times", _COUNT), ("times_step", _COUNT), ("max_attempts", _COUNT),
-        ("follow", _COUNT),
-        ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("reach", _POINTER),
-    )  # fmt: skip
+NUMBERS = (
+    "members", "intervals", "n_data", "data_step", "n_times", "times_step", "max_attempts",
+    "follow", "n_todo", "budget",
+)  # fmt: skip
+_Many = struct(
+    "S R members breaks intervals data n_data data_step ends h_min times n_times times_step "
+    "max_attempts follow out reason made reach"
+)
+"""Struct `Many` of loop.h."""
 
 
 @final
@@ -217,22 +209,19 @@ class CompiledMembers:
         Raises:
             MemoryError: about a megabyte is missing.
         """
-        members, times, data = S.shape[0], stretch.times, stretch.data
-        found = np.empty((members, times.shape[1], self.signals))
-        starts, reason = np.ascontiguousarray(S), np.zeros(members, dtype=np.int64)
+        found = np.empty((S.shape[0], stretch.times.shape[1], self.signals))
+        starts, reason = np.ascontiguousarray(S), np.zeros(S.shape[0], dtype=np.int64)
         reach = np.stack([S[:, State.Y]] * 2, axis=1)
         given = {
-            "R": R, "breaks": stretch.breaks, "data": data, "ends": stretch.ends,
-            "h_min": stretch.h_min, "times": times,
-        }  # fmt: skip
-        arrays: dict[str, NDArray[Any]] = {k: np.ascontiguousarray(a) for k, a in given.items()}
+            name: getattr(stretch, name) for name in ("breaks", "data", "ends", "h_min", "times")
+        }
+        arrays: dict[str, NDArray[Any]] = {
+            name: np.ascontiguousarray(array) for name, array in (given | {"R": R}).items()
+        }
         arrays |= {"S": starts, "out": found, "reason": reason, "made": made, "reach": reach}
         every = _Many(
             **{name: array.ctypes.data for name, array in arrays.items()},
-            members=members, intervals=data.shape[2], n_data=data.shape[1],
-            data_step=data[0].size if data.shape[0] > 1 else 0, n_times=times.shape[1],
-            times_step=times.shape[1] if times.shape[0] > 1 else 0,
-            max_attempts=stretch.max_steps, follow=stretch.follow,
+            members=S.shape[0], **stretch.numbers,
         )  # fmt: skip
         if not self.library.symfric_many(ctypes.byref(every)):
             raise MemoryError
@@ -258,17 +247,14 @@ def many_source(
     n = step.numel_in(0) - State.MEMORY
     step = step if step.is_a("SXFunction") else step.expand()
     groups = 2 if step.n_instructions() < PAIRED else 1
-    (of_step, work), (of_values, more) = (
-        vector_source("symfric_step", step, groups),
-        vector_source("symfric_values", densified(signals)),
-    )
+    of_step, work = vector_source("symfric_step", step, groups)
+    of_values, more = vector_source("symfric_values", densified(signals))
     sizes = {
         "N": n, "MEMORY": State.MEMORY, "T": State.T, "H": State.H, "SIZE_R": step.numel_in(1),
         "T_END": Given.T_END, "N_D": signals.numel_in(2), "ROWS": step.numel_out(1) // n,
         "SIGNALS": signals.numel_out(0), "FLOOR": repr(FLOOR), "WORK": max(work, more),
-        "GROUPS": groups,
+        "GROUPS": groups, "FOLLOWS": 0 if not follows else 1 if follow is None else 2,
     }  # fmt: skip
-    sizes["FOLLOWS"] = 0 if not follows else 1 if follow is None else 2
     jump = ""
     if follow is not None:
         generator = ca.CodeGenerator("symfric_round.c", {"static_aux": True})

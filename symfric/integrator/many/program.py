@@ -1,43 +1,37 @@
-"""Equations of an ensemble as plain data, and projection of start values onto constraints."""
+"""Equations of an ensemble for workers without the model, and projection of start values."""
 
 from dataclasses import dataclass, fields
-from functools import lru_cache, partial
+from functools import cached_property
 from threading import Lock
 from typing import Any, final
-from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, Equations
 from symfric.integrator.equations.manifold import Manifold
-from symfric.integrator.many.members import CompiledMembers, Follow, Members, VmMembers, many_source
+from symfric.integrator.many.members import CompiledMembers, Members, VmMembers, many_source
+from symfric.integrator.running.engine import VmEngine
 from symfric.integrator.running.integrator import Integrator
 
 Array = NDArray[np.float64]
+_LOCK = Lock()
 
 
-@final
-@dataclass(frozen=True, eq=False)
 class Assembly:
-    """Projection of start values onto constraints, for the rows of matrices.
+    """Projection of start values onto the constraints of a mechanism with `nx` states, for rows.
 
     It corresponds to the first part of `symfric.integrator.equations.initial.consistent`.
     """
 
-    manifold: Manifold
-    nx: int
-    defect: Columns
-    project: Columns
-    slope: Columns
-
-    @classmethod
-    def of(cls, manifold: Manifold, nx: int) -> "Assembly":
-        """Build from a mechanism with `nx` states."""
-        functions = (manifold.defect, manifold.project, manifold.slope)
-        return cls(manifold, nx, *(Columns(function) for function in functions))
+    def __init__(self, manifold: Manifold, nx: int) -> None:
+        self.manifold, self.nx = manifold, nx
+        self.defect, self.project, self.slope = (
+            Columns(function) for function in (manifold.defect, manifold.project, manifold.slope)
+        )
 
     def __call__(self, y: Array, d: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Project positions and velocities in rows of y (members, n); return y and a mask of
@@ -73,146 +67,83 @@ class Assembly:
         return right[:, m:].reshape(y.shape[0], -1)
 
 
-Rows = tuple[tuple[float, ...], ...]
-Packed = tuple[tuple[str, str | int], ...]
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Equations of an integrator for workers without the model; picklable.
+    """Equations of an integrator; picklable, without its caches.
 
     Attributes:
         where: for messages.
-        code: C of steps, signals and their loop, or the serialised step for the virtual machine.
-        compiled: True for C.
-        signals: the serialised Function of the signals.
-        n_signals: number of signals.
-        constraints: the serialised algebraic equations, "" if there are none.
-        free: as `System.free`, row by row.
-        manifold: the constraints of a mechanism, Functions serialised; () for other models.
-        names: of the unknowns.
+        code: C of steps, signals and their loop; or the step, for the virtual machine.
+        signals: as `Integrator.signals`.
+        equations: the algebraic equations; None if there are none.
         nominal: typical magnitudes of the differential states.
-        follow: update of algebraic unknowns after jumps of inputs in the virtual machine: the
-            serialised round and its contraction; ("", 0) for a full search, () without such
-            unknowns.
+        follows: True if there are algebraic unknowns, which follow jumps of inputs.
+        follow: fast update of these unknowns; None for a full search.
     """
 
     where: str
-    code: str
-    compiled: bool
-    signals: str
-    n_signals: int
-    constraints: str
-    free: Rows
-    manifold: Packed
-    names: tuple[str, ...]
+    code: str | ca.Function
+    signals: ca.Function
+    equations: Equations | None
     nominal: Array
-    follow: Follow
+    follows: bool
+    follow: Following | None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @property
     def nx(self) -> int:
         """Number of differential states."""
         return self.nominal.size
 
-    def load(self) -> Members:
-        """Return the runner of the members; compiled once in a process."""
-        if self.compiled:
-            return _compiled(self.code, self.n_signals)
-        return _vm(self.code, self.signals, self.follow)
+    @property
+    def n_signals(self) -> int:
+        """Number of signals."""
+        return self.signals.numel_out(0)
 
-    def equations(self) -> tuple[Equations, Columns]:
-        """Return the algebraic equations, and their constraints for many columns."""
-        return _equations(self.names, self.nx, self.free, self.constraints, self.manifold)
+    @cached_property
+    def members(self) -> Members:
+        """Runner of the members; raises CompileError without a working compiler."""
+        if isinstance(self.code, str):
+            return CompiledMembers.of(self.code, self.n_signals)
+        engine = VmEngine(self.code, follows=self.follows)
+        return VmMembers(engine, Columns(self.signals), self.follow)
 
+    @cached_property
+    def constraints(self) -> Columns | None:
+        """Algebraic equations for many columns."""
+        return None if self.equations is None else Columns(self.equations.constraints)
+
+    @cached_property
     def assembly(self) -> Assembly | None:
-        """Return the projection of a mechanism with a fast update of algebraic unknowns, else
-        None.
-        """
-        if not self.manifold or not self.follow or not self.follow[0]:
+        """Projection of a mechanism with a fast update of algebraic unknowns, else None."""
+        if self.equations is None or self.equations.manifold is None or self.follow is None:
             return None
-        return _assembly(self.manifold, self.nx)
-
-
-_KNOWN: WeakKeyDictionary[Integrator, dict[bool, Program]] = WeakKeyDictionary()
-_LOCK = Lock()
+        return Assembly(self.equations.manifold, self.nx)
 
 
 def program(integrator: Integrator, compiled: bool) -> Program:
-    """Return the program of an integrator, written once and cached during its lifetime."""
+    """Return the program of an integrator, written once and cached with it."""
     with _LOCK:
-        known = _KNOWN.setdefault(integrator, {})
+        known: dict[bool, Program] = integrator.memory.setdefault("programs", {})
         if compiled not in known:
             known[compiled] = _written(integrator, compiled)
         return known[compiled]
 
 
 def _written(integrator: Integrator, compiled: bool) -> Program:
-    s, step = integrator.system, integrator.step
+    s, step, signals = integrator.system, integrator.step, integrator.signals
     jumps = integrator.model.u or s.manifold is not None
     follow = integrator.follow if integrator.follows and jumps else None
-    how: Follow = ("", 0.0) if integrator.follows else ()
-    if follow is not None:
-        how = (str(follow.round.serialize()), follow.contraction)
-    source = partial(many_source, step, integrator.signals, integrator.follows, follow)
+    equations = Equations(s.names, s.nx, s.free, s.constraints, s.manifold)
     return Program(
         where=f"simulate_many of '{integrator.model.name}'",
-        code=source() if compiled else str(step.serialize()),
-        compiled=compiled,
-        signals=str(integrator.signals.serialize()),
-        n_signals=integrator.signals.numel_out(0),
-        constraints=str(s.constraints.serialize()) if s.algebraic[0] else "",
-        free=tuple(map(tuple, s.free.tolist())),
-        manifold=_packed(s.manifold),
-        names=s.names,
+        code=many_source(step, signals, integrator.follows, follow) if compiled else step,
+        signals=signals,
+        equations=equations if s.algebraic[0] else None,
         nominal=s.nominal,
-        follow=how,
+        follows=integrator.follows,
+        follow=follow,
     )
-
-
-def _packed(manifold: Manifold | None) -> Packed:
-    """Return a mechanism's constraints as plain data, () if there are none."""
-    if manifold is None:
-        return ()
-    values = ((f.name, getattr(manifold, f.name)) for f in fields(manifold))
-    return tuple(
-        (name, str(value.serialize()) if isinstance(value, ca.Function) else value)
-        for name, value in values
-    )
-
-
-@lru_cache(16)
-def _equations(
-    names: tuple[str, ...],
-    nx: int,
-    free: Rows,
-    constraints: str,
-    manifold: Packed,
-) -> tuple[Equations, Columns]:
-    function = ca.Function.deserialize(constraints)
-    mechanism = _manifold(manifold) if manifold else None
-    return Equations(names, nx, np.array(free), function, mechanism), Columns(function)
-
-
-@lru_cache(16)
-def _manifold(manifold: Packed) -> Manifold:
-    values: dict[str, Any] = {
-        name: ca.Function.deserialize(value) if isinstance(value, str) else value
-        for name, value in manifold
-    }
-    return Manifold(**values)
-
-
-@lru_cache(16)
-def _assembly(manifold: Packed, nx: int) -> Assembly:
-    return Assembly.of(_manifold(manifold), nx)
-
-
-@lru_cache(16)
-def _compiled(code: str, signals: int) -> CompiledMembers:
-    return CompiledMembers.of(code, signals)
-
-
-@lru_cache(16)
-def _vm(step: str, signals: str, follow: Follow) -> VmMembers:
-    return VmMembers.of(step, signals, follow)

@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import archive
+from symfric.foundation import storable
 from symfric.foundation.files import written
 from symfric.integrator.many.chunk import Solved
 
@@ -93,7 +93,7 @@ class Store:
             return False
         try:
             with mark.open("rb") as file:
-                saved = archive.read(file)
+                saved = storable.arrays(file)
             attempts, reached, reach = (saved[n] for n in ("attempts", "reached", "reach"))
             failed = dict(zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True))
             if str(saved["checksum"]) == self._checksum(first, attempts.size):

@@ -7,8 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from symfric.integrator.methods.explicit import Explicit, Exponential, shampine
-from symfric.integrator.methods.implicit import BackwardEuler, Radau, Rosenbrock, through
+from symfric.integrator.methods.families import (
+    BackwardEuler,
+    Explicit,
+    Exponential,
+    Radau,
+    Rosenbrock,
+)
 from symfric.integrator.methods.method import Array, Method
 
 
@@ -24,6 +29,25 @@ def _number(value: str | float) -> float:
     """Return a number or a quotient of two."""
     above, _, below = str(value).partition("/")
     return float(above) / float(below or 1)
+
+
+def shampine(b: Array, D: Array) -> Array:
+    """Return the coefficients H of the quartic with the slopes k_1 and k_s at its ends.
+
+    With the increment r = sum_j b_j k_j and the free term q = sum_j D_j k_j it is
+
+        y_0 + theta [r + (1 - theta) (k_1 - r + theta (2 r - k_1 - k_s + (1 - theta) q))]
+    """
+    first, last = np.eye(b.size)[[0, -1]]
+    return np.array([first - b, 2 * b - first - last + D, -D])
+
+
+def through(c: Array) -> Array:
+    """Return coefficients H of the cubic through 0 and the increments at nodes, the last one 1."""
+    inner, rows = c[:-1], np.eye(c.size)
+    values = (rows[:-1] - inner[:, None] * rows[-1]) / (inner * (1 - inner))[:, None]
+    vandermonde: Array = np.vander(inner, increasing=True)
+    return np.linalg.solve(vandermonde, values)
 
 
 def _explicit(A: Array, D: Array, **fields: Any) -> Explicit:

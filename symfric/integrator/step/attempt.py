@@ -171,22 +171,22 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
 
 def build_fixed(system: System, method: Method) -> ca.Function:
     """Return the bare step (y, h, d) -> y_next, without error control, for derivatives."""
-    return _bare(system, method, "fixed", "y_next", lambda trial: trial.end)
+    arguments, trial = _bare(system, method)
+    return ca.Function("fixed", arguments, [trial.end], list("yhd"), ["y_next"], {"cse": True})
 
 
 def build_dense_step(system: System, method: Method) -> ca.Function:
     """Return the bare step with its dense output, (y, h, d) -> all = (y_next, D), for
     sensitivities.
     """
-    return _bare(system, method, "dense", "all", lambda trial: ca.vertcat(trial.end, *trial.dense))
+    arguments, trial = _bare(system, method)
+    every = ca.vertcat(trial.end, *trial.dense)
+    return ca.Function("dense", arguments, [every], list("yhd"), ["all"], {"cse": True})
 
 
-def _bare(
-    system: System, method: Method, name: str, result: str, of: Callable[[Trial], ca.SX]
-) -> ca.Function:
+def _bare(system: System, method: Method) -> tuple[list[ca.SX], Trial]:
     y, h, d = ca.SX.sym("y", system.n), ca.SX.sym("h"), ca.SX.sym("d", system.d.numel())
-    found = of(steps(system.plain, method)(y, h, d))
-    return ca.Function(name, [y, h, d], [found], ["y", "h", "d"], [result], {"cse": True})
+    return [y, h, d], steps(system.plain, method)(y, h, d)
 
 
 def error_norm(

@@ -1,1 +1,1 @@
-"""Laws, scenes and a solver written apart from symfric: NumPy, SciPy and the standard library."""
+"""Independent laws, scenes and solver: NumPy, SciPy and the standard library only."""

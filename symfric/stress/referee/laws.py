@@ -1,7 +1,7 @@
-"""Ten friction laws as their papers and the manual write them, in plain Python.
+"""Ten friction laws as in their papers and in the manual, in plain Python.
 
-A law is made from its numbers `p` and its forms, and gives F [N] and the rates of its states from
-sliding velocity v [m/s], normal force N [N] and states z:
+A law is created from its numbers `p` and its forms. It returns F [N] and the rates of its states
+for a sliding velocity v [m/s], a normal force N [N] and states z:
 
     force, rates = law(p, forms)(v, N, z)
 """
@@ -15,29 +15,29 @@ Forms = Mapping[str, str]
 
 
 def sign(x: float, width: float) -> float:
-    """Sign of x, rounded to tanh(x / width)."""
+    """Return the sign of x, smoothed to tanh(x / width)."""
     if width == 0.0:
         return float((x > 0) - (x < 0))
     return tanh(x / width)
 
 
 def clip(x: float, low: float, high: float) -> float:
-    """The number between low and high that is nearest to x."""
+    """Return the number between low and high that is nearest to x."""
     return min(max(x, low), high)
 
 
 def decay(x: float) -> float:
-    """exp(-x) for x >= 0, zero where it is below the smallest double."""
+    """Return exp(-x) for x >= 0, zero below the smallest double."""
     return exp(-min(x, 800.0))
 
 
 def power(x: float, n: float, width: float) -> float:
-    """|x|^n, rounded at rest."""
+    """Return |x|^n, smoothed at rest."""
     return x * x if n == 2.0 else (x * x + width * width) ** (n / 2) - width**n
 
 
 def stribeck_weight(p: Numbers, v: float, width: float) -> float:
-    """Exponential exp(-|v/v_s|^delta), rounded at rest for delta other than 2."""
+    """Return exp(-|v/v_s|^delta), smoothed at rest for delta other than 2."""
     u, n, w = v / p["v_s"], p["delta"], width / p["v_s"]
     if n == 2.0 or w == 0.0:
         return decay(abs(u) ** n)
@@ -172,7 +172,7 @@ def elasto_plastic(p: Numbers, _: Forms) -> Rub:
 def bouc_wen(p: Numbers, _: Forms) -> Rub:
     """dz/dt = v/x_0 [A - |z|^n (beta sign(v z) + gamma)],   x_0 = mu_d N / sigma_0,   F = mu_d N z.
 
-    With sign(v), sign(z) and |z| rounded: |v| (beta sign(z) + gamma sign(v)) |z|^n is taken off.
+    With sign(v), sign(z) and |z| smoothed: |v| (beta sign(z) + gamma sign(v)) |z|^n is subtracted.
     """
     mu_d, sigma_0, A, beta, gamma, n = (
         p[k] for k in ("mu_d", "sigma_0", "A", "beta", "gamma", "n")
@@ -187,7 +187,7 @@ def bouc_wen(p: Numbers, _: Forms) -> Rub:
 
 
 def exact_coulomb(p: Numbers, forms: Forms) -> Rub:
-    """F = mu N mode + sigma_2 v while it slides; what rest carries is the scene's.
+    """F = mu N mode + sigma_2 v in sliding; the scene determines the force at rest.
 
     mu = mu_d or, form "stribeck", mu_d + (mu_s - mu_d) exp(-(v/v_s)^2); `z` is the mode.
     """

@@ -1,8 +1,8 @@
-"""Six machines with friction as a textbook writes them, in plain Python.
+"""Six machines with friction as in textbooks, in plain Python.
 
-A scene is made from its numbers `p`, its force over time and a time within the piece between two
-kinks on which it is to hold, and gives the rates of its own states y at t. Each contact asks
-`rub(i, v, N, F_e)` for its friction force, from the sliding velocity v, the normal force N and the
+A scene is created from its numbers `p`, its force over time and a time within the piece between two
+kinks for which it is valid. It returns the rates of its own states y at t. Each contact calls
+`rub(i, v, N, F_e)` for its friction force, with the sliding velocity v, the normal force N and the
 force F_e that it would carry at rest.
 """
 
@@ -17,21 +17,21 @@ Motion = Callable[[float, Sequence[float], Friction], Sequence[float]]
 
 ROUNDING, CLOSE, LOOPS = 4e-16, 1e-11, 60
 WIDTH = 1e-4
-"""Rounding [N] of the length of a bearing's force."""
+"""Smoothing [N] of the length of the force of a bearing."""
 
 
 class UnsolvableError(ArithmeticError):
-    """Accelerations and normal forces that fit each other were not found."""
+    """The search for consistent accelerations and normal forces failed."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A machine: how it moves, and for each contact the state that slides and its value at rest.
+    """Machine: its equations, and for each contact the state that slides and its value at rest.
 
     Attributes:
-        states: how many it has of its own.
-        motion: the equations.
-        slides: per contact, (number of a velocity state, its value where nothing slides).
+        states: number of its own states.
+        motion: equations.
+        slides: for each contact, (number of a velocity state, its value at rest).
         breaks: times at which the equations have a kink [s].
     """
 
@@ -119,7 +119,7 @@ def quarter_car(p: Numbers, _: Force, within: float) -> Scene:
 
 
 def length(*forces: float) -> float:
-    """Length of a force [N], rounded at zero."""
+    """Return the length of a force [N], smoothed at zero."""
     return hypot(*forces, WIDTH) - WIDTH
 
 
@@ -172,9 +172,9 @@ def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
 def settled(
     accelerated: Callable[[list[float]], tuple[list[float], list[float]]], N: list[float]
 ) -> list[float]:
-    """Accelerations under the normal forces N that follow from them, by Broyden's method.
+    """Return accelerations under the normal forces N that follow from them, by Broyden's method.
 
-    N is the first guess, and the result.
+    N is the first guess, and is overwritten with the result.
     """
     n, last = range(len(N)), inf
     a, found = accelerated(N)
@@ -182,7 +182,7 @@ def settled(
     inverse = [[-float(i == j) for j in n] for i in n]  # inverse slope of the gap
     for _ in range(LOOPS):
         size = max(abs(gap[i]) / (1 + found[i]) for i in n)
-        if size <= ROUNDING or last / 2 < size < CLOSE:  # rounding is all that is left
+        if size <= ROUNDING or last / 2 < size < CLOSE:  # only rounding is left
             return a
         step = [max(-sum(inverse[i][j] * gap[j] for j in n), -0.9 * N[i]) for i in n]
         N[:] = [N[i] + step[i] for i in n]

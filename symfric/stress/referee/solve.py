@@ -1,8 +1,8 @@
-"""Motion of the machines in `scenes` under the laws in `laws`, by SciPy.
+"""Motion of the machines of `scenes` with the laws of `laws`, by SciPy.
 
-Smooth laws are solved by LSODA from kink to kink of the force and the machine. Exact Coulomb
-friction is solved from event to event: each contact slides forward, slides back or rests, until
-its slip passes through zero or its load passes mu_s N.
+Smooth laws are solved by LSODA between the kinks of the force and of the machine. Exact Coulomb
+friction is solved from event to event: each contact slides forward, slides back or rests until its
+slip passes through zero or its load passes mu_s N.
 """
 
 import warnings
@@ -20,13 +20,13 @@ from symfric.stress.referee.scenes import SCENES, Force, Scene
 
 Array = NDArray[np.float64]
 EVALUATIONS = 150_000
-"""Calls of the equations after which a solve is given up."""
+"""Largest number of calls of the equations in a solve."""
 PIECES = 200
-"""Steps that a solve takes at least: what SciPy's first estimates of an error may overlook."""
+"""Least number of steps of a solve; SciPy may overlook events in longer steps."""
 EVENTS = 10_000
 CLOSE = 1e-14
 UNKNOWN = {("exact_coulomb", "pendulum_box")}
-"""Rest of two contacts that load each other, which has no equation of its own here."""
+"""Rest of two contacts that load each other, for which there are no equations here."""
 
 
 class GaveUpError(ArithmeticError):
@@ -35,21 +35,28 @@ class GaveUpError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Signal:
-    """A force over time: constant (c), hold or linear (values at t), sine, pulse; see `between`."""
+    """Force over time.
+
+    Attributes:
+        kind: constant (c), hold and linear (values at t), sine (amplitude, rate [rad/s], offset)
+            or pulse (height, start [s], width [s]).
+        values: numbers in parentheses above.
+        t: sample times [s] of hold and linear.
+    """
 
     kind: str
-    values: Sequence[float]
-    t: Sequence[float] = ()
+    values: tuple[float, ...]
+    t: tuple[float, ...] = ()
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Times [s] at which it jumps, bends, or is quickest."""
+        """Times [s] at which it jumps, bends, or changes fastest."""
         if self.kind == "pulse":
             return self.values[1], self.values[1] + self.values[2]
-        return tuple(self.t)
+        return self.t
 
     def between(self, a: float, b: float) -> Force:
-        """The force for times from a to b, between which there is no kink."""
+        """Return the force for times from a to b, between which there is no kink."""
         if self.kind == "constant":
             return lambda t: self.values[0]
         if self.kind == "sine":
@@ -73,14 +80,14 @@ NO_FORCE, SINE = Signal("constant", (0.0,)), Signal("sine", (2.0, pi, 0.0))
 
 @dataclass(frozen=True)
 class Question:
-    """A case as data.
+    """Case as data.
 
     Attributes:
         law, scene, forms, p: names, options, and all numbers of law and scene.
-        signal: the force of a drive.
-        y: start values, the machine's states before those of the laws.
+        y: start values, states of the machine before those of the laws.
         scale: typical sizes of the states.
-        times: when states are requested, from the start to the end [s].
+        times: times of the results, from the start to the end [s].
+        signal: force of a drive.
     """
 
     law: str
@@ -94,12 +101,12 @@ class Question:
 
 
 def knows(law: str, scene: str) -> bool:
-    """True if this law in this scene is written here."""
+    """Return True if there are equations for this law in this scene."""
     return law in LAWS and scene in SCENES and (law, scene) not in UNKNOWN
 
 
 class Motion:
-    """The equations between two kinks: rates of all states, with friction from the laws."""
+    """Equations between two kinks: rates of all states, with friction from the laws."""
 
     def __init__(self, asked: Question, a: float, b: float) -> None:
         law, force = LAWS[asked.law], asked.signal.between(a, b)
@@ -110,7 +117,7 @@ class Motion:
         self.calls = 0
 
     def __call__(self, t: float, y: Sequence[float]) -> list[float]:
-        """Rates of the states at t."""
+        """Return the rates of the states at t."""
         self.calls += 1
         if self.calls > EVALUATIONS:
             raise GaveUpError(f"no end after {EVALUATIONS} evaluations")
@@ -128,11 +135,11 @@ class Motion:
         return [*own, *(rate for of_contact in rates for rate in of_contact)]
 
     def mode(self, i: int) -> int:
-        """Number of the state that is the mode of contact `i`."""
+        """Return the number of the state that is the mode of contact `i`."""
         return self.scene.states + i
 
     def held(self, t: float, y: Array, i: int, mu_s: float) -> Array:
-        """States with contact `i` at rest if that carries the load, else beginning to slide."""
+        """Return states with contact `i` at rest if it carries the load, else starting to slide."""
         velocity, rest = self.scene.slides[i]
         y[velocity], y[self.mode(i)] = rest, 0.0
         self(t, y.tolist())
@@ -141,7 +148,7 @@ class Motion:
         return y
 
     def changed(self, t: float, y: Array, i: int, mu_s: float) -> Array:
-        """States after the mode of contact `i` has ended."""
+        """Return states after the mode of contact `i` has ended."""
         if y[self.mode(i)]:
             return self.held(t, y, i, mu_s)
         self(t, y.tolist())
@@ -150,7 +157,7 @@ class Motion:
 
 
 def solve(asked: Question, rtol: float = 1e-10) -> Array:
-    """States at the requested times, shape (nx, times).
+    """Return states at the requested times, shape (nx, times).
 
     Raises:
         ArithmeticError, ValueError: SciPy gave up, or a number left the range of the equations.
@@ -173,20 +180,20 @@ def solve(asked: Question, rtol: float = 1e-10) -> Array:
 def by_lsoda(
     motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
 ) -> tuple[Array, Array]:
-    """States at `times`, and at the end."""
+    """Return states at `times`, and at the end."""
     from scipy.integrate import odeint  # noqa: PLC0415  (a third of a second)
 
-    at = np.unique([*span, *times])  # LSODA takes no two that differ by rounding alone
+    at = np.unique([*span, *times])  # LSODA needs times that differ by more than rounding
     at = at[np.append(True, np.diff(at) > CLOSE * np.abs(at).max())]
     longest = (asked.times[-1] - asked.times[0]) / PIECES
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the message says it, too
-        states, told = odeint(
+        warnings.simplefilter("ignore")  # the message repeats it
+        states, info = odeint(
             motion, y, at, rtol=rtol, atol=1e-3 * rtol * asked.scale, tcrit=[span[1]],
             tfirst=True, mxstep=10 * EVALUATIONS, hmax=longest, full_output=True,
         )  # fmt: skip
-    if told["message"] != "Integration successful.":
-        raise GaveUpError(told["message"])
+    if info["message"] != "Integration successful.":
+        raise GaveUpError(info["message"])
     nearest = np.abs(at[:, None] - times).argmin(0)
     return states[nearest].T, states[-1]
 
@@ -194,7 +201,7 @@ def by_lsoda(
 def by_events(
     motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
 ) -> tuple[Array, Array]:
-    """States at `times`, and at the end, from event to event."""
+    """Return states at `times`, and at the end, integrated from event to event."""
     from scipy.integrate import solve_ivp  # noqa: PLC0415
 
     contacts, mu_s, (t, end) = range(len(motion.scene.slides)), asked.p["mu_s"], span
@@ -226,7 +233,7 @@ def by_events(
 def ending(
     motion: Motion, i: int, mode: float, mu_s: float, begun: float
 ) -> Callable[[float, Array], float]:
-    """A function of time and states that passes through zero where the mode of a contact ends."""
+    """Return a function of time and states that passes through zero when a mode ends."""
     velocity, rest = motion.scene.slides[i]
 
     def sliding(t: float, y: Array) -> float:

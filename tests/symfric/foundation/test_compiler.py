@@ -4,13 +4,14 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
+from re import escape
 from time import sleep
 
 import pytest
 
 from symfric.foundation import programs
 from symfric.foundation import programs as module
-from symfric.foundation.programs import CompileError, Compiler, find_compiler, no_compiler
+from symfric.foundation.programs import CompileError, Compiler, find_compiler, needed_compiler
 
 needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
 
@@ -25,7 +26,8 @@ def test_without_any_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert find_compiler() is None
-    assert "found none; install one, or pass backend='vm'" in str(no_compiler())
+    with pytest.raises(CompileError, match="found none; install one, or pass backend='vm'"):
+        needed_compiler()
 
 
 def test_cc_comes_first_with_its_options_and_is_looked_at_each_time(
@@ -58,7 +60,8 @@ def test_a_cc_that_does_not_exist_is_not_passed_over(monkeypatch: pytest.MonkeyP
     for wanted in ("no-such-compiler -O3", "/no/such/compiler", "'half a quotation"):
         monkeypatch.setenv("CC", wanted)
         assert find_compiler() is None
-        assert f"$CC is {wanted!r}, which is not found" in str(no_compiler())
+        with pytest.raises(CompileError, match=escape(f"$CC is {wanted!r}, which is not found")):
+            needed_compiler()
 
 
 def test_an_explicit_compiler_must_exist() -> None:

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symfric.foundation.tables import Column, read_table
+from symfric.foundation.tables import read_columns
 
-WANTED = {"t": Column(("t", "time"), "s"), "F": Column(("F", "force"), "N", assumed=True)}
+WANTED = {"t": (("t", "time"), "s"), "F": (("F", "force"), "N")}
 
 
 def table(folder: Path, text: str) -> dict[str, list[float]]:
     (folder / "a.csv").write_text(text, encoding="utf-8")
-    found = read_table(folder / "a.csv", WANTED)
-    return {name: column.tolist() for name, column in found.columns.items()}
+    found = read_columns(folder / "a.csv", WANTED)
+    return {name: column.tolist() for name, column in found.items()}
 
 
 def test_units_become_si_and_other_columns_are_left_out(tmp_path: Path) -> None:
@@ -43,15 +43,15 @@ def test_a_rate_is_a_length_over_a_time(
     tmp_path: Path, unit: str, text: str, factor: float
 ) -> None:
     (tmp_path / "a.csv").write_text(f"v [{text}]\n2\n", encoding="utf-8")
-    found = read_table(tmp_path / "a.csv", {"v": Column(("v",), unit)})
-    assert found.columns["v"][0] == pytest.approx(2 * factor, rel=1e-15)
+    found = read_columns(tmp_path / "a.csv", {"v": (("v",), unit)})
+    assert found["v"][0] == pytest.approx(2 * factor, rel=1e-15)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "read 'a.csv': expected a header such as 't [s], x [m], force [N]', got an empty"),
-        ("F,t\n1,2\n", "column 't': expected a unit of s, ms, us, µs, min, h, d, a, yr in"),
+        ("F,t [J]\n1,2\n", "column 't [J]': expected a unit of s, ms, us, µs, min, h, d, a, yr in"),
         ("F [m],t [s]\n", "column 'F [m]': expected a unit of N, mN, kN in brackets, got m"),
         ("F,force,t [s]\n", "expected one column for F, got 'F', 'force'"),
         ("x,t [s]\n", "expected a column 'F [N]', got x, t [s]; check the header"),
@@ -73,9 +73,9 @@ def test_what_cannot_be_read_is_refused_with_its_place(
 
 def test_folders_missing_files_and_other_bytes_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="expected a file, got nothing there"):
-        read_table(tmp_path / "none.csv", WANTED)
+        read_columns(tmp_path / "none.csv", WANTED)
     with pytest.raises(ValueError, match="expected a file, got a folder"):
-        read_table(tmp_path, WANTED)
+        read_columns(tmp_path, WANTED)
     (tmp_path / "a.csv").write_bytes(np.arange(200, dtype=np.uint8).tobytes())
     with pytest.raises(ValueError, match="expected UTF-8 text, got other bytes"):
-        read_table(tmp_path / "a.csv", WANTED)
+        read_columns(tmp_path / "a.csv", WANTED)

@@ -16,8 +16,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.integrator.methods.explicit import Explicit
-from symfric.integrator.methods.implicit import Rosenbrock
+from symfric.integrator.methods.families import Explicit, Rosenbrock
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.model import Event
 

@@ -1,89 +1,178 @@
-"""A campaign counts, keeps what fails, and survives an interrupt."""
+"""A campaign draws the same cases everywhere, counts, and survives interrupts and crashes."""
 
 import json
+import os
+import re
+import signal as signals
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from symfric.stress import Case, Signal, draw, workers
 from symfric.stress.campaign import Report, campaign, rerun
-from symfric.stress.cases import Case, draw
+from symfric.stress.cases import Draws
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
+from symfric.stress.problem import problem, signal
+from symfric.stress.workers import Crashed, TimedOut
 
 COSTLY = ("arm", "four_bar", "double_pendulum")
 """Scenes of which the suite takes no case."""
 LONG = (2, 18)
 """Cases of seconds."""
-SEEDS = (20261, 20262, 20263, 20264)
 
 
-def test_of_a_few_random_cases_none_is_silently_wrong_or_ends_badly() -> None:
-    """The suite's share of `symfric stress`."""
+def test_a_few_random_cases_are_right() -> None:
     numbers = [n for n in range(20) if draw(1, n).scene not in COSTLY and n not in LONG]
     report = campaign(numbers, work=12_000)
-    failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
-    assert not failing
+    assert not {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
+    assert report.passed
     assert report.classes["right"] > 0.6 * len(numbers)
     assert report.refereed > 0.3 * len(numbers)
-    assert len(report.verdicts) == len(numbers)
+    assert len(report.verdicts) == report.asked == len(numbers)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [20261, 20262, 20263, 20264])
 def test_of_500_random_cases_none_is_silently_wrong_and_few_are_undecided(seed: int) -> None:
     report = campaign(500, seed)
-    failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
-    assert not failing
+    assert not {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert report.classes["undecided"] < 5
     assert report.classes["right"] > 350
     assert report.refereed > 200
 
 
-def test_workers_do_not_change_what_is_found() -> None:
-    report = campaign(4, seed=7, workers=2)
-    assert [report.verdicts[n] for n in range(4)] == [judge(draw(7, n)) for n in range(4)]
+def test_workers_do_not_change_verdicts_and_an_interrupt_keeps_them() -> None:
+    def interrupt(report: Report) -> None:
+        if len(report.verdicts) == 2:
+            raise KeyboardInterrupt
 
-
-def test_an_interrupt_keeps_what_there_is() -> None:
-    def interrupt(_: Report) -> None:
-        raise KeyboardInterrupt
-
-    report = campaign(50, workers=1, progress=interrupt)
-    assert (len(report.verdicts), report.asked) == (1, 50)
+    report = campaign(50, seed=7, workers=2, progress=interrupt)
+    assert len(report.verdicts) == 2 and report.asked == 50
+    assert all(verdict == judge(draw(7, n)) for n, verdict in report.verdicts.items())
 
 
 def test_numbers_of_a_campaign_are_positive() -> None:
-    for cases, workers, limit in ((0, 1, 1.0), (5, 0, 1.0), (5, 1, -1.0)):
+    for cases, number, limit in ((0, 1, 1.0), (5, 0, 1.0), (5, 1, -1.0)):
         with pytest.raises(ValueError, match=r"stress: expected [a-z]+ > 0"):
-            campaign(cases, workers=workers, limit=limit)
+            campaign(cases, workers=number, limit=limit)
 
 
-def test_a_case_runs_again_in_a_process_of_its_own() -> None:
-    assert rerun(draw(3, 1)) == judge(draw(3, 1))
+def test_a_case_runs_again_in_its_own_process() -> None:
     assert rerun(Case(1, 1, "drive", "dahl", {"mu": 1.0})).kind == "refused"
-
-
-REPORT = Report(
-    7,
-    5,
-    {
-        0: Verdict("right", "", "", 0.5),
-        1: Verdict("silent", "1e6 tolerances off", "", 1e6),
-        2: Verdict("refused", "no", "input"),
-        3: Verdict("loose", "20 tolerances off", "", 20.0),
-    },
-    12.0,
-)
+    assert rerun(draw(3, 1), limit=0.01).kind == "hang"
 
 
 def test_a_report_counts_classes_and_keeps_failing_cases(tmp_path: Path) -> None:
-    data = json.loads(json.dumps(REPORT.to_dict(), allow_nan=False))
-    assert data["classes"] == {name: 0 for name in CLASSES} | {
-        "right": 1, "silent": 1, "refused": 1, "loose": 1,
-    }  # fmt: skip
-    assert data["groups"]["refused"] == {"input": 1}
-    assert (data["cases"], data["asked"], data["seed"]) == (4, 5, 7)
-    assert data["errors_in_tolerances"]["greatest"] == 20.0
-    assert not REPORT.passed
-    (path,) = REPORT.save(tmp_path / "new")
+    verdicts = {
+        0: Verdict("right", "", "", 0.5, by="referee"),
+        1: Verdict("silent", "1e6 tolerances off", "", 1e6),
+        2: Verdict("refused", "no", "input"),
+        3: Verdict("loose", "20 tolerances off", "", 20.0),
+    }
+    report = Report(7, 5, verdicts, 12.04)
+    data = json.loads(json.dumps(report.to_dict(), allow_nan=False))
+    counts = {"right": 1, "silent": 1, "refused": 1, "loose": 1}
+    assert data["classes"] == dict.fromkeys(CLASSES, 0) | counts
+    assert data["groups"] == {name: {} for name in CLASSES} | {"refused": {"input": 1}}
+    expected = {"seed": 7, "cases": 4, "asked": 5, "seconds": 12.0, "refereed": 1}
+    assert {name: data[name] for name in expected} == expected
+    errors = data["errors_in_tolerances"]
+    assert errors == {"median": 10.25, "99 %": pytest.approx(19.805), "greatest": 20.0}
+    assert [n["case"]["number"] for n in data["notable"]] == [1, 3]
+    assert not report.passed
+    (path,) = report.save(tmp_path / "new")
     assert path.name == "silent_7_1.json"
     assert Case.read(path) == draw(7, 1)
+
+
+# ---- cases ----
+
+
+def test_draws_are_the_same_everywhere() -> None:
+    rng = Draws(1, 2)
+    drawn = rng.unit(), rng.decade(-2, 2), rng.pick("abc"), rng.between(2, 3), rng.signed(0, 1)
+    assert drawn == (0.08841827389941048, 19.5, "b", 2.43, -3.3)
+    assert draw(1, 85) == draw(1, 85) != draw(2, 85)
+    drawn = {"scene": "drive", "law": "elasto_plastic", "method": "rodas3", "rtol": 1e-4}
+    assert {name: getattr(draw(1, 3), name) for name in drawn} == drawn
+
+
+def test_cases_differ_in_everything_that_is_drawn() -> None:
+    cases = [draw(1, n) for n in range(150)]
+    for name, least in (("scene", 10), ("law", 45), ("method", 6), ("rtol", 7), ("t_end", 100)):
+        assert len({getattr(case, name) for case in cases}) >= least, name
+    kinds = {s.kind for case in cases for s in case.inputs.values()}
+    assert kinds == {"constant", "hold", "linear", "sine", "pulse"}
+    for name in ("values", "forms", "free", "x0"):
+        assert any(getattr(case, name) for case in cases), name
+
+
+def test_a_file_restores_its_case(tmp_path: Path) -> None:
+    path = tmp_path / "case.json"
+    for n in range(40):
+        draw(3, n).write(path)
+        assert Case.read(path) == draw(3, n)
+    path.write_text(json.dumps({"case": draw(3, 4).to_dict(), "verdict": {"kind": "silent"}}))
+    assert Case.read(path) == draw(3, 4)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "expected JSON of a case"),
+        ("[1]", "expected JSON of a case, got something else"),
+        ('{"seed": 1}', "case '.*case.json': expected fields among"),
+        ('{"case": [1]}', "case '.*case.json': expected JSON of a case, got something else"),
+        ('{"seed": 1, "number": 2, "scene": "a", "law": "b", "x": 1}', "expected fields"),
+        ('{"seed": 1, "number": 2, "scene": "a", "law": "b", "inputs": {"c": 1}}', "stress` wrote"),
+        ('{"seed": "1", "number": 2, "scene": "a", "law": "b"}', "got others: .'seed'."),
+    ],
+)
+def test_a_file_of_something_else_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "case.json").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        Case.read(tmp_path / "case.json")
+
+
+def test_parameters_given_at_run_time_are_not_in_the_equations() -> None:
+    ready = problem(Case(1, 0, "rabinowicz", "stribeck", {"mu_s": 0.2, "m": 2.0}, free=("mu_s",)))
+    assert [v.name for v in ready.model.p] == ["mu_s"]
+    assert ready.p == {"mu_s": 0.2}
+
+
+def test_an_unknown_signal_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected a signal constant, hold"):
+        signal(Signal("noise", (1.0, 2.0, 3.0)))
+
+
+# ---- processes of tasks ----
+
+
+def outcomes(work: Callable[..., object], tasks: list[object], limit: float = 60.0) -> object:
+    return dict(workers.outcomes(work, enumerate(tasks), 2, limit))
+
+
+def test_results_exceptions_exits_and_signals_are_distinguished() -> None:
+    error = Crashed("exit status 1", "TypeError: bad operand type for abs(): 'str'")
+    assert outcomes(abs, [-1, "text", -3]) == {0: 1, 1: error, 2: 3}
+    assert outcomes(os._exit, [3]) == {0: Crashed("exit status 3", "no output")}
+    killed = outcomes(signals.raise_signal, [signals.SIGSEGV])
+    assert re.search(r"how='SIGSEGV'", str(killed))
+
+
+def test_an_endless_loop_in_compiled_code_is_stopped_by_its_processor_time() -> None:
+    assert outcomes(sum, [range(10**12), (1, 2)], limit=0.5) == {0: TimedOut(0.5), 1: 3}
+
+
+def test_only_wall_time_far_above_the_limit_stops_a_waiting_task(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert outcomes(time.sleep, [0.5], limit=0.1) == {0: None}
+    monkeypatch.setattr(workers, "WALL", 1)
+    assert outcomes(time.sleep, [1000.0, 0.0, 0.0], limit=4.0) == {
+        0: TimedOut(4.0),
+        1: None,
+        2: None,
+    }

@@ -136,7 +136,7 @@ def test_a_loose_run_has_a_measured_reason() -> None:
     verdict = judge(case)
     assert verdict.kind == "loose"
     assert verdict.group == "the problem amplifies tolerances"
-    assert "the problem makes" in verdict.reason
+    assert "the problem amplifies one to" in verdict.reason
 
 
 def test_what_is_off_between_right_ends_of_steps_is_told_apart() -> None:

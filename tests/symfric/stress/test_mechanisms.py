@@ -1,14 +1,23 @@
-"""Mechanisms at the edge: each runs to an oracle's result or says why it does not, never NaN."""
+"""Mechanisms at the edge: each run equals an oracle or states why it stops, and is finite."""
 
+from functools import cache
 from math import atan, exp, sqrt
 
 import numpy as np
 import pytest
 from mechanics import Rates, brown_mcphee, four_mass, pendulum_box, pendulum_period, slider_crank
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from symfric import BrownMcPhee, Law, SolveError, Status, Trajectory, Viscous, simulate
+from symfric import BrownMcPhee, Law, Model, SolveError, Status, Trajectory, Viscous, simulate
+from symfric.integrator.equations.blocks import signs
+from symfric.integrator.equations.initial import first_guess
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.equations.manifold import SHOCK
+from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import Tolerances, integrate
 from symfric.laws import LuGre, LuGreNormalised
 from symfric.multibody import Mechanism
 from symfric.scenes import (
@@ -22,25 +31,27 @@ from symfric.scenes import (
     SliderCrank,
 )
 
-pytestmark = pytest.mark.slow
+Array = NDArray[np.float64]
 SMOOTH = Viscous(sigma_2=0.0)
 G = 9.81
-
-
-def finite(run: Trajectory) -> bool:
-    return all(np.isfinite(run[name]).all() for name in run.units)
+slow = pytest.mark.slow
+loose = pytest.mark.filterwarnings("ignore:.*stick phases:UserWarning")
+JOINT = ("joint", 1)
 
 
 def sound(run: Trajectory) -> None:
-    """Numbers everywhere, loops closed, pressed contacts, no energy out of nothing."""
-    assert finite(run)
+    """Numbers are finite, loops closed, contacts pressed, and energy does not grow."""
+    assert all(np.isfinite(run[name]).all() for name in run.units)
     if "constraint_position" in run.units:
         assert run["constraint_position"].max() < 1e-11
     assert all(run[name].min() >= 0 for name in run.units if name.endswith("_N"))
     assert np.diff(run["energy"]).max() < 1e-6 * np.ptp(run["energy"]) + 1e-9
 
 
-def oracle(rates: Rates, y0: list[float], times: np.ndarray) -> np.ndarray:
+# ---- narrow transitions and strong friction, beside a solver of SciPy ----
+
+
+def oracle(rates: Rates, y0: list[float], times: Array) -> Array:
     run = solve_ivp(
         rates, (0.0, times[-1]), y0, method="Radau", rtol=1e-8, atol=1e-10, t_eval=times
     )
@@ -52,14 +63,23 @@ VELOCITIES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 LEVELS = (0.3, 0.7, 1.0, 1.5)
 
 
-def law(mu_s: float, v_t: float) -> tuple[BrownMcPhee, Rates]:
+def pairs(mu_s: float, v_t: float, narrowest: int = 5) -> pytest.MarkDecorator:
+    """Levels and velocities of the law: narrow at one level, and strong at one velocity."""
+    cases = [(mu_s, v) for v in VELOCITIES[:narrowest]] + [(mu, v_t) for mu in LEVELS]
+    return pytest.mark.parametrize(("mu_s", "v_t"), cases)
+
+
+def law(mu_s: float, v_t: float) -> tuple[Law, Rates]:
     def mu(v: float) -> float:
         return brown_mcphee(v, mu_s, 0.8 * mu_s, v_t)
 
     return BrownMcPhee(mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t), mu  # type: ignore[return-value]
 
 
-def compare_box(mu_s: float, v_t: float) -> None:
+@slow
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")  # of SciPy's differences
+@pairs(0.15, 1e-3)
+def test_pendulum_box(mu_s: float, v_t: float) -> None:
     friction, mu = law(mu_s, v_t)
     times = np.linspace(0.1, 3.0, 16)
     expected = oracle(pendulum_box(6.0, 20.0, 0.3, 0.01, G, mu), [0, np.pi / 6, 0, 0], times)  # type: ignore[arg-type]
@@ -69,23 +89,9 @@ def compare_box(mu_s: float, v_t: float) -> None:
     assert run["phi"] == pytest.approx(expected[1], abs=2e-6)
 
 
-@pytest.mark.parametrize("v_t", VELOCITIES)
-def test_pendulum_box_at_narrow_transitions(v_t: float) -> None:
-    compare_box(0.15, v_t)
-
-
-@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")  # of SciPy's differences
-@pytest.mark.parametrize("mu_s", LEVELS)
-def test_pendulum_box_under_strong_friction(mu_s: float) -> None:
-    compare_box(mu_s, 1e-3)
-
-
-@pytest.mark.parametrize(
-    ("mu_s", "v_t"), [(0.12, v) for v in VELOCITIES[:4]] + [(mu, 1e-2) for mu in LEVELS]
-)
-def test_four_mass_system_at_narrow_transitions_and_under_strong_friction(
-    mu_s: float, v_t: float
-) -> None:
+@slow
+@pairs(0.12, 1e-2, 4)
+def test_four_mass_system(mu_s: float, v_t: float) -> None:
     friction, mu = law(mu_s, v_t)
     times = np.linspace(0.1, 2.0, 20)
     th, x4, *_ = oracle(four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)  # type: ignore[arg-type]
@@ -95,12 +101,9 @@ def test_four_mass_system_at_narrow_transitions_and_under_strong_friction(
     assert run["x4"] == pytest.approx(x4, abs=5e-6)
 
 
-@pytest.mark.parametrize(
-    ("mu_s", "v_t"), [(0.1, v) for v in VELOCITIES] + [(mu, 1e-2) for mu in LEVELS]
-)
-def test_slider_crank_at_narrow_transitions_and_under_strong_friction(
-    mu_s: float, v_t: float
-) -> None:
+@slow
+@pairs(0.1, 1e-2)
+def test_slider_crank(mu_s: float, v_t: float) -> None:
     friction, mu = law(mu_s, v_t)
     times = np.linspace(0.01, 0.25, 25)
     th, _ = oracle(slider_crank(mu), [0.0, 120.0], times)  # type: ignore[arg-type]
@@ -109,54 +112,107 @@ def test_slider_crank_at_narrow_transitions_and_under_strong_friction(
     assert run["crank"] == pytest.approx(th, rel=1e-6, abs=1e-6)
 
 
-def light_box(ratio: float, mu: float = 0.12) -> MechanismScene:
-    return PendulumBox(BrownMcPhee(mu_s=mu, mu_d=mu, v_t=1e-3), hinge=SMOOTH, m_box=20.0 * ratio)
+# ---- jamming: Painleve's paradox ----
+
+MU, MASS = 0.12, 20.0
 
 
-def reserve(phi: float, ratio: float, mu: float = 0.12) -> float:
+def light_box(ratio: float) -> MechanismScene:
+    """A box of `ratio` times the mass of its pendulum, without friction in the hinge."""
+    friction = BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3)
+    return PendulumBox(friction, hinge=SMOOTH, m_box=MASS * ratio)
+
+
+@cache
+def light_model(ratio: float, formulation: str, index: int) -> Model:
+    return light_box(ratio).mechanism().build(formulation=formulation, index=index)
+
+
+def reserve(phi: Array, ratio: float) -> Array:
     """Factor of x'' while the box slides: m_box / m + sin(phi) (sin(phi) - mu cos(phi))."""
-    return ratio + np.sin(phi) * (np.sin(phi) - mu * np.cos(phi))
+    return ratio + np.sin(phi) * (np.sin(phi) - MU * np.cos(phi))
 
 
-@pytest.mark.parametrize("ratio", [1e-6, 1e-4, 1e-3])
-def test_a_light_box_jams_where_the_closed_form_says(ratio: float) -> None:
-    """Painleve: below m_box/m = (sqrt(1 + mu^2) - 1)/2 the sliding box has no acceleration."""
-    assert ratio < (sqrt(1 + 0.12**2) - 1) / 2
+@pytest.mark.parametrize(
+    ("ratio", "rtol", "form"),
+    [
+        (1e-3, 1e-4, JOINT),
+        (1e-3, 1e-7, JOINT),
+        *(pytest.param(1e-3, 10.0**-k, JOINT, marks=slow) for k in (5, 6, 8, 9, 10)),
+        *(pytest.param(1e-3, 1e-7, ("absolute", k), marks=slow) for k in (0, 1)),
+        *(pytest.param(ratio, 1e-8, JOINT, marks=slow) for ratio in (1e-6, 1e-4)),
+    ],
+)
+@loose
+def test_a_light_box_jams(ratio: float, rtol: float, form: tuple[str, int]) -> None:
+    """Below m_box/m = (sqrt(1 + mu^2) - 1)/2 the box that slides has no acceleration."""
+    assert ratio < (sqrt(1 + MU**2) - 1) / 2
     with pytest.raises(SolveError, match=r"friction jams.*joint 'x' with BrownMcPhee") as caught:
-        simulate(light_box(ratio).model(), 3.0, rtol=1e-8)
+        simulate(light_model(ratio, *form), 3.0, rtol=rtol, backend="vm")
+    assert caught.value.status is Status.JAMMED
+    assert "a tangential shock where it slides, and impacts are excluded" in str(caught.value)
     run = caught.value.partial
     assert isinstance(run, Trajectory)
-    assert caught.value.status is Status.JAMMED
     sound(run)
-    last = run.at([float(run.step_times[-1])])["phi"][0]
-    top = atan(0.12) / 2  # where the reserve is smallest
-    assert last == pytest.approx(brentq(reserve, top, 0.5, args=(ratio,)), abs=2e-4)
-    assert (reserve(run["phi"], ratio) > 0).all()
+    potential = np.append(run["potential"], run.final["potential"])
+    fallen = (potential - potential[0]) / (MASS * G * 0.3)
+    phi = np.arccos(np.cos(np.pi / 6) - fallen)
+    top = atan(MU) / 2  # where the reserve is smallest
+    assert phi[-1] == pytest.approx(brentq(reserve, top, 0.5, args=(ratio,)), abs=3e-4)
+    share = reserve(phi, ratio) / (ratio + np.sin(phi) ** 2)  # mass with friction over without
+    assert (share > 0).all()
+    assert ratio < 1e-3 or share[-1] == pytest.approx(SHOCK, rel=0.05)
+    assert run.final["x_N"] > 1e4 * run["x_N"][0]
 
 
-@pytest.mark.parametrize("ratio", [4e-3, 1e-2])
-def test_a_box_just_heavy_enough_goes_on(ratio: float) -> None:
-    sound(simulate(light_box(ratio).model(), 1.0, rtol=1e-8))
+@pytest.mark.parametrize("ratio", [3.7e-3, pytest.param(1e-2, marks=slow)])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, pytest.param(1e-10, marks=slow)])
+@loose
+def test_a_box_just_heavy_enough_moves_on(ratio: float, rtol: float) -> None:
+    sound(simulate(light_model(ratio, *JOINT), 1.0, rtol=rtol, backend="vm"))
 
 
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_machines_with_strong_friction_are_far_from_jamming(name: str) -> None:
+    """Det(I - dN/dN) at the ends of all steps, by NumPy, equals the product of the pivots."""
+    model = MECHANISMS[name](BrownMcPhee(mu_s=0.7, mu_d=0.56, v_t=1e-2)).model()
+    inputs = input_data(model, None, 0.0, 0.25 if name == "slider_crank" else 1.0)
+    integrator = Integrator(model, inputs, RODAS5P)
+    s, d = integrator.system, inputs.values[:, 0]
+    y = first_guess(s, model, model.initial_state())
+    tolerances = Tolerances(1e-6, 1e-7 * s.nominal, 1e-10, 100_000)
+    run, _ = integrate(integrator, inputs, y, np.zeros(0), tolerances, "vm", None)
+    assert run.status is Status.SUCCESS
+    manifold = s.manifold
+    assert manifold is not None
+    k = manifold.n + manifold.m
+    pivots = signs(s, RODAS5P.gamma, s.algebraic[0][k:])
+    for y in run.dense.y1:
+        A = manifold.slope(y, d).full()
+        reserve = np.linalg.det(A) / np.linalg.det(A[:k, :k]) * (-1) ** (A.shape[0] - k)
+        assert reserve == pytest.approx(float(np.prod(np.array(pivots(y, 1e-3, d)[2]))), rel=1e-9)
+        assert reserve > 100 * SHOCK
+
+
+# ---- uneven masses and dead points ----
+
+
+@slow
 @pytest.mark.parametrize("formulation", ["joint", "absolute"])
 def test_a_weight_under_a_box_without_mass_falls_freely(formulation: str) -> None:
     """Without friction the rod carries nothing: L (cos phi - cos phi_0) = g t^2 / 2."""
     scene = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e-6)
     times = np.linspace(0.01, 0.08, 8)
-    mechanism = scene.mechanism()
-    model = mechanism.build(formulation=formulation)
-    run = simulate(model, 0.08, rtol=1e-9, t_eval=times)
+    run = simulate(scene.mechanism().build(formulation=formulation), 0.08, rtol=1e-9, t_eval=times)
     fallen = run["potential"] / (20 * G)
     assert fallen - fallen[0] == pytest.approx(-G * (times**2 - times[0] ** 2) / 2, abs=1e-6)
 
 
+@slow
 def test_a_box_of_a_million_pendulums_is_a_wall() -> None:
     period = pendulum_period(sqrt(G / 0.3), np.pi / 6)
-    run = simulate(
-        PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e6).model(), period, rtol=1e-10, t_eval=[period]
-    )
-    assert run["phi"][0] == pytest.approx(np.pi / 6, abs=1e-5)
+    model = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e6).model()
+    assert simulate(model, period, rtol=1e-10).final["phi"] == pytest.approx(np.pi / 6, abs=1e-5)
 
 
 def uneven(ratio: float) -> Mechanism:
@@ -170,18 +226,19 @@ def uneven(ratio: float) -> Mechanism:
     return heavy
 
 
+@slow
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1e3, 1e6])
 def test_uneven_pendulums_keep_their_energy_in_both_formulations(ratio: float) -> None:
     runs = [
         simulate(uneven(ratio).build(formulation=f), 0.5, rtol=1e-9) for f in ("joint", "absolute")
     ]
     for run in runs:
-        assert finite(run)
         assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
     kinetic = [run["kinetic"] / run["kinetic"].max() for run in runs]
     assert kinetic[0] == pytest.approx(kinetic[1], abs=1e-6)
 
 
+@slow
 @pytest.mark.parametrize("length", [0.2215, 0.22143, 0.2214214])
 def test_slider_crank_near_its_dead_point_keeps_energy_and_closed_form(length: float) -> None:
     """The rod just reaches over: slider^2 falls to a few parts in a million of l^2."""
@@ -194,6 +251,7 @@ def test_slider_crank_near_its_dead_point_keeps_energy_and_closed_form(length: f
     assert np.ptp(run["energy"]) < 1e-7 * run["energy"][0]
 
 
+@slow
 def test_slider_crank_swings_through_the_dead_point_it_cannot_turn_over() -> None:
     run = simulate(SliderCrank(SMOOTH, l=0.22).model(), 0.25, rtol=1e-9)
     assert run["slider"].min() < -0.2
@@ -201,6 +259,7 @@ def test_slider_crank_swings_through_the_dead_point_it_cannot_turn_over() -> Non
     assert np.ptp(run["energy"]) < 1e-7 * run["energy"][0]
 
 
+@slow
 @pytest.mark.parametrize("length", [0.22143, 0.2214214])
 def test_slider_crank_with_friction_jams_near_its_dead_point_and_says_so(length: float) -> None:
     scene = SliderCrank(BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01), l=length)
@@ -210,29 +269,27 @@ def test_slider_crank_with_friction_jams_near_its_dead_point_and_says_so(length:
     sound(e.value.partial)
 
 
-def test_an_exact_parallelogram_stops_where_its_links_lie_in_line() -> None:
-    scene = FourBar(SMOOTH, crank=0.2, coupler=0.4, rocker=0.2, base=0.4)
-    with pytest.raises(SolveError, match=r"the configuration is singular.*pin_lambda") as caught:
-        simulate(scene.model(), 3.0, rtol=1e-8)
-    run = caught.value.partial
-    assert isinstance(run, Trajectory)
-    assert finite(run)
-    assert run["theta_crank"] == pytest.approx(run["theta_rocker"], abs=1e-9)
-    reached = run.at([float(run.step_times[-1])])["theta_crank"][0]
-    assert reached == pytest.approx(np.pi, abs=1e-5)
-
-
+@slow
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
-@pytest.mark.parametrize(("formulation", "index"), [("joint", 1), ("joint", 0), ("absolute", 0)])
-def test_a_step_over_a_change_point_is_not_taken(formulation: str, index: int, rtol: float) -> None:
+@pytest.mark.parametrize("form", [JOINT, ("joint", 0), ("absolute", 0)])
+def test_an_exact_parallelogram_stops_where_its_links_are_in_line(
+    form: tuple[str, int], rtol: float
+) -> None:
     scene = FourBar(SMOOTH, crank=0.2, coupler=0.4, rocker=0.2, base=0.4)
-    model = scene.mechanism().build(formulation=formulation, index=index)
+    model = scene.mechanism().build(formulation=form[0], index=form[1])
     with pytest.raises(SolveError, match="the configuration is singular") as caught:
         simulate(model, 3.0, rtol=rtol, backend="vm")
-    assert caught.value.partial is not None
-    assert caught.value.partial.step_times[-1] == pytest.approx(0.206637, abs=1e-5)
+    run = caught.value.partial
+    assert isinstance(run, Trajectory)
+    assert run.step_times[-1] == pytest.approx(0.206637, abs=1e-5)
+    if form == JOINT:
+        assert "pin_lambda" in str(caught.value)
+        assert run["theta_crank"] == pytest.approx(run["theta_rocker"], abs=1e-8)
+        reached = run.at([float(run.step_times[-1])])["theta_crank"][0]
+        assert reached == pytest.approx(np.pi, abs=1e-4)
 
 
+@slow
 @pytest.mark.parametrize("excess", [1e-8, 1e-4, 1e-2])
 def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> None:
     """Energy and loop closed; beyond the line the rocker turns against the crank."""
@@ -243,6 +300,7 @@ def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> No
     assert run["theta_crank"][-1] > 30.0
 
 
+@slow
 @pytest.mark.parametrize(("v_t", "t_end"), [(1e-6, 1e3), (1e-7, 1e4), (1e-8, 1e5)])
 def test_a_velocity_law_creeps_as_its_slope_at_rest_says(v_t: float, t_end: float) -> None:
     """phi' = -phi m g L / (R^2 N mu'(0)): no static law holds for ever, for 1e5 s neither."""
@@ -257,13 +315,13 @@ def test_a_velocity_law_creeps_as_its_slope_at_rest_says(v_t: float, t_end: floa
     assert expected[-1] / 1e-4 == pytest.approx(exp(-t_end * L / (R * R * slope)))
 
 
+@slow
 @pytest.mark.parametrize("friction", [LuGre(), LuGreNormalised()], ids=["lugre", "normalised"])
 def test_bristles_hold_a_pendulum_for_a_day(friction: Law) -> None:
     """At rest weight and bristles balance, and nothing moves between an hour and 1e5 s."""
     run = simulate(
         Pendulum(friction, phi_0=0.002).model(), 1e5, rtol=1e-8, t_eval=[100.0, 3600.0, 1e5]
     )
-    assert finite(run)
     phi = run["phi"]
     assert np.ptp(phi) < 1e-9
     assert abs(phi[-1]) > 1e-4
@@ -275,13 +333,14 @@ def test_bristles_hold_a_pendulum_for_a_day(friction: Law) -> None:
 LONG = ("pendulum", "pendulum_box", "four_mass", "slider_crank", "four_bar", "arm")
 
 
+@slow
 @pytest.mark.parametrize("name", LONG)
 @pytest.mark.parametrize(
     "friction", [BrownMcPhee(), LuGreNormalised(), LuGre()], ids=lambda law: type(law).__name__
 )
 def test_every_mechanism_rests_for_a_day_or_says_why_not(name: str, friction: Law) -> None:
     run = simulate(MECHANISMS[name](friction).model(), 1e5, throw=False)
-    assert finite(run)
+    assert all(np.isfinite(run[name]).all() for name in run.units)
     if run.status.ok:
         assert run["kinetic"][-1] < 1e-8
         assert run["energy"][-1] == pytest.approx(run["energy"][1000], abs=1e-2)

@@ -14,12 +14,12 @@ from symfric import BrownMcPhee, LuGre, rabinowicz, simulate_many
 from symfric.bench.ensemble import cuda
 from symfric.bench.report import Report
 from symfric.cli.campaigns import show
-from symfric.integrator.cuda.device import CupyDevice, DeviceError
+from symfric.integrator.cuda.device import Device, DeviceError
 
 
 def missing() -> str:
     try:
-        CupyDevice.found()
+        Device.found()
     except DeviceError as error:
         return str(error)
     return ""

@@ -1,31 +1,26 @@
-"""Kernels compile by NVRTC, which needs no graphics processor, and fit into registers."""
+"""Kernels compile by NVRTC, which needs neither driver nor device, and fit into registers."""
 
+import ctypes
 import re
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
 import pytest
 from differentiable import pendulum, switched
 
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda import device
-from symfric.integrator.cuda.device import DeviceError
-from symfric.integrator.cuda.kernel import NAME, kernel_of
+from symfric.integrator.cuda.device import OPTIONS
+from symfric.integrator.cuda.kernel import AFTER, BEFORE, NAME, kernel_of
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.scenes import SliderCrank
 from symfric.scenes.catalogue import ALL_SCENES
 
-needs_nvrtc = pytest.mark.skipif(
-    device.library() is None, reason="needs NVRTC (extra 'cuda-check'); no GPU is needed"
-)
-
-
-def integrator(model: Model) -> Integrator:
-    return Integrator(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
-
-
-MODELS = {
+MODELS: dict[str, Callable[[], Model]] = {
     "brown_mcphee": lambda: rabinowicz(BrownMcPhee()),
     "lugre": lambda: rabinowicz(LuGre()),
     "algebraic unknowns": switched,
@@ -34,40 +29,74 @@ MODELS = {
 }
 
 
-@needs_nvrtc
+def found() -> Path | None:
+    spec = find_spec("nvidia")
+    places = [] if spec is None else list(spec.submodule_search_locations or [])
+    every = (path for place in places for path in sorted(Path(place).glob("*/lib/libnvrtc.so*")))
+    return next(every, None)
+
+
+pytestmark = pytest.mark.skipif(
+    found() is None, reason="needs NVRTC (extra 'cuda-check'); no GPU is needed"
+)
+
+
+def build(source: str, *options: str) -> tuple[str, str]:
+    """PTX, or "" of machine code (sm_80), and the messages of NVRTC."""
+    nvrtc, handle = ctypes.CDLL(str(found())), ctypes.c_void_p()
+    assert not nvrtc.nvrtcCreateProgram(
+        ctypes.byref(handle), source.encode(), b"symfric.cu", 0, None, None
+    )
+
+    def text(what: str) -> str:
+        size = ctypes.c_size_t()
+        assert not getattr(nvrtc, f"nvrtcGet{what}Size")(handle, ctypes.byref(size))
+        content = ctypes.create_string_buffer(max(1, size.value))
+        assert not getattr(nvrtc, f"nvrtcGet{what}")(handle, content)
+        return content.value.decode(errors="replace")
+
+    every = ["--std=c++14", *(options or ("--gpu-architecture=compute_80", *OPTIONS))]
+    given = (ctypes.c_char_p * len(every))(*(word.encode() for word in every))
+    status = nvrtc.nvrtcCompileProgram(handle, len(every), given)
+    log = text("ProgramLog")
+    assert not status, log
+    return "" if any("sm_" in word for word in every) else text("PTX"), log
+
+
+def code(name: str, between: bool = True, real: str = "double", scene: Any = None) -> str:
+    model = MODELS[name]() if scene is None else scene
+    own = Integrator(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
+    return f"{BEFORE}{kernel_of(own, between, REALS[real]).text}{AFTER}"
+
+
 @pytest.mark.parametrize("real", REALS)
-@pytest.mark.parametrize("between", [True, False])
 @pytest.mark.parametrize("name", ["brown_mcphee", "algebraic unknowns", "mechanism"])
-def test_a_kernel_becomes_ptx_without_a_warning(name: str, between: bool, real: str) -> None:
-    kernel = kernel_of(integrator(MODELS[name]()), between, REALS[real])
-    built = device.build(kernel.on_device)
-    assert f".visible .entry {NAME}(" in built.text
-    assert not built.log.strip("\0\n ")
-    doubles = len(re.findall(r"\b(?:add|mul|fma|div|sqrt)\S*\.f64", built.text))
-    assert (doubles > 100) == (real == "double")
+def test_a_kernel_becomes_ptx_without_a_warning(name: str, real: str) -> None:
+    for between in (True, False):
+        text, log = build(code(name, between, real))
+        assert f".visible .entry {NAME}(" in text
+        assert not log.strip("\0\n ")
+        doubles = len(re.findall(r"\b(?:add|mul|fma|div|sqrt)\S*\.f64", text))
+        assert (doubles > 100) == (real == "double")
 
 
-@needs_nvrtc
 @pytest.mark.slow
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("name", ALL_SCENES)
 def test_all_scenes_become_ptx(name: str, real: str) -> None:
     """The arm takes a minute."""
-    kernel = kernel_of(integrator(ALL_SCENES[name](LuGre()).model()), True, REALS[real])
-    assert f".visible .entry {NAME}(" in device.build(kernel.on_device).text
+    scene = ALL_SCENES[name](LuGre()).model()
+    assert f".visible .entry {NAME}(" in build(code(name, True, real, scene))[0]
 
 
-@needs_nvrtc
-def test_no_product_goes_unrounded_into_a_sum(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_product_goes_unrounded_into_a_sum() -> None:
     source = 'extern "C" __global__ void f(double *x) { x[0] = x[0] * x[1] + x[2]; }'
-    built = device.build(source)
-    assert "mul" in built.text
-    assert "fma" not in built.text
-    monkeypatch.setattr(device, "OPTIONS", ())
-    assert "fma" in device.build(source).text
+    text, _ = build(source)
+    assert "mul" in text
+    assert "fma" not in text
+    assert "fma" in build(source, "--gpu-architecture=compute_80")[0]
 
 
-@needs_nvrtc
 @pytest.mark.parametrize(
     ("name", "most"),
     [
@@ -77,19 +106,9 @@ def test_no_product_goes_unrounded_into_a_sum(monkeypatch: pytest.MonkeyPatch) -
     ],
 )
 def test_registers_are_few(name: str, most: int) -> None:
-    """Small scenes spill nothing; those of a mechanism are as many as there are."""
-    built = device.build(kernel_of(integrator(MODELS[name]())).on_device, "sm_80")
-    assert 32 <= built.registers <= most
-    assert (built.spilled == 0) == (most < 255)
-
-
-@needs_nvrtc
-def test_what_is_no_cuda_is_refused_with_its_first_error() -> None:
-    with pytest.raises(DeviceError, match=r"rejected the kernel: .*error: .*nonsense"):
-        device.build("nonsense x;")
-
-
-def test_without_nvrtc_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device, "library", lambda: None)
-    with pytest.raises(DeviceError, match=r"pip install 'symfric\[cuda-check\]'"):
-        device.build("")
+    """Small scenes spill nothing; a mechanism takes all registers."""
+    _, log = build(code(name), "--gpu-architecture=sm_80", "--ptxas-options=-v", *OPTIONS)
+    registers = max(map(int, re.findall(r"Used (\d+) registers", log)))
+    spilled = max(map(int, re.findall(r"(\d+) bytes spill stores", log)), default=0)
+    assert 32 <= registers <= most
+    assert (spilled == 0) == (most < 255)

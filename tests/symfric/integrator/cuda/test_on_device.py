@@ -1,38 +1,46 @@
-"""Ensembles on a device: what the virtual machine gives, to the bit, the counts and failures too.
+"""Ensembles on a device: the bits of the virtual machine, also of counts and failures.
 
-The processor takes the place of the graphics processor: the text of the kernel is the same, and so
-is all that drives it but the calls of CuPy (`test_cupy_device`).
+A module in the place of CuPy compiles the same text of the kernel for the processor.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from device_cases import ALIKE, CASES, VELOCITIES
-from differentiable import oscillator
+from differentiable import oscillator, root, switched
 from ensembles import after, assert_same
+from fake_cupy import LAUNCH_ON_HOST, ON_HOST, FakeCupy
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
-from symfric.emitter.c99 import DOUBLE
-from symfric.integrator.cuda import on_device
-from symfric.integrator.cuda.device import Device, HostArray, HostDevice
-from symfric.integrator.cuda.kernel import Kernel
+from symfric.emitter.c99 import DOUBLE, REALS
+from symfric.integrator.cuda.device import BLOCK, Device, DeviceError
+from symfric.integrator.cuda.kernel import Kernel, kernel_of
+from symfric.integrator.cuda.on_device import OnDevice
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.integrator import Integrator
 from symfric.model import Event
 from symfric.scenes.catalogue import ALL_SCENES
 
+TWENTY: dict[str, Any] = {"x0": {"x": np.linspace(0.5, 2.0, 20)}, "backend": "cuda"}
+
 
 @pytest.fixture(autouse=True)
-def here(monkeypatch: pytest.MonkeyPatch) -> Callable[[Device], None]:
-    """The processor as the device; or another one, handed in."""
+def cupy(monkeypatch: pytest.MonkeyPatch) -> FakeCupy:
+    module = FakeCupy()
+    monkeypatch.setitem(sys.modules, "cupy", module)
+    return module
 
-    def use(device: Device) -> None:
-        monkeypatch.setattr(on_device, "find_device", lambda: device)
 
-    use(HostDevice())
-    return use
+def integrator(model: Model) -> Integrator:
+    return Integrator(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
 
 
 @pytest.mark.parametrize(
@@ -51,7 +59,7 @@ def test_members_are_those_of_the_virtual_machine(case: str) -> None:
         assert "friction jams" in ours.failed[1]
 
 
-def test_one_that_uses_up_its_steps_is_named() -> None:
+def test_a_member_without_enough_steps_is_named() -> None:
     arguments: dict[str, Any] = {"p": {"k": [1.0, 1e8, 4.0]}, "max_steps": 1000}
     ours = simulate_many(oscillator(), 1.0, backend="cuda", **arguments)
     assert_same(ours, simulate_many(oscillator(), 1.0, backend="vm", **arguments))
@@ -59,134 +67,98 @@ def test_one_that_uses_up_its_steps_is_named() -> None:
     assert ours.attempts[1] == 1000
 
 
-@dataclass(eq=False)
-class Counting:
-    """A device that notes its launches and the members that are to go on."""
-
-    device: HostDevice
-    launches: list[int]
-    todo: list[int]
-    lacking: int = 0
-
-    name, free = "counting", 2**30
-
-    def load(self, kernel: Any) -> Any:
-        loaded = self.device.load(kernel)
-
-        def launch(many: bytes, threads: int) -> None:
-            self.launches.append(threads)
-            loaded(many, threads)
-
-        launch.threads = loaded.threads  # type: ignore[attr-defined]
-        return launch
-
-    def put(self, array: Any) -> HostArray:
-        if array.dtype == np.int32:
-            self.todo.append(array.size)
-        if self.lacking and array.nbytes > self.lacking:
-            raise MemoryError
-        return self.device.put(array)
-
-    def full(self, shape: tuple[int, ...], value: float, kind: Any) -> HostArray:
-        return self.device.full(shape, value, kind)
-
-
-def members() -> Any:
+def members(backend: str = "cuda") -> Any:
     return simulate_many(
-        rabinowicz(LuGre()), 9.0, x0={"v": VELOCITIES}, t_eval=[0.0, 2.71, 9.0], backend="cuda"
+        rabinowicz(LuGre()), 9.0, x0={"v": VELOCITIES}, t_eval=[0.0, 2.71, 9.0], backend=backend
     )
 
 
-@pytest.mark.parametrize("threads", [1, 3, 1000])
-def test_the_number_of_threads_changes_nothing(
-    threads: int, here: Callable[[Device], None]
+def test_threads_launches_and_memory_change_nothing(
+    cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = members()
-    here(HostDevice(threads))
+    expected = members("vm")
     assert_same(members(), expected)
+    assert cupy.launches[0] == ((1,), (BLOCK,))
+    assert cupy.waited == len(cupy.launches)
+    assert all(module == cupy.modules[0] for module in cupy.modules)
+    assert (cupy.modules[0]["options"], cupy.modules[0]["backend"]) == (("--fmad=false",), "nvrtc")
+    assert "#include" not in cupy.modules[0]["code"]
+    for most in (1, 3):
+        cupy.most = most
+        assert_same(members(), expected)
+    cupy.room = 1000  # members in parts
+    assert_same(members(), expected)
+    cupy.room, cupy.largest = 2**30, 300  # another process took the rest meanwhile
+    before = len(cupy.launches)
+    assert_same(members(), expected)
+    assert len(cupy.launches) > before + 2
+    cupy.largest = 10
+    with pytest.raises(MemoryError):
+        members()
+    cupy.largest, cupy.most, cupy.todo = 2**30, 4, []
+    monkeypatch.setattr(OnDevice, "launched", lambda self, spent: None)
+    assert_same(members(), expected)
+    assert cupy.todo[0] == 7
+    assert cupy.todo == sorted(cupy.todo, reverse=True)  # finished members are left out
+    assert len(cupy.todo) >= expected.attempts.sum() / 128  # four threads of 32 attempts
 
 
-def test_short_launches_change_nothing_and_leave_out_who_is_done(
-    here: Callable[[Device], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    expected, device = members(), Counting(HostDevice(4), [], [])
-    here(device)
-    monkeypatch.setattr(on_device.DeviceMembers, "budget", 40)
-    monkeypatch.setattr(on_device.DeviceMembers, "launched", lambda self, spent: None)
-    assert_same(members(), expected)
-    assert device.todo[0] == 7
-    assert device.todo == sorted(device.todo, reverse=True)
-    assert device.launches == [min(4, left) for left in device.todo]
-    # four threads of 40 attempts each
-    assert len(device.launches) >= expected.attempts.sum() / 160
-
-
-def test_what_the_memory_does_not_hold_goes_in_parts(here: Callable[[Device], None]) -> None:
-    expected = members()
-    here(HostDevice(free=1000))
-    assert_same(members(), expected)
-    device = Counting(HostDevice(), [], [], lacking=200)  # others took the rest meanwhile
-    here(device)
-    assert_same(members(), expected)
-    assert max(n for n in device.todo) == 7 // 2 or len(device.launches) > 1
+def test_the_budget_of_a_launch_approaches_its_time() -> None:
+    own = integrator(oscillator())
+    device = OnDevice.of(own, np.array([0.0, 1.0]), np.array([1.0]), 100, "double")
+    budgets = [device.budget]
+    for spent in (1e-9, 0.125, 0.5, 2.5):
+        device.launched(spent)
+        budgets.append(device.budget)
+    assert budgets == [32, 128, 256, 128, 12]
 
 
 def test_chunks_change_nothing_and_progress_rises_between_launches() -> None:
     told: list[float] = []
-    arguments: dict[str, Any] = {"x0": {"x": np.linspace(0.5, 2.0, 10)}, "backend": "cuda"}
-    whole = simulate_many(oscillator(), 1.0, **arguments)
-    assert_same(simulate_many(oscillator(), 1.0, chunk=3, **arguments), whole)
-    assert_same(simulate_many(oscillator(), 1.0, chunk=3, progress=told.append, **arguments), whole)
+    whole = simulate_many(oscillator(), 1.0, **TWENTY)
+    for progress in (None, told.append):
+        assert_same(simulate_many(oscillator(), 1.0, chunk=6, progress=progress, **TWENTY), whole)
     assert told == sorted(told)
     assert set(told) >= {0.3, 0.6, 0.9, 1.0}
 
 
-def test_an_interrupt_keeps_what_is_finished_and_a_folder_goes_on(tmp_path: Path) -> None:
-    arguments: dict[str, Any] = {
-        "x0": {"x": np.linspace(0.5, 2.0, 20)}, "chunk": 4, "backend": "cuda", "out": tmp_path,
-    }  # fmt: skip
-    many = simulate_many(oscillator(), 1.0, progress=after(3), **arguments)
+def test_an_interrupt_keeps_finished_chunks_and_a_folder_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = TWENTY | {"chunk": 4, "out": tmp_path}
+    many = simulate_many(oscillator(), 1.0, progress=after(3), **given)
     assert many.status is Status.INTERRUPTED
     finished = np.isfinite(many["x"][:, 0])
     assert 4 <= finished.sum() < 20
     np.testing.assert_array_equal(finished, np.isfinite(many.reached))
-    again = simulate_many(oscillator(), 1.0, **arguments)
+    again = simulate_many(oscillator(), 1.0, **given)
     assert again.status is Status.SUCCESS
-    arguments.pop("out")
-    assert_same(again, simulate_many(oscillator(), 1.0, **arguments))
+    assert_same(again, simulate_many(oscillator(), 1.0, **TWENTY | {"chunk": 4}))
     assert len(list(tmp_path.iterdir())) == 1
-
-
-def test_an_interrupt_between_launches_ends_a_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(on_device.DeviceMembers, "budget", 5)
-    monkeypatch.setattr(on_device.DeviceMembers, "launched", lambda self, spent: None)
-    told = list[float]()
-
-    def progress(fraction: float) -> None:
-        told.append(fraction)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(on_device, "find_device", lambda: HostDevice(2))
-    x0 = {"x": np.linspace(0.5, 2.0, 20)}
-    many = simulate_many(oscillator(), 1.0, x0=x0, backend="cuda", progress=progress)
+    monkeypatch.setattr(OnDevice, "launched", lambda self, spent: setattr(self, "budget", 5))
+    many = simulate_many(oscillator(), 1.0, progress=after(1), **TWENTY)  # between two launches
     assert many.status is Status.INTERRUPTED
-    assert 0 < told[0] < 1
     assert np.isnan(many.reached).all()
 
 
-def test_the_size_of_a_chunk_is_that_of_its_work_or_of_its_results() -> None:
+def test_the_size_of_a_chunk_depends_on_its_work_and_its_results() -> None:
+    own = integrator(oscillator())
     kernel = Kernel("", DOUBLE, rows=7, given=5, states=2, signals=4, operations=800)
-    assert on_device.chunk_of(kernel, 1, 0) == 2**30 // 800
-    assert on_device.chunk_of(kernel, 10_000, 0) == 2**30 // (8 * 40_012)
-    assert on_device.chunk_of(kernel, 1, 10**9) == 1
-    half = replace(kernel, real=on_device.REALS["float"])
-    assert on_device.chunk_of(half, 10_000, 0) == 2**30 // (4 * 40_012)
+    for times, real, size in (
+        (1, "double", 2**30 // 800),
+        (10_000, "double", 2**30 // (8 * 40_012)),
+        (10_000, "float", 2**30 // (4 * 40_012)),
+        (10**9, "double", 1),
+    ):
+        task = OnDevice.of(own, np.array([0.0, 1.0]), np.array([1.0]), 100, real)
+        task.kernel = replace(kernel, real=REALS[real])
+        task.job = replace(task.job, times=np.broadcast_to(1.0, (times,)))
+        assert task.chunk(SimpleNamespace(own={})) == size  # type: ignore[arg-type]
 
 
 def with_events() -> Model:
     model = oscillator()
-    event = Event("through", model.x[0].symbol)
-    return replace(model, events=(event,))
+    return replace(model, events=(Event("through", model.x[0].symbol),))
 
 
 @pytest.mark.parametrize(
@@ -197,16 +169,76 @@ def with_events() -> Model:
         ({"workers": 2}, "no executor and no workers.*, got workers = 2"),
         ({"real": "half"}, "simulate_many: real: expected one of double, float, got half"),
         ({"real": "float"}, "rtol: expected at least 1e-05 with real='float', got 1e-06"),
-        (
-            {"real": "float", "backend": "auto"},
-            "real: expected double for this backend, got float",
-        ),
+        ({"real": "float", "backend": "auto"}, "expected double for this backend, got float"),
     ],
 )
-def test_what_a_device_has_no_use_for_is_refused(arguments: dict[str, Any], message: str) -> None:
+def test_unsupported_arguments_are_refused(arguments: dict[str, Any], message: str) -> None:
     given = {"model": oscillator(), "t_end": 1.0, "backend": "cuda"} | arguments
     with pytest.raises(ValueError, match=message):
         simulate_many(**given)
+
+
+def test_the_device_of_cupy(cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = Device.found()
+    assert device.name == "Fake 100"
+    # 94 registers of 32 threads are 3072 of 65536: 21 warps, 10 blocks of 64 threads
+    assert device.threads(94) == 3 * 640
+    assert device.threads(0) == device.threads(8) == 3 * 2048
+    assert device.threads(255) == 3 * 256
+    cupy.refuses = True
+    with pytest.raises(DeviceError, match=r"NVRTC did not compile.*identifier is undefined\)"):
+        members()
+    cupy.refuses, cupy.broken = False, True
+    with pytest.raises(DeviceError, match=r"processor stopped \(cudaErrorLaunchTimeout"):
+        members()
+    driver = r"needs a graphics processor of NVIDIA.*{}.*nvidia-"
+    for module, why in (
+        (FakeCupy(0), driver.format("no device found")),
+        (FakeCupy(-1), driver.format("CUDA driver version is insufficient")),
+        (None, r"needs CuPy .*; pip install 'symfric\[cuda\]', or use"),
+    ):
+        monkeypatch.setitem(sys.modules, "cupy", module)
+        with pytest.raises(DeviceError, match=why):
+            members()
+    assert not members("auto").failed  # which never uses it
+
+
+STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror")
+COMPILERS = {
+    "gcc": ("-std=c99", "-x", "c"), "clang": ("-std=c99", "-x", "c"),
+    "g++": ("-std=c++17", "-x", "c++"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_kernel_is_c_and_cpp_without_a_warning(compiler: str) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"needs {compiler}")
+    for model, real in ((root(), "double"), (switched(), "float")):
+        kernel = kernel_of(integrator(model), model.name == "switched", REALS[real])
+        subprocess.run(
+            [compiler, *COMPILERS[compiler], *STRICT, "-fsyntax-only", "-"],
+            input=f"{ON_HOST}{kernel.text}{LAUNCH_ON_HOST}", text=True, check=True,
+        )  # fmt: skip
+
+
+def test_the_kernel_has_only_what_it_needs() -> None:
+    own = integrator(rabinowicz(BrownMcPhee()))
+    between, ends = kernel_of(own), kernel_of(own, between=False)
+    assert between is kernel_of(own)
+    assert ends.operations < between.operations
+    assert "real *D)" not in ends.text
+    for kernel in (between, ends):
+        assert "symfric_round(const" not in kernel.text
+        assert "#define FOLLOWS 0" in kernel.text
+    follows = kernel_of(integrator(switched()))
+    assert "symfric_round(const" in follows.text
+    assert "#define FOLLOWS 2" in follows.text
+    single = kernel_of(own, real=REALS["float"])
+    attempt = single.text[single.text.index("symfric_attempt(") : single.text.index("#define N ")]
+    assert "double" not in attempt
+    assert "1.1754944e-38f" in attempt
+    assert "#define SF_POWF powf" in single.text
 
 
 @pytest.mark.slow

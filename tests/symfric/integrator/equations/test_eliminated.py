@@ -9,7 +9,7 @@ from symfric import BrownMcPhee, Viscous, simulate
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
-from symfric.integrator.methods.explicit import eliminated
+from symfric.integrator.methods.families import eliminated
 from symfric.integrator.methods.tableaux import DOPRI5
 from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model

@@ -8,6 +8,7 @@ import pytest
 from differentiable import oscillator
 
 from symfric import Hold, Model, Output, Variable
+from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.many.members import (
     CompiledMembers,
@@ -17,6 +18,7 @@ from symfric.integrator.many.members import (
     many_source,
 )
 from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.engine import VmEngine
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
@@ -28,7 +30,7 @@ def compiled(integrator: Integrator) -> Members:
 
 
 def vm(integrator: Integrator) -> Members:
-    return VmMembers.of(integrator.step.serialize(), integrator.signals.serialize(), ())
+    return VmMembers(VmEngine(integrator.step), Columns(integrator.signals), None)
 
 
 each_loop = pytest.mark.parametrize("make", [vm, compiled])

@@ -6,7 +6,7 @@ import pytest
 from closed_forms import assemble
 
 from symfric import LuGre, Model, Variable, rabinowicz
-from symfric.integrator.methods.explicit import SMALL, exp_phi1_phi2
+from symfric.integrator.methods.families import SMALL, exp_phi1_phi2
 from symfric.integrator.methods.tableaux import EXPONENTIAL
 from symfric.integrator.step.attempt import build_fixed
 

@@ -5,7 +5,7 @@ import pytest
 from closed_forms import assemble, smooth_dae, smooth_ode
 
 from symfric import Model, Variable
-from symfric.integrator.methods.explicit import need_ode
+from symfric.integrator.methods.families import need_ode
 from symfric.integrator.methods.method import combination
 
 x, y = Variable("x", "1", start=1.0), Variable("y", "1", start=1.0)

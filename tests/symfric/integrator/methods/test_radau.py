@@ -8,8 +8,8 @@ import pytest
 from closed_forms import assemble, observed_order, smooth_dae, smooth_ode
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz, simulate, simulate_many
-from symfric.integrator.methods.implicit import eigenbasis, through
-from symfric.integrator.methods.tableaux import RADAU5
+from symfric.integrator.methods.families import eigenbasis
+from symfric.integrator.methods.tableaux import RADAU5, through
 from symfric.integrator.step.attempt import KAPPA, build_fixed, build_step, converged
 from symfric.integrator.step.layout import Given, State
 from symfric.scenes import SliderCrank

@@ -22,8 +22,7 @@ from closed_forms import (
 from numpy.typing import NDArray
 
 from symfric import Model, Variable
-from symfric.integrator.methods.explicit import Explicit
-from symfric.integrator.methods.implicit import Radau, Rosenbrock
+from symfric.integrator.methods.families import Explicit, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import ADAPTIVE, DOPRI5, METHODS
 from symfric.integrator.step.attempt import build_fixed

@@ -1,0 +1,122 @@
+"""Tasks in processes of their own, which may crash or hang."""
+
+import os
+import signal
+from collections.abc import Callable, Generator, Iterable
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import wait
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic
+from typing import Any, NamedTuple, final
+
+WALL = 10
+"""Wall time over processor time after which a task counts as blocked."""
+
+Work = Callable[[Any], Any]
+Task = tuple[int, Any]
+"""Number of a task, and the argument of the work."""
+
+
+@final
+class Crashed(NamedTuple):
+    """The process of a task ended: its signal or exit status, and its last line of output."""
+
+    how: str
+    last_line: str
+
+
+@final
+class TimedOut(NamedTuple):
+    """A task took more processor time than its limit [s]."""
+
+    limit: float
+
+
+@final
+@dataclass(frozen=True)
+class _Running:
+    number: int
+    process: Any
+    log: Path
+    since: float
+
+
+def outcomes(
+    work: Work, tasks: Iterable[Task], size: int, limit: float
+) -> Generator[tuple[int, Any]]:
+    """Yield number and result of each task as they come, or `Crashed` or `TimedOut`.
+
+    Each task has a process, a copy of one that has imported the module of `work`. Closing the
+    iterator ends all processes.
+
+    Args:
+        work: function of a module, called with the argument of a task.
+        tasks: numbers and arguments.
+        size: number of processes at a time.
+        limit: processor time of a task [s], which a loaded machine does not change; wall time is
+            limited to `WALL` times as much.
+    """
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["__main__", work.__module__])
+    waiting, running = iter(tasks), dict[Any, _Running]()
+    with TemporaryDirectory(prefix="symfric-") as folder:
+        try:
+            while True:
+                while len(running) < size and (task := next(waiting, None)) is not None:
+                    pipe, end = context.Pipe(duplex=False)
+                    log = Path(folder) / f"{task[0]}.txt"
+                    arguments = (work, task[1], end, str(log), limit)
+                    process = context.Process(target=_run, args=arguments, daemon=True)
+                    process.start()
+                    end.close()
+                    running[pipe] = _Running(task[0], process, log, monotonic())
+                if not running:
+                    return
+                wait([*running], timeout=1.0)
+                for pipe, one in [*running.items()]:
+                    late = monotonic() - one.since > WALL * limit
+                    if pipe.poll() or late:
+                        result = _result(pipe, one, limit) if pipe.poll() else TimedOut(limit)
+                        del running[pipe]
+                        _end(pipe, one)
+                        yield one.number, result
+        finally:
+            for pipe, one in running.items():
+                _end(pipe, one)
+
+
+def _end(pipe: Any, one: _Running) -> None:
+    one.process.kill()
+    one.process.join(10)
+    pipe.close()
+
+
+def _result(pipe: Any, one: _Running, limit: float) -> Any:
+    """Return the result of a task, or describe how its process ended."""
+    try:
+        return pipe.recv()
+    except (EOFError, ConnectionError):
+        one.process.join(10)
+    code = one.process.exitcode or 0
+    if code == -signal.SIGPROF:
+        return TimedOut(limit)
+    lines = one.log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    how = signal.Signals(-code).name if code < 0 else f"exit status {code}"
+    return Crashed(how, lines[-1] if lines else "no output")
+
+
+def _run(work: Work, argument: Any, pipe: Any, log: str, limit: float) -> None:
+    """Run one task; an exception ends the process, its traceback in `log`.
+
+    The timer counts processor time and ends the process by SIGPROF, inside compiled code, too.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the parent handles Ctrl-C
+    with open(log, "w", encoding="utf-8") as output:
+        os.dup2(output.fileno(), 1)
+        os.dup2(output.fileno(), 2)
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    result = work(argument)
+    signal.setitimer(signal.ITIMER_PROF, 0.0)
+    pipe.send(result)

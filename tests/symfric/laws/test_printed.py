@@ -1,0 +1,222 @@
+"""Every static law computes the equation that it prints, and the digits of a catalogue.
+
+The catalogue has levels of 1 N and 1.5 N and a characteristic velocity of 1e-3 m/s; it prints nine
+digits after the point, computed by a third program.
+"""
+
+from dataclasses import replace
+from itertools import product
+from math import isfinite
+
+import casadi as ca
+import numpy as np
+import printed_laws
+import pytest
+from printed_laws import PRINTED
+
+from symfric import ALL_LAWS, BrownMcPhee, Coulomb, Law, LuGre, Stribeck, parameters, with_values
+from symfric.laws import (
+    BAM,
+    Ambrosio,
+    Andersson,
+    Awrejcewicz,
+    BengisuAkay,
+    Benson,
+    Exudyn,
+    Hollars,
+    Karnopp,
+    LeineSwitch,
+    MakkarDixon,
+    ModifiedThrelfall,
+    PoppStelter,
+    QuarterCarGeneral,
+    SimscapeBreakaway,
+    Specker,
+    SteadyStateLuGre,
+    Step5,
+    Threlfall,
+    VelocityBased,
+    Wojewoda,
+    law_name,
+)
+
+BOTH = {"mu_s": 1.5, "mu_d": 1.0}
+V = (1e-4, 5e-4, 1e-3, 2e-3, 1e-2)
+"""Velocities of the catalogue [m/s]."""
+CATALOGUE: list[tuple[Law, tuple[float, ...]]] = [
+    (Coulomb(1.0), (0.099667995, 0.462117157, 0.761594156, 0.964027580, 0.999999996)),
+    (Coulomb(1.0, shape="atan"), (0.063451035, 0.295167235, 0.5, 0.704832765, 0.936548965)),
+    (Coulomb(1.0, shape="erf"), (0.112462916, 0.520499878, 0.842700793, 0.995322265, 1.0)),
+    (Coulomb(1.0, shape="sqrt"), (0.099503719, 0.447213595, 0.707106781, 0.894427191, 0.995037190)),
+    (Coulomb(1.0, shape="saturation"), (0.1, 0.5, 1.0, 1.0, 1.0)),
+    (Coulomb(1.0, shape="quadratic"), (0.19, 0.75, 1.0, 1.0, 1.0)),
+    (Threlfall(1.0, form="original"), (0.259181779, 0.776869840, 0.950212932, 0.95, 0.95)),
+    (ModifiedThrelfall(1.0, form="original"), (0.272761789, 0.817574476, 1.0, 1.0, 1.0)),
+    (Ambrosio(1.0, form="original"), (0.0, 0.375, 1.0, 1.0, 1.0)),
+    (BengisuAkay(**BOTH, form="original"), (0.285, 1.125, 1.5, 1.183939721, 1.000061705)),
+    (VelocityBased(**BOTH, form="original"), (0.22425, 1.03125, 1.5, 1.0, 1.0)),
+    (Benson(**BOTH, v_eps=0.0), (1.452418709, 1.30326533, 1.183939721, 1.067667642, 1.0000227)),
+    (Andersson(**BOTH), (1.13860224, 1.38927424, 1.183939716, 1.009157819, 1.0)),
+    (Hollars(**BOTH, v_t=1e-3, u_eps=0.0), (0.199009901, 0.9, 1.5, 1.2, 1.00990099)),
+    (Exudyn(**BOTH, u_eps=0.0), (0.15, 0.75, 1.5, 1.183939721, 1.000061705)),
+    (Step5(**BOTH), (0.01284, 0.75, 1.5, 1.25, 1.0)),
+    (BrownMcPhee(**BOTH), (0.468248208, 1.342725805, 1.4993293, 1.326530387, 1.007540767)),
+    (SimscapeBreakaway(**BOTH), (0.843619068, 1.363657058, 1.499999996, 1.22313016, 1.0)),
+    (Specker(**BOTH), (0.843619069, 1.363657061, 1.5, 1.223130162, 1.0)),
+    (MakkarDixon(), (1.092557237, 1.268805228, 1.119202916, 1.01798621, 1.000000002)),
+    (
+        LeineSwitch(1.5, form="original"),
+        (1.499550135, 1.49775337, 1.49551346, 1.491053678, 1.45631068),
+    ),
+    (
+        LeineSwitch(1.5, v_eps=1e-6),
+        (1.49000402, 1.495846374, 1.494561387, 1.490579061, 1.456217968),
+    ),
+    (
+        PoppStelter(1.5, d=1.0, kappa=0.1, v_eps=0.0),
+        (1.499925008, 1.499625212, 1.499250849, 1.498503394, 1.492584257),
+    ),
+    *(
+        (Stribeck(**BOTH, delta=delta, v_eps=0.0), row)
+        for delta, row in {
+            0.78: (1.423540613, 1.279287385, 1.183939721, 1.089790325, 1.001208056),
+            1.0: (1.452418709, 1.303265330, 1.183939721, 1.067667642, 1.000022700),
+            2.0: (1.495024917, 1.389400392, 1.183939721, 1.009157819, 1.000000000),
+            3.2: (1.499684621, 1.448446451, 1.183939721, 1.000051049, 1.000000000),
+        }.items()
+    ),
+]
+MM_PER_MIN = np.array([100, 140, 210, 294, 390, 500]) / 60000
+PUBLISHED = {
+    "pilot": (3.2145, 3.1306, 3.3552, 3.6768, 4.0448, 4.4665),
+    "main": (4.2237, 4.1312, 3.8051, 3.2418, 2.7793, 2.6550),
+}
+FINE = 0.0123e-3 * 1.17 ** np.arange(60)
+"""Velocities from 1e-5 to 0.13 m/s, on no knot of any law."""
+
+
+def test_force_has_the_printed_digits_and_is_that_of_plain_python() -> None:
+    for law, row in CATALOGUE:
+        assert law.force(np.array(V), 1.0) == pytest.approx(row, abs=5.1e-10), law
+        v = np.concatenate([V, FINE])
+        expected = [PRINTED[law_name(law)](law, x, 1.0) for x in v]
+        assert law.force(v, 1.0) == pytest.approx(expected, rel=1e-12, abs=1e-15), law
+        assert (law.force(-v, 1.0) == -np.asarray(law.force(v, 1.0))).all(), law
+        if isinstance(law, Stribeck):
+            narrow = replace(law, v_eps=1e-12).force(np.array(V), 1.0)
+            assert narrow == pytest.approx(row, abs=1e-7 if law.delta < 1 else 1e-9)
+            bristle = LuGre(**BOTH, delta=law.delta, v_eps=0.0)
+            for v, g in zip(V, row, strict=True):
+                force = bristle.force(-v, 7.0, bristle.steady_state(-v, 7.0))
+                assert force == pytest.approx(-7 * g, abs=7 * 5.1e-10)
+    for name, row in PUBLISHED.items():
+        law = getattr(SteadyStateLuGre, name)()
+        assert law.force(MM_PER_MIN, 99.0) == pytest.approx(row, abs=5.1e-5)
+
+
+SHARP = {"hollars": {"u_eps": 0.0}, "exudyn": {"u_eps": 0.0}}
+"""Laws whose equation is printed for the float 0 of a width."""
+
+
+def drawn(law: Law, rng: np.random.Generator) -> Law:
+    """Return the law with numbers over decades of their defaults, in the order that it asks for."""
+    values: dict[str, float] = {}
+    for name, p in parameters(law).items():
+        if name == "u_eps":
+            continue
+        default = float(p.value) or {"viscous": 0.3, "shape": 0.4}.get(p.role, 0.0)
+        if p.role in ("shape", "temperature", "geometry") and isfinite(p.upper):
+            low = max(p.lower, 0.0 if p.role == "temperature" else -1.0)
+            values[name] = float(rng.uniform(low, p.upper))
+        else:
+            values[name] = abs(default) * 10 ** float(rng.uniform(-2, 2))
+    for low, high in (*law.ordered, *law.strictly_ordered):
+        if values[low] > values[high]:
+            values[low], values[high] = values[high], values[low]
+    return with_values(law, values)
+
+
+def differing(count: int, seed: int) -> list[str]:
+    """Return the cases that differ by more than rounding.
+
+    Where an equation holds |v|, the law may differ by 1e-4 of what falls.
+    """
+    rng, wrong = np.random.default_rng(seed), list[str]()
+    for name, _ in product(PRINTED, range(count)):
+        law = drawn(replace(ALL_LAWS[name](), **SHARP.get(name, {})), rng)
+        scales = [float(p.value) for p in parameters(law).values() if p.unit == "m/s"]
+        v = float((rng.choice(scales) if scales else 1e-3) * 10 ** rng.uniform(-5, 3))
+        N = float(10 ** rng.uniform(-2, 3))
+        expected, found = PRINTED[name](law, v, N), float(law.force(v, N))
+        falls = abs(float(law.static_level(N)))
+        if abs(found - expected) > 1e-9 * abs(expected) + 1e-4 * falls * (found != expected):
+            wrong.append(f"{law} at v = {v:g}, N = {N:g}: {found:g}, printed {expected:g}")
+    return wrong
+
+
+def test_force_is_the_printed_equation_at_any_numbers() -> None:
+    assert differing(40, seed=1) == []
+    static = {name for name, kind in ALL_LAWS.items() if not kind().states}
+    assert static - set(PRINTED) == {law_name(law) for law, *_ in WITH_INPUTS}
+
+
+@pytest.mark.slow
+def test_force_is_the_printed_equation_at_many_numbers() -> None:
+    assert differing(4000, seed=2) == []
+
+
+SLOW = (-3e-3, -1e-3, -7e-4, -1e-5, 0.0, 1e-5, 5e-4, 9.99e-4, 1e-3, 2e-3, 0.05)
+LOADS = (-3.0, -1.5, -0.4, 0.0, 0.2, 1.2, 1.5, 1.7)
+CAR = QuarterCarGeneral(sigma_v=50.0)
+STRUT = {"x_rel": (5e-3, -6.9e-3, 0.0), "v_rel": (0.0, 0.02, -0.3)}
+SERVO = BAM(K_s=0.03, K_e=0.04, K_m=0.06, K_es=0.02, K_ms=0.05, Q_e=0.01, Q_m=0.02, v_eps=1e-9,
+            tau_eps=1e-6)  # fmt: skip
+WITH_INPUTS: list[tuple[Law, tuple[float, ...], dict[str, tuple[float, ...]], float]] = [
+    (Awrejcewicz(**BOTH, form="original"), SLOW, {"F_e": LOADS}, 1e-12),
+    (Karnopp(**BOTH, form="original", sigma_2=0.4), SLOW, {"F_e": LOADS}, 1e-12),
+    (CAR, (-0.3, -0.01, 2e-3, 0.1), STRUT, 1e-12),
+    (replace(CAR, form="as_printed"), (-0.3, -0.01, 0.0, 2e-3, 0.1), STRUT, 1e-12),
+    (Wojewoda(**BOTH, v_eps=1e-6, a_eps=1e-4), (5e-3, 0.1), {"dv": (-3.0, -0.5, 0.5, 3.0)}, 1e-12),
+    (SERVO, (0.1, 3.0), {"tau_m": (-1.0, -0.3, 0.2, 0.9), "tau_e": (-0.7, 0.4)}, 1e-10),
+]
+"""Laws that need more than v and N: law, velocities, values of its inputs, relative rounding."""
+
+
+def test_force_of_a_law_with_further_inputs_is_the_printed_equation() -> None:
+    for law, speeds, inputs, rounding in WITH_INPUTS:
+        formula = getattr(printed_laws, law_name(law))
+        for v, *values in product(speeds, *inputs.values()):
+            given = dict(zip(inputs, values, strict=True))
+            expected = formula(law, v, 1.0, **given)
+            found = law.force(v, 1.0, **given)
+            assert found == pytest.approx(expected, rel=rounding, abs=1e-15), (law, v, given)
+
+
+DELTAS = (0.1, 0.2, 0.35, 0.5, 0.7, 0.78, 1.0, 1.3, 1.7, 2.0, 2.5, 3.2, 5.0, 10.0)
+
+
+def test_stribeck_differs_from_its_equation_by_less_than_it_says() -> None:
+    """At every speed, for v_eps from far below to far above v_s."""
+    for delta, v_s, ratio in product(
+        DELTAS, (1e-9, 1e-3, 20.0), (1e-8, 1e-4, 1e-2, 0.09, 0.5, 3.0, 1e4)
+    ):
+        law = Stribeck(mu_s=0.4, mu_d=0.1, v_s=v_s, delta=delta, v_eps=ratio * v_s)
+        v = v_s * np.concatenate(
+            [np.geomspace(1e-14, 1e3, 500), ratio * np.geomspace(1e-7, 9, 250)]
+        )
+        with np.errstate(over="ignore"):
+            printed = (0.1 + 0.3 * np.exp(-((v / v_s) ** delta))) * np.tanh(v / law.v_eps)
+        error = np.abs(law.force(v, 5.0) - 5.0 * printed)
+        assert error.max() < 1e-4 * 0.3 * 5.0, law
+        assert delta < 0.7 or ratio >= 1 or (error / (5.0 * printed)).max() < 1e-3, law
+
+
+def test_derivatives_of_stribeck_stay_finite_at_every_exponent() -> None:
+    v, d = ca.SX.sym("v"), ca.SX.sym("d")
+    speeds = [0.0, 1e-300, 1e-20, 1e-12, 1e-6, 1e-3, 1.0, 1e3]
+    points = ca.DM([*product(speeds, DELTAS)]).T
+    for v_s, v_eps in ((1e-3, 1e-4), (1e-9, 1e-15), (20.0, 2.0)):
+        F = Stribeck(delta=d, v_s=v_s, v_eps=v_eps).force(v, 5.0)
+        hessian, gradient = ca.hessian(F, ca.vertcat(v, d))
+        f = ca.Function("f", [v, d], [ca.vertcat(F, gradient, ca.vec(hessian))])
+        assert f(v_s * points[0, :], points[1, :]).is_regular(), (v_s, v_eps)
