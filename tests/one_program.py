@@ -9,10 +9,14 @@ import casadi as ca
 import numpy as np
 
 from symfric.codegen import Block, law_block
+from symfric.codegen.guards import Status
 from symfric.codegen.layout import CBlock
-from symfric.codegen.runner import WARNINGS, program
+from symfric.codegen.runner import WARNINGS, program, run_vm
 from symfric.codegen.source import header, source
+from symfric.codegen.vectors import changed_value
+from symfric.codegen.verification import excitation, spoiled, varied
 from symfric.emitter.c99 import REALS
+from symfric.foundation.numeric import bound
 from symfric.foundation.programs import Compiler, finished
 
 block_of = cache(law_block)
@@ -31,6 +35,27 @@ def along(
     steps = block.step.mapaccum("steps", n, {"base": 10})
     states, outputs = steps(ca.DM(x), np.broadcast_to(p, (n, p.shape[-1])).T, inputs.T)
     return states.full().T, outputs.full().T
+
+
+class Stepper:
+    """Block that makes one step a call, by CasADi; inputs that are not given are 0.
+
+    `x` are its states, which may be written between steps.
+    """
+
+    def __init__(self, block: Block, **parameters: float) -> None:
+        self.block = block
+        self.x = np.array([float(v.start) for v in block.states])
+        self.p = np.array([parameters.get(v.name, float(v.start)) for v in block.parameters])
+        self.u, self.y = np.zeros(len(block.inputs)), np.zeros(len(block.outputs))
+        self.end = np.zeros_like(self.x)
+        self.go = bound(block.step, (self.x, self.p, self.u), (self.end, self.y))
+
+    def __call__(self, **inputs: float) -> dict[str, float]:
+        self.u[:] = [inputs.get(v.name, 0.0) for v in self.block.inputs]
+        self.go()
+        self.x[:] = self.end
+        return dict(zip(self.block.outputs, self.y.tolist(), strict=True))
 
 
 STRICT = ("-std=c99", "-ffp-contract=off", *WARNINGS, "-Werror")
@@ -82,3 +107,34 @@ class OneProgram:
             numbers = numbers[steps * columns :]
         assert not numbers.size
         return found
+
+
+STEPS = 120
+
+
+def jobs_of(program: OneProgram) -> list[Job]:
+    """Valid inputs, bad ones, other parameters, and every parameter changed alone."""
+    jobs = []
+    for k, c in enumerate(program.several):
+        u = excitation(c.block, STEPS)
+        start = np.array([float(v.start) for v in c.block.parameters])
+        one_by_one = np.tile(start, (STEPS, 1))
+        for i, v in enumerate(c.block.parameters):
+            one_by_one[4 * i : 4 * i + 4, i] = changed_value(v)
+        jobs += [(k, u), (k, spoiled(c.block, u)), (k, u, varied(c.block, STEPS, 10.0)),
+                 (k, u, one_by_one)]  # fmt: skip
+    return jobs
+
+
+def has_bits(program: OneProgram, limited: frozenset[int] = frozenset()) -> None:
+    """The rows and status of all jobs are those of CasADi in double; valid numbers set no bit."""
+    jobs = jobs_of(program)
+    for number, ((k, u, *p), rows) in enumerate(zip(jobs, program.run(jobs), strict=True)):
+        c = program.several[k]
+        assert np.array_equal(rows, run_vm(c, u, None, *p), equal_nan=True), (k, c.block.doc)
+        status = rows[:, -1].astype(int)
+        if number % 4 == 1:
+            assert status.any()
+            assert k in limited or not (status & Status.OUTPUT).any()
+        else:
+            assert not status.any()

@@ -125,7 +125,6 @@ class Stores:
 
 
 @final
-@dataclass(frozen=True)
 class Plan:
     """Function as statements.
 
@@ -134,30 +133,9 @@ class Plan:
         bodies: the statements of each region in order.
         takes: nodes of its own region that each statement takes, including its inner statements.
         goals: select -> the select or result that it is a side or all of, whose place it takes.
+        waiting: selects of branches that wait for each other.
     """
 
-    placed: Placed
-    bodies: tuple[tuple[Statement, ...], ...]
-    takes: Mapping[Statement, frozenset[int]]
-    goals: Mapping[int, int | Store]
-
-
-def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
-    """Return the statements of a simplified graph.
-
-    Args:
-        bools: for each node, True if it is a bool.
-        stores: rules for writing results.
-    """
-    apart: set[int] = set()
-    while True:
-        plan, waiting = _Planner(placed(source, apart), bools, stores).result()
-        if not waiting:
-            return plan
-        apart |= waiting
-
-
-class _Planner:
     def __init__(self, found: Placed, bools: Sequence[bool], stores: Stores) -> None:
         self.placed, self.nodes, self.stores = found, found.source.nodes, stores
         groups = defaultdict[tuple[int, int], list[int]](list)
@@ -171,23 +149,19 @@ class _Planner:
         self.goals = self._goals(bools, uses)
         self.items: list[list[Statement]] = [[] for _ in found.regions]
         self.takes: dict[Statement, set[int]] = {}
-
-    def result(self) -> tuple[Plan, set[int]]:
-        """Return the plan, and the selects of branches that wait for each other."""
         self._collect()
         self._connect()
-        bodies, waiting = list[tuple[Statement, ...]](), set[int]()
-        for statements in self.items:
-            last = [self.stores.late and isinstance(s, Store) for s in statements]
-            early = [s for s, late in zip(statements, last, strict=True) if not late]
-            order = ordered([self.takes[s] for s in early], [_made(s) for s in early])
-            late = (s for s, late in zip(statements, last, strict=True) if late)
-            bodies.append((*(early[k] for k in order), *late))
-            left = {*range(len(early))}.difference(order)
-            branches = (s for s in (early[k] for k in left) if isinstance(s, Branch))
-            waiting.update(i for branch in branches for i in branch.selects)
-        takes = {statement: frozenset(values) for statement, values in self.takes.items()}
-        return Plan(self.placed, tuple(bodies), takes, self.goals), waiting
+        self.waiting = set[int]()
+        self.bodies = [self._in_order(statements) for statements in self.items]
+
+    def _in_order(self, statements: Sequence[Statement]) -> list[Statement]:
+        """Return the statements of a region in order, without those that wait for each other."""
+        last = [s for s in statements if self.stores.late and isinstance(s, Store)]
+        early = [s for s in statements if s not in last]
+        order = ordered([self.takes[s] for s in early], [_made(s) for s in early])
+        left = (early[k] for k in {*range(len(early))}.difference(order))
+        self.waiting.update(i for s in left if isinstance(s, Branch) for i in s.selects)
+        return [*(early[k] for k in order), *last]
 
     def _written(self) -> Iterator[tuple[int, int]]:
         """Yield every operand that is written somewhere, and the number of times."""
@@ -303,6 +277,19 @@ class _Planner:
         if isinstance(at, Branch) and i in at.selects and at is not statement:
             at = inner
         self.takes.setdefault(at, set()).add(i)
+
+
+def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
+    """Return the statements of a simplified graph.
+
+    Args:
+        bools: for each node, True if it is a bool.
+        stores: rules for writing results.
+    """
+    apart: set[int] = set()
+    while (plan := Plan(placed(source, apart), bools, stores)).waiting:
+        apart |= plan.waiting
+    return plan
 
 
 def _made(statement: Statement) -> tuple[int, ...]:

@@ -7,14 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from law_cases import CASES, NO_STEP
-from one_program import STRICT, OneProgram, block_of
+from one_program import STRICT, OneProgram, block_of, has_bits, jobs_of
 
 from symfric.codegen import plant_block
 from symfric.codegen.compared import Run
-from symfric.codegen.guards import Status
 from symfric.codegen.runner import run_vm
-from symfric.codegen.vectors import changed_value
-from symfric.codegen.verification import excitation, spoiled, varied
+from symfric.codegen.verification import excitation
 from symfric.foundation.programs import Compiler
 from symfric.laws import BrownMcPhee, LuGre
 from symfric.scenes import ALL_SCENES, Drive
@@ -28,35 +26,6 @@ FEW = (
     *("stribeck", "brown_mcphee", "self_tuning", "lugre", "dahl, n 0.5", "maxwell_slip"),
     *("bouc_wen", "lagged(stribeck)", "asymmetric(lugre)", "haessig_friedland, event"),
 )
-STEPS = 250
-
-
-def jobs_of(program: OneProgram) -> list[tuple]:
-    """Valid inputs, bad ones, other parameters, and every parameter changed alone."""
-    jobs = []
-    for k, c in enumerate(program.several):
-        u = excitation(c.block, STEPS)
-        start = np.array([float(v.start) for v in c.block.parameters])
-        one_by_one = np.tile(start, (STEPS, 1))
-        for i, v in enumerate(c.block.parameters):
-            one_by_one[8 * i : 8 * i + 8, i] = changed_value(v)
-        jobs += [(k, u), (k, spoiled(c.block, u)), (k, u, varied(c.block, STEPS, 10.0)),
-                 (k, u, one_by_one)]  # fmt: skip
-    return jobs
-
-
-def has_bits(program: OneProgram, limited: frozenset[int] = frozenset()) -> None:
-    """The rows and status of all jobs are those of CasADi in double; valid numbers set no bit."""
-    jobs = jobs_of(program)
-    for number, ((k, u, *p), rows) in enumerate(zip(jobs, program.run(jobs), strict=True)):
-        c = program.several[k]
-        assert np.array_equal(rows, run_vm(c, u, None, *p), equal_nan=True), (k, c.block.doc)
-        status = rows[:, -1].astype(int)
-        if number % 4 == 1:
-            assert status.any()
-            assert k in limited or not (status & Status.OUTPUT).any()
-        else:
-            assert not status.any()
 
 
 @pytest.fixture(scope="module")
