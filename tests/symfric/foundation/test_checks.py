@@ -12,39 +12,14 @@ from symfric import LuGre
 from symfric.foundation import checks
 
 NUMBERS: list[Any] = [
-    2,
-    2.0,
-    np.float32(2),
-    np.float64(2),
-    np.int64(2),
-    np.uint8(2),
-    np.array(2.0),
-    np.array(2),
-    ca.DM(2),
-    ca.SX(2),
-]
+    2, 2.0, np.float32(2), np.float64(2), np.int64(2), np.uint8(2), np.array(2.0), np.array(2),
+    ca.DM(2), ca.SX(2),
+]  # fmt: skip
 NO_NUMBERS: list[Any] = [
-    None,
-    "2",
-    [2.0],
-    (2.0,),
-    {},
-    True,
-    np.True_,
-    2j,
-    object(),
-    float,
-    np.array([2.0]),
-    np.array("2"),
-    np.array(None),
-    ca.SX.sym("a"),
-    ca.MX.sym("a"),
-    ca.DM([1, 2]),
-    float("nan"),
-    float("inf"),
-    10**400,
-    lambda: 2,
-]
+    None, "2", [2.0], (2.0,), {}, True, np.True_, 2j, object(), float, np.array([2.0]),
+    np.array("2"), np.array(None), ca.SX.sym("a"), ca.MX.sym("a"), ca.DM([1, 2]), float("nan"),
+    float("inf"), 10**400, lambda: 2,
+]  # fmt: skip
 
 
 def test_every_real_scalar_is_a_number_and_nothing_else_is() -> None:

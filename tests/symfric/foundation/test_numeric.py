@@ -23,51 +23,24 @@ FUNCTIONS = {
 }
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_function_of_every_type(name: str) -> None:
-    function, x, expected = FUNCTIONS[name]
-    assert function(x) == pytest.approx(expected, rel=1e-14)
-    many = function(np.full((2, 3), x))
-    assert isinstance(many, np.ndarray)
-    assert many.shape == (2, 3)
-    for kind in (ca.SX, ca.DM, ca.MX):
-        assert isinstance(function(kind(x)), kind)
-    assert float(function(ca.DM(x))) == pytest.approx(expected, rel=1e-14)
+def test_functions_of_every_type() -> None:
+    for function, x, expected in FUNCTIONS.values():
+        assert function(x) == pytest.approx(expected, rel=1e-14)
+        many = function(np.full((2, 3), x))
+        assert isinstance(many, np.ndarray)
+        assert many.shape == (2, 3)
+        for kind in (ca.SX, ca.DM, ca.MX):
+            assert isinstance(function(kind(x)), kind)
+        assert float(function(ca.DM(x))) == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("value", "number"),
-    [
-        (1.0, True),
-        (2, True),
-        (np.float64(1.0), True),
-        (np.int64(3), True),
-        (True, False),
-        (np.ones(2), False),
-        ("1", False),
-        (None, False),
-        (ca.DM(1.0), False),
-        (ca.SX(1.0), False),
-    ],
-)
-def test_plain_numbers_are_told_apart(value: object, number: bool) -> None:
-    assert numeric.is_number(value) is number
-    assert numeric.equals(value, 1.0) is (number and float(value) == 1.0)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("value", "symbolic"),
-    [
-        (ca.SX.sym("x"), True),
-        (ca.MX.sym("x"), True),
-        (ca.SX(1.0), False),
-        (ca.DM(1.0), False),
-        (1.0, False),
-        (np.ones(2), False),
-    ],
-)
-def test_symbols_are_told_apart(value: object, symbolic: bool) -> None:
-    assert numeric.is_symbolic(value) is symbolic
+def test_plain_numbers_and_symbols_are_told_apart() -> None:
+    numbers = (1.0, 2, np.float64(1.0), np.int64(3))
+    others = (True, np.ones(2), "1", None, ca.DM(1.0), ca.SX(1.0))
+    symbols = (ca.SX.sym("x"), ca.MX.sym("x"))
+    assert [numeric.is_number(x) for x in (*numbers, *others, *symbols)] == [True] * 4 + [False] * 8
+    assert [numeric.equals(x, 1.0) for x in (*numbers, *others)] == [True, False] * 2 + [False] * 6
+    assert [numeric.is_symbolic(x) for x in (*others, *symbols)] == [False] * 6 + [True] * 2
 
 
 def test_column_stacks_floats_arrays_and_matrices() -> None:

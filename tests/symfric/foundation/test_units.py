@@ -3,11 +3,12 @@
 from dataclasses import replace
 from math import pi, sqrt
 
+import numpy as np
 import pytest
 from scipy import constants
 
 from symfric import ALL_LAWS, Output, Variable, parameters
-from symfric.foundation.units import in_si, nearest, turned, written
+from symfric.foundation.units import clock, in_si, nearest, readable, turned, written
 from symfric.scenes import ALL_SCENES
 
 
@@ -109,3 +110,31 @@ def test_all_units_of_the_package_are_si() -> None:
     for scene in ALL_SCENES.values():
         units |= {p.unit for p in parameters(scene(ALL_LAWS["brown_mcphee"]())).values()}
     assert {unit for unit in units if in_si(unit) != 1.0 or written(unit) != unit} == set()
+
+
+@pytest.mark.parametrize(
+    ("unit", "top", "expected", "size"),
+    [
+        ("m/s", 0.0024, "mm/s", 1e-3), ("m", 3e-6, "µm", 1e-6), ("m", 7e-5, "µm", 1e-6),
+        ("m", 9e-5, "mm", 1e-3),  # 0.09, not 90 of the next
+        ("m", 2e-9, "nm", 1e-9), ("m", 1e-14, "nm", 1e-9), ("N", 0.15, "N", 1.0),
+        ("N", 1500.0, "N", 1.0), ("N", 3e4, "kN", 1e3), ("J", 2e7, "MJ", 1e6),
+        ("Pa", 3.4e7, "MPa", 1e6), ("1", 1e-9, "1", 1.0), ("", 1e-9, "", 1.0), ("m", 0.0, "m", 1.0),
+    ],
+)  # fmt: skip
+def test_the_largest_magnitude_chooses_the_prefix(
+    unit: str, top: float, expected: str, size: float
+) -> None:
+    factor, found = readable(unit, [[0.0, -top], [0.1 * top, np.nan, np.inf]])
+    assert (found, factor) == (expected, pytest.approx(1 / size))
+    assert readable("m", []) == readable("m", [[]]) == (1.0, "m")
+
+
+def test_long_times_are_told_in_hours_days_and_years() -> None:
+    for last, expected, told in (
+        (60.0, "s", 60.0), (2.1e4, "s", 2.1e4), (36000.0, "h", 10.0), (864000.0, "days", 10.0),
+        (500 * 365.25 * 86400.0, "years", 500.0),
+    ):  # fmt: skip
+        factor, unit = clock([0.0, np.nan, last])
+        assert (unit, factor * last) == (expected, pytest.approx(told))
+    assert clock([]) == (1.0, "s")

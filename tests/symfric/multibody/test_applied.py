@@ -201,19 +201,6 @@ def pair(law_1: Law, law_2: Law, rate: float = 1.0) -> Model:
     return m.build()
 
 
-def test_blocks_on_a_rod_hold_what_both_can() -> None:
-    """0.3 x 10 N + 0.2 x 20 N = 7 N; each then carries the same share of what it can."""
-    model = pair(ExactCoulomb(mu_s=0.3, mu_d=0.2), ExactCoulomb(mu_s=0.2, mu_d=0.1))
-    run = solve(model, 8.0, u={"push": lambda t: t}, samples=801)
-    ((t, name),) = run.happened
-    assert (name, t) == ("s0_loop_slip", pytest.approx(7.0, abs=1e-8))
-    rest = run.t < 7.0
-    for i, capacity in enumerate((3.0, 4.0)):
-        assert run[f"s{i}_friction"][rest] == pytest.approx(run.t[rest] * capacity / 7, abs=1e-9)
-    # 3 kg x'' = t - 4 N from t = 7 s on
-    assert run.final["s1_rate"] == pytest.approx((3.0 + 0.5) / 3.0, rel=1e-7)
-
-
 def test_rest_is_rest_for_as_long_as_it_lasts() -> None:
     """A thousand seconds at nine tenths of the break-away: no rate is left, so nothing drifts."""
     law = ExactCoulomb(mu_s=0.3, mu_d=0.3)
@@ -250,18 +237,6 @@ def test_a_light_box_jams_by_name_under_dry_friction_too() -> None:
     with pytest.raises(SolveError, match=message) as caught:
         solve(scene.model(), 3.0)
     assert caught.value.status is Status.JAMMED
-
-
-@pytest.mark.slow
-def test_a_fall_over_a_velocity_and_a_viscous_part_are_those_of_the_smooth_law() -> None:
-    dry = ExactCoulomb(form="stribeck", v_s=0.01, sigma_2=0.3)
-    exact = solve(PendulumBox(dry).model(), 2.0, rtol=1e-9, t_eval=TIMES[:100])
-    errors: list[float] = []
-    for width in (1e-4, 1e-5):
-        law = Stribeck(v_s=0.01, sigma_2=0.3, v_eps=width)
-        run = solve(PendulumBox(law).model(), 2.0, rtol=1e-8, t_eval=TIMES[:100])
-        errors.append(float(np.abs(run["phi"] - exact["phi"]).max()))
-    assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.2)
 
 
 @pytest.mark.slow

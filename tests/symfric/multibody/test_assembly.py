@@ -1,6 +1,7 @@
 """What a mechanism does not have costs nothing: counts of the model and of its step."""
 
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -40,6 +41,7 @@ def step(model: Model) -> ca.Function:
     return build_step(system(model, input_data(model, None, 0.0, 1.0)), METHODS["rodas5p"])
 
 
+@cache
 def counts(name: str) -> tuple[int, int, int]:
     model = VARIANTS[name].build()
     return len(model.x), len(model.z), step(model).n_instructions()

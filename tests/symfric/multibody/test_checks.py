@@ -1,6 +1,9 @@
-"""Every mistake of a scene is described with its path, all in one error."""
+"""Every mistake of a mechanism is described with its path, all in one error."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -18,197 +21,149 @@ from symfric.multibody import (
     PrescribedMotion,
     Prismatic,
     Revolute,
+    Screw,
     Spherical,
     SpringDamper,
     Universal,
+    UserConstraint,
+    UserForce,
 )
 
 LAW = BrownMcPhee()
+J = (1.0, 1.0, 1.0)
+Change = Callable[[Mechanism], object]
 
 
-def wrong(change: Callable[[Mechanism], object]) -> Mechanism:
-    m = rod()
-    change(m)
-    return m
+def body(*numbers: Any, **more: Any) -> Change:
+    return lambda m: m.body("bob", *numbers, **more)
 
 
-MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
-    "zero mass": (
-        lambda m: m.body("bob", 0.0, (1.0, 1.0, 1.0)),
-        "> body 'bob' > mass: expected > 0 kg, got 0",
-    ),
-    "indefinite inertia": (
-        lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0, 2.0, 0.0, 0.0)),
-        "> body 'bob' > inertia: expected positive principal moments, got -1, 1, 3",
-    ),
-    "zero inertia": (
-        lambda m: m.body("bob", 1.0, (0.0, 0.0, 0.0)),
-        "> body 'bob' > inertia: expected positive principal moments, got 0, 0, 0",
-    ),
-    "impossible inertia": (
-        lambda m: m.body("bob", 1.0, (1.0, 1.0, 3.0)),
-        "largest principal moment to be at most the sum of the others, got 1, 1, 3",
-    ),
-    "two numbers of inertia": (
-        lambda m: m.body("bob", 1.0, (1.0, 1.0)),
-        "> body 'bob' > inertia: expected 3 or 6 numbers [kg m^2], got 2; write (Jxx, Jyy, Jzz)",
-    ),
-    "no identifier": (
-        lambda m: m.body("the bob", 1.0, (1.0, 1.0, 1.0)),
-        "> body 'the bob': expected a name that is a C identifier",
-    ),
-    "twice": (
-        lambda m: m.body("hinge", 1.0, (1.0, 1.0, 1.0)),
-        "> joint 'hinge': expected every name once",
-    ),
-    "unknown body": (
-        lambda m: m.joint(Fixed("weld", "rodd", "ground")),
-        "> joint 'weld': expected a body or 'body.frame', got rodd; did you mean rod?",
-    ),
-    "unknown frame": (
-        lambda m: m.joint(Fixed("weld", "rod.tip", "ground")),
-        "> joint 'weld': expected one of the frames hinge, got rod.tip",
-    ),
-    "one body twice": (
-        lambda m: m.joint(Fixed("weld", "rod", "rod.hinge")),
-        "> joint 'weld': expected two bodies, got rod twice",
-    ),
-    "frame of nothing": (
-        lambda m: m.frame("bob.tip"),
-        "> frame 'bob.tip': expected 'body.frame' of a known body",
-    ),
-    "force at nothing": (
-        lambda m: m.force(SpringDamper("spring", "ground", "bob")),
-        "> force 'spring': expected a body or 'body.frame', got bob",
-    ),
-    "force along nothing": (
-        lambda m: m.force(JointSpringDamper("motor", "hing")),
-        "> force 'motor': expected a joint, got hing",
-    ),
-    "turning a slide": (
-        lambda m: (
-            m.body("block", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Prismatic("rail", "ground", "block")),
-            m.force(JointSpringDamper("motor", "rail", "turn")),
-        ),
-        "> force 'motor' > direction: expected slide, got turn",
-    ),
-    "one way of several": (
-        lambda m: (
-            m.body("block", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Universal("cross", "ground", "block")),
-            m.force(JointSpringDamper("motor", "cross")),
-        ),
-        "> force 'motor' > direction: expected x or y, got none",
-    ),
-    "loose body": (
-        lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-        "> body 'bob': expected joints with coordinates up to the ground, found none; "
-        "a Floating joint lets it move freely",
-    ),
-    "friction of nothing": (
-        lambda m: (
-            m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Floating("pose", "rod", "bob", friction=JointFriction(LAW))),
-        ),
-        "> joint 'pose' > friction: expected a joint with friction",
-    ),
-    "start of another size": (
-        lambda m: (
-            m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Spherical("ball", "rod", "bob", start=(1.0, 0.0))),
-        ),
-        "> joint 'ball' > start: expected 4 numbers, got 2",
-    ),
-    "start that is no number": (
-        lambda m: (
-            m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Revolute("pin", "rod", "bob", rate=float("nan"))),
-        ),
-        "> joint 'pin' > rate: expected finite numbers, got nan",
-    ),
-    "a mass that is no number": (
-        lambda m: m.body("bob", "1", (1.0, 1.0, 1.0)),
-        "> body 'bob' > mass: expected a number [kg], got '1'",
-    ),
-    "an inertia as a matrix": (
-        lambda m: m.body("bob", 1.0, np.eye(3)),  # type: ignore[arg-type]
-        "> body 'bob' > inertia: expected 3 or 6 numbers",
-    ),
-    "a mass nobody declared": (
-        lambda m: m.body("bob", ca.SX.sym("load"), (1.0, 1.0, 1.0)),
-        "> body 'bob': expected only declared parameters, got load; pass the variable, build",
-    ),
-    "a spring whose places coincide": (
-        lambda m: m.force(SpringDamper("spring", "ground.hinge", "rod.hinge", 1.0, 0.1)),
-        "> force 'spring': expected a finite force at the start, got nan; do its places coincide",
-    ),
-    "a joint without its body": (
-        lambda m: m.joint(Fixed("weld", "", "ground")),
-        "> joint 'weld': expected a body or 'body.frame', got ",
-    ),
-    "a torque nobody declared": (
-        lambda m: m.force(JointSpringDamper("motor", "hinge", actuator=ca.SX.sym("torque"))),
-        "> force 'motor': expected only declared positions, velocities, time, parameters and "
-        "inputs, got torque",
-    ),
-    "a radius nobody declared": (
-        lambda m: m.joint(
-            Revolute("pin", "rod", "ground", friction=JointFriction(LAW, radius=ca.SX.sym("R")))
-        ),
-        "> joint 'pin' > friction: expected only declared parameters and inputs, got R",
-    ),
-    "stiffness that is no number": (
-        lambda m: m.force(SpringDamper("spring", "ground", "rod", stiffness=float("nan"))),
-        "> force 'spring' > stiffness: expected a finite number, got nan",
-    ),
-    "a law for a joint": (
-        lambda m: m.joint(Revolute("pin", "rod", "ground", friction=LAW)),  # type: ignore[arg-type]
-        "> joint 'pin' > friction: expected JointFriction(law, radius=...), got BrownMcPhee",
-    ),
-    "a rod without length": (
-        lambda m: m.joint(Distance("stay", "ground", "rod", length=0.0)),
-        "> joint 'stay' > length: expected > 0 m, got 0.0",
-    ),
-    "a rod that can never fit": (
-        lambda m: m.joint(Distance("stay", "ground.hinge", "rod.hinge", length=2.0)),
-        "> start: expected positions that satisfy stay_lambda, got -2; no position near it satis",
-    ),
-    "a frame without direction": (
-        lambda m: m.frame("rod.tip", z=(0.0, 0.0, 0.0)),
-        "> frame 'rod.tip' > z: expected three numbers that are not all zero",
-    ),
-    "a frame twice": (
-        lambda m: m.frame("rod.hinge", z=X),
-        "> frame 'rod.hinge': expected every name once",
-    ),
-    "an input like a joint": (
-        lambda m: m.input("hinge", "N"),
-        "> input 'hinge': expected every name once",
-    ),
-    "motion that is no function": (
-        lambda m: m.constraint(PrescribedMotion("drive", "hinge", 0.3)),  # type: ignore[arg-type]
-        "> drive 'drive' > motion: expected a function of time, got 0.3",
-    ),
-    "what is no joint": (
-        lambda m: m.joint("hinge"),  # type: ignore[arg-type]
-        "> joint: expected a Joint of symfric.multibody, got 'hinge'",
-    ),
-}
+def joint(kind: Any, *given: Any, **more: Any) -> Change:
+    return lambda m: m.joint(kind(*given, **more))
 
 
-@pytest.mark.parametrize("name", MISTAKES)
-def test_mistakes_are_described_with_their_path(name: str) -> None:
-    change, message = MISTAKES[name]
+def force(kind: Any, *given: Any, **more: Any) -> Change:
+    return lambda m: m.force(kind(*given, **more))
+
+
+def of_bob(kind: Any, name: str, parent: str = "rod", **more: Any) -> Change:
+    return lambda m: (m.body("bob", 1.0, J), m.joint(kind(name, parent, "bob", **more)))
+
+
+def drive(name: str, *given: Any) -> Change:
+    return lambda m: m.constraint(PrescribedMotion(name, *given))
+
+
+def held(expression: Callable[[Any], Any]) -> Change:
+    return lambda m: m.constraint(UserConstraint("held", expression))
+
+
+pushed = partial(force, UserForce, "push", "rod")
+PUSH, HELD = "'push' > expression: expected a force and", "'held' > expression: expected one or a"
+PIN, BOB, POSITIONS = ("pin", "rod", "ground"), "> body 'bob'", "expected positions only, got velo"
+
+MISTAKES: list[tuple[Change, str]] = [
+    (body(0.0, J), f"{BOB} > mass: expected > 0 kg, got 0"),
+    (body("1", J), f"{BOB} > mass: expected a number [kg], got '1'"),
+    (body(10**400, J), f"{BOB} > mass"),
+    (body(np.inf, J), f"{BOB} > mass"),
+    (body(ca.SX.sym("load"), J), f"{BOB}: expected only declared parameters, got load; pass the"),
+    (body(1.0, (0, 0, 0)), f"{BOB} > inertia: expected positive principal moments, got 0, 0, 0"),
+    (body(1.0, (1, 1, 1, 2, 0, 0)), "> inertia: expected positive principal moments, got -1, 1, 3"),
+    (body(1.0, (1, 1, 3)), "largest principal moment to be at most the sum of the others, got 1, "),
+    (body(1.0, (1, 1)), "> inertia: expected 3 or 6 numbers [kg m^2], got 2; write (Jxx, Jyy, Jzz"),
+    (body(1.0, np.eye(3)), f"{BOB} > inertia: expected 3 or 6 numbers"),
+    (body(1.0, (np.inf,) * 3), f"{BOB} > inertia"),
+    (body(1.0, J), f"{BOB}: expected joints with coordinates up to the ground, found none; "
+                   "a Floating joint lets it move freely"),
+    (lambda m: m.body("the bob", 1.0, J), "body 'the bob': expected a name that is a C identifier"),
+    (lambda m: m.body("hinge", 1.0, J), "> joint 'hinge': expected every name once"),
+    (lambda m: m.input("hinge", "N"), "> input 'hinge': expected every name once"),
+    (lambda m: m.frame("bob.tip"), "> frame 'bob.tip': expected 'body.frame' of a known body"),
+    (lambda m: m.frame("rod.tip", z=(0, 0, 0)), "'rod.tip' > z: expected three numbers that are"),
+    (lambda m: m.frame("rod.hinge", z=X), "> frame 'rod.hinge': expected every name once"),
+    (lambda m: m.joint("hinge"), "> joint: expected a Joint of symfric.multibody, got 'hinge'"),
+    (joint(Fixed, "weld", "rodd", "ground"), "'weld': expected a body or 'body.frame', got rodd; di"
+                                             "d you mean rod?"),
+    (joint(Fixed, "weld", "rod.tip", "ground"), "expected one of the frames hinge, got rod.tip"),
+    (joint(Fixed, "weld", "rod", "rod.hinge"), "'weld': expected two bodies, got rod twice"),
+    (joint(Fixed, "weld", "", "ground"), "> joint 'weld': expected a body or 'body.frame', got "),
+    (joint(Revolute, *PIN, axis=X), "got axis; the axis of a joint is the z"),
+    (joint(Revolute, *PIN, friction=LAW), "expected JointFriction(law, radius=...), got Brown"),
+    (joint(Revolute, *PIN, friction=JointFriction(LAW, radius=ca.SX.sym("R"))),
+     "> joint 'pin' > friction: expected only declared parameters and inputs, got R"),
+    (joint(Distance, "stay", "ground", "rod", length=0.0), "'stay' > length: expected > 0 m, got"),
+    (joint(Distance, "stay", "ground.hinge", "rod.hinge", length=2.0),
+     "> start: expected positions that satisfy stay_lambda, got -2; no position near it satis"),
+    (of_bob(Floating, "pose", friction=JointFriction(LAW)),
+     "> joint 'pose' > friction: expected a joint with friction"),
+    (of_bob(Spherical, "ball", start=(1.0, 0.0)), "'ball' > start: expected 4 numbers, got 2"),
+    (of_bob(Revolute, "pin", rate=np.nan), "'pin' > rate: expected finite numbers, got nan"),
+    (force(SpringDamper, "s", "ground", "bob"), "'s': expected a body or 'body.frame', got bob"),
+    (force(SpringDamper, "s", "ground", "rod", np.nan), "> stiffness: expected a finite number"),
+    (force(SpringDamper, "s", "ground.hinge", "rod.hinge", 1.0, 0.1),
+     "> force 's': expected a finite force at the start, got nan; do its places coincide"),
+    (force(JointSpringDamper, "motor", "hing"), "> force 'motor': expected a joint, got hing"),
+    (force(JointSpringDamper, "motor", "hinge", actuator=ca.SX.sym("torque")),
+     "> force 'motor': expected only declared positions, velocities, time, parameters and inputs, "
+     "got torque"),
+    (force(JointSpringDamper, "motor", "hinge", "slide"), "> direction: expected turn, got slide"),
+    (lambda m: (of_bob(Universal, "cross", "ground")(m), m.force(JointSpringDamper("e", "cross"))),
+     "> force 'e' > direction: expected x or y, got none"),
+    (drive("d", "hinge", 0.3), "> drive 'd' > motion: expected a function of time, got 0.3"),
+    (drive("d", "y", lambda t: t), "> drive 'd': expected a joint, got y"),
+    (drive("d", "hinge", lambda t: t, "slide"), "'d' > direction: expected turn, got slide"),
+    (drive("d", "hinge", lambda t: ca.vertcat(t, t)), "> motion: expected one expression, got 2"),
+    (drive("d", "hinge", lambda t: ca.SX.sym("w") * t),
+     "> drive 'd': expected an expression of positions, time and parameters, got w; the two deriv"),
+    (drive("d", "hinge", ca.sqrt), "start: expected a finite velocity of d_moment"),
+    (drive("hinge", "hinge", lambda t: t), "> drive 'hinge': expected every name once"),
+    (lambda m: m.constraint(Screw("j", "a", 0.1, friction=None)),  # type: ignore[call-arg]
+     "expected name, joint, lead, offset, got fric"),
+    (pushed(lambda kin: None), PUSH),
+    (pushed(lambda kin: (0, 0, 0)), PUSH),
+    (pushed(lambda kin: ((0, 0), (0, 0, 0))), PUSH),
+    (pushed(lambda kin: ("abc", "def")), PUSH),
+    (pushed(lambda kin: ((np.nan, 0, 0), (0, 0, 0))), PUSH),
+    (pushed(lambda kin: (kin.point("c.x")[0], (0, 0, 0))), "expected a place 'body.frame', got c"),
+    (held(lambda kin: None), HELD),
+    (held(lambda kin: "z"), HELD),
+    (held(lambda kin: kin.motion["rod"].R), HELD),
+    (held(lambda kin: ca.SX(0, 1)), HELD),
+    (held(lambda kin: kin.point("rod")[1][0]), f"constraint 'held' > expression: {POSITIONS}"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_mistakes_are_described_with_their_path(formulation: str) -> None:
+    for change, message in MISTAKES:
+        m = rod()
+        with pytest.raises(ValueError) as caught:
+            change(m)
+            m.build(formulation=formulation)
+        assert message in str(caught.value)
+        assert "mechanism 'rod' > " in str(caught.value) or not message.startswith(">")
+
+
+@pytest.mark.parametrize(
+    ("m", "message"),
+    [
+        *((Mechanism(name), "> name: expected a C identifier") for name in ("a crank", "", "4bar")),
+        (Mechanism("m", gravity=(0.0, -9.81)), "> gravity: expected three numbers [m/s^2]"),
+        (Mechanism("m", gravity=(0.0, 0.0, 0.0)), "expected bodies that can move, got none"),
+    ],
+)
+def test_mistakes_of_a_mechanism_as_a_whole(m: Mechanism, message: str) -> None:
+    m.body("stone", 1.0, J)
+    m.joint(Fixed("foot", "ground", "stone"))
     with pytest.raises(ValueError) as caught:
-        wrong(change).build()
-    assert "mechanism 'rod' > " in str(caught.value)
+        m.build()
     assert message in str(caught.value)
 
 
-def test_all_mistakes_come_at_once() -> None:
+def test_all_mistakes_come_at_once_and_each_once() -> None:
     m = Mechanism("crank")
-    m.body("a", -1.0, (1.0, 1.0, 1.0))
+    m.body("a", -1.0, J)
     m.body("b", 1.0, (0.0, 1.0, 1.0))
     m.joint(Revolute("slider", "ground", "a", friction=JointFriction(LAW)))
     m.joint(Prismatic("slide", "a", "c"))
@@ -218,10 +173,28 @@ def test_all_mistakes_come_at_once() -> None:
     assert len(lines) == 4
     assert all(line.startswith("mechanism 'crank' > ") for line in lines)
     assert any("joint 'slider' > friction" in line for line in lines)
-
-
-def test_the_same_mistake_is_said_once() -> None:
-    m = wrong(lambda m: (m.body("bob", 1.0, (1, 1, 1)), m.body("bob", 1.0, (1, 1, 1))))
+    twice = rod()
+    for _ in range(2):
+        twice.body("bob", 1.0, J)
     with pytest.raises(ValueError) as caught:
-        m.build()
+        twice.build()
     assert str(caught.value) == "mechanism 'rod' > body 'bob': expected every name once"
+
+
+def test_a_symbol_in_a_drive_may_not_be_an_input() -> None:
+    m = rod()
+    u = m.input("wish", "m")
+    m.constraint(PrescribedMotion("d", "hinge", lambda t: u))
+    with pytest.raises(ValueError, match="got wish; the two derivatives of an input are unknown"):
+        m.build()
+
+
+def test_a_list_of_expressions_is_a_column() -> None:
+    m = Mechanism("one")
+    m.body("b", 1.0, J)
+    m.joint(Floating("j", "ground", "b"))
+    held(lambda kin: [kin.point("b")[0][1], kin.point("b")[0][2]])(m)
+    assert [v.name for v in m.build().z] == ["held_lambda_1", "held_lambda_2", "j_norm"]
+    m.bodies[1] = replace(m.bodies[1], mass=0.0)
+    with pytest.raises(ValueError, match="formulation: expected one of joint, absolute, got abs"):
+        m.build(formulation="abs")

@@ -7,11 +7,9 @@ import pytest
 from mechanics import brown_mcphee, four_bar_with_friction
 from scipy.integrate import solve_ivp
 
-from symfric import BrownMcPhee, Dahl, ExactCoulomb, LuGre, SolveError, Trajectory, simulate
+from symfric import BrownMcPhee, Dahl, ExactCoulomb, SolveError, Trajectory, simulate
 from symfric.laws import Law, LoadNormalised, MaxwellSlip
 from symfric.multibody import (
-    Cylindrical,
-    Distance,
     Floating,
     JointFriction,
     JointSpringDamper,
@@ -116,16 +114,6 @@ def test_rest_is_rest_whichever_hinge_closes_the_loop() -> None:
     )
     for name in ("coupler_rod_x", "coupler_rod_z", "pin_slip"):
         assert other[name] == pytest.approx(one[name], abs=1e-6)
-
-
-@pytest.mark.slow
-def test_bristles_bend_in_the_joint_that_closes() -> None:
-    law = LuGre(mu_s=0.3, mu_d=0.2, sigma_0=1e4, sigma_1=0.0)
-    a, b = (
-        simulate(four_bar(cut, law).build(), 0.1, samples=11) for cut in ("pin", "theta_rocker")
-    )
-    for name in ("coupler_rod_x", "pin_z", "theta_rocker_z"):
-        assert a[name] == pytest.approx(b[name], rel=1e-3, abs=1e-7)
 
 
 def slider_crank(cut: str, length: float | None = None) -> Mechanism:
@@ -254,44 +242,6 @@ def test_a_bead_on_a_turning_wire_is_pressed_by_coriolis_and_weight() -> None:
     assert np.hypot(run["bead_x"], run["bead_y"]) == pytest.approx(r, rel=1e-7)
     assert run["along_slip"] == pytest.approx(v, rel=1e-7)
     assert run["along_N"] == pytest.approx(0.1 * np.hypot(2 * w * v, g), rel=1e-6)
-
-
-def crank_in_space(block: str) -> Mechanism:
-    """The spatial slider-crank; its block slides on a shaft, or is a bead on a line."""
-    m = Mechanism("slider_crank", gravity=(0.0, 0.0, -9.8))
-    b, c, r, length = 0.1, 0.12, 0.08, 0.3
-    m.body("wheel", 0.5, (0.2, 0.2, 0.2))
-    m.body("block", 5.0, (0.2, 0.2, 0.2))
-    m.frame("ground.bearing", at=(0.0, b, c), z=X, x=Z)
-    m.frame("ground.guide", z=X, x=Z)
-    m.frame("wheel.bearing", z=X, x=Z)
-    m.frame("wheel.pin", at=(0.0, 0.0, r))
-    m.frame("block.guide", z=X, x=Z)
-    start = (length**2 - b**2 - (c + r) ** 2) ** 0.5
-    speed = b * r * 20.0 / start
-    m.joint(Revolute("crank", "ground.bearing", "wheel.bearing", 0.0, 20.0))
-    friction = JointFriction(LAW, radius=1e-6)
-    if block == "shaft":
-        ends = "ground.guide", "block.guide"
-        m.joint(Cylindrical("slider", *ends, (start, 0.0), (speed, 0.0), friction))
-    else:
-        at = (start, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-        m.joint(Floating("free", "ground", "block", at, (speed, *6 * (0.0,))))
-        m.joint(PointOnLine("slider", "ground.guide", "block.guide", friction=friction))
-    m.joint(Distance("rod", "wheel.pin", "block", length=length))
-    return m
-
-
-@pytest.mark.slow
-def test_a_block_on_a_line_is_a_block_on_a_shaft() -> None:
-    one, other = (
-        simulate(crank_in_space(block).build(), 0.3, rtol=1e-8, samples=21)
-        for block in ("shaft", "line")
-    )
-    assert other["block_x"] == pytest.approx(one["block_x"], abs=1e-7)
-    assert other["crank"] == pytest.approx(one["crank"], abs=1e-6)
-    assert other["slider_N"] == pytest.approx(one["slider_N"], rel=1e-5, abs=1e-4)
-    assert other["slider_friction"] == pytest.approx(one["slider_slide_friction"], abs=1e-4)
 
 
 def test_a_joint_that_closes_may_be_driven() -> None:

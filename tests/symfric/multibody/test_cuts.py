@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, LuGre, Model, simulate
+from symfric import BrownMcPhee, LuGre, Model
 from symfric.bench.mechanisms import chain
 from symfric.integrator.equations.blocks import blocks, refinement, signs
 from symfric.integrator.equations.inputs import input_data
@@ -110,11 +110,3 @@ def test_cuts_are_made_where_they_pay(law: Law | None, monkeypatch: pytest.Monke
     monkeypatch.setattr(prepare, "LONG", 1000)
     monkeypatch.setattr(prepare, "LONG_WITH_FRICTION", 1000)
     assert cut < 1.05 * instructions(longest, law)
-
-
-def test_a_long_chain_swings_as_it_does_without_cuts(monkeypatch: pytest.MonkeyPatch) -> None:
-    runs = []
-    for first in (2, 1000):
-        monkeypatch.setattr(prepare, "LONG_WITH_FRICTION", first)
-        runs.append(simulate(chain(5, BrownMcPhee(v_t=0.1)), 0.3, rtol=1e-8, backend="vm"))
-    assert runs[0]["q5"] == pytest.approx(runs[1]["q5"], abs=1e-7)

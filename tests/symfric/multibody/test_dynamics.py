@@ -9,12 +9,8 @@ from chains import TREE, at_start, chain, rod, solve, state
 
 from symfric import BrownMcPhee
 from symfric.multibody import (
-    Distance,
     JointFriction,
     JointSpringDamper,
-    Mechanism,
-    Prismatic,
-    Revolute,
     SpringDamper,
     UserForce,
 )
@@ -108,43 +104,8 @@ def test_reactions_of_every_joint_agree_between_the_formulations() -> None:
         assert wrench == pytest.approx(expected[joint], rel=1e-10, abs=1e-9), joint
 
 
-def test_turning_a_joint_round_changes_nothing() -> None:
-    """The wrench on the child is that on the parent with the opposite sign."""
-    m = [Mechanism("m") for _ in range(2)]
-    for k, each in enumerate(m):
-        each.body("rod", 2.0, (0.1, 0.2, 0.2))
-        each.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=(0.0, 1.0, 0.0))
-        each.frame("ground.hinge", z=(0.0, 1.0, 0.0))
-        ends = ("ground.hinge", "rod.hinge")
-        each.joint(Revolute("h", *(ends if k == 0 else ends[::-1]), start=0.5 - k))
-    results = [solve(each.prepare().eq, np.array([0.5 - k]), np.array([1.0 - 2 * k]))
-               for k, each in enumerate(m)]  # fmt: skip
-    assert results[0].a == pytest.approx(-results[1].a)
-    forward, back = (r.reactions["h"][:3] for r in results)
-    assert np.linalg.norm(forward) == pytest.approx(np.linalg.norm(back))
-
-
-def test_hanging_rod_pulls_with_its_weight() -> None:
-    made = rod().prepare()
-    found = solve(made.eq, np.array([0.0]), np.array([0.0]))
-    assert found.a == pytest.approx([0.0])
-    assert np.abs(found.reactions["hinge"]).max() == pytest.approx(2.0 * 9.81)
-
-
 def test_swinging_rod_carries_the_centrifugal_force() -> None:
     """At the lowest point m g + m L w^2."""
     made = rod(JointFriction(BrownMcPhee(mu_s=0.0, mu_d=0.0), radius=0.1)).prepare()
     found = solve(made.eq, np.array([0.0]), np.array([3.0]))
     assert pytest.approx([2.0 * 9.81 + 2.0 * 0.4 * 9.0], abs=2e-4) == found.N
-
-
-def test_force_in_a_rod_is_its_multiplier_times_its_length() -> None:
-    """A bob that hangs on a rod of 2 m: tension m g, negative as the rod pulls."""
-    m = Mechanism("m")
-    m.body("bob", 3.0, (0.1, 0.1, 0.1))
-    m.frame("ground.axis", z=(0.0, 0.0, 1.0))
-    m.joint(Prismatic("slide", "ground.axis", "bob", start=-2.0))
-    m.joint(Distance("rod", "ground", "bob", length=2.0))
-    made = m.prepare()
-    found = solve(made.eq, made.q0, made.qd0)
-    assert found.lam * 2.0 == pytest.approx([3.0 * 9.81])

@@ -13,7 +13,6 @@ from symfric.multibody import (
     Mechanism,
     Prismatic,
     SpringDamper,
-    UserForce,
 )
 from symfric.multibody.equations import equations
 from symfric.multibody.forces import Axial, Force, Load
@@ -92,15 +91,6 @@ def test_dampers_take_energy(force: Force) -> None:
     assert rate == 0.0
 
 
-def test_a_user_force_has_the_power_of_its_expression() -> None:
-    push = UserForce("push", "b2.out", lambda kin: (-3 * kin.point("b2.out")[1], (0, 0, 0)))
-    m = chain()
-    made = m.prepare()
-    q, qd = state(made)
-    speed = ca.Function("v", [made.eq.q, made.eq.qd], [made.eq.kin.point("b2.out")[1]])(q, qd)
-    assert power_of(push)[0] == pytest.approx(-3 * float(ca.sumsqr(speed)), rel=1e-12)
-
-
 def test_absent_terms_cost_nothing() -> None:
     """A spring without damping has no velocity in it, one without length no root."""
 
@@ -127,8 +117,3 @@ def test_a_slide_needs_no_direction() -> None:
     assert simulate(m.build(), 1.0, rtol=1e-9).final["rail"] == pytest.approx(
         0.1 * cos(3.0), abs=1e-9
     )
-
-
-def test_of_a_joint_that_slides_and_turns_the_turn_is_meant_as_ever() -> None:
-    said, meant = (JointSpringDamper("t", "j2", way, 5.0, 0.3) for way in ("", "turn"))
-    assert power_of(said) == power_of(meant)

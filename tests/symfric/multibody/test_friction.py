@@ -86,11 +86,6 @@ def test_an_unloaded_bearing_does_not_press_and_has_a_slope() -> None:
     assert slope.full() == pytest.approx(0.0)
 
 
-def test_absent_reactions_leave_no_trace() -> None:
-    N = BEARING.normal_force(SLIDE, ca.SX(3, 1), ca.SX(3, 1))
-    assert N.is_constant()
-
-
 @pytest.mark.parametrize(
     ("friction", "rubs", "message"),
     [
@@ -116,11 +111,6 @@ def test_bad_bearings_are_described(
     friction: JointFriction, rubs: tuple[str, ...], message: str
 ) -> None:
     assert any(message in problem for problem in friction.problems(rubs))
-
-
-def test_what_is_not_a_law_is_refused() -> None:
-    with pytest.raises(ValueError, match="friction: expected a law such as"):
-        JointFriction("lugre")  # type: ignore[arg-type]
 
 
 KINETIC = BrownMcPhee(mu_s=0.2, mu_d=0.2, mu_v=0.0, v_t=1e-3)
@@ -150,12 +140,6 @@ def test_a_spinning_ball_slows_down_linearly(formulation: str) -> None:
     assert run["ball_friction"] == pytest.approx(0.2 * 20.0, rel=1e-3)
     assert run["ball_power"] == pytest.approx(run["ball_slip"] * run["ball_friction"], rel=1e-4)
     assert run["friction_work_rate"] == pytest.approx(-run["ball_power"])
-
-
-@in_both
-def test_preload_presses_a_ball_too(formulation: str) -> None:
-    run = rotor(formulation, preload=10.0)
-    assert run["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 2 * 2.4), rel=1e-4)
 
 
 def test_bristles_of_a_ball_are_vectors() -> None:
@@ -275,17 +259,6 @@ def test_laws_without_a_form_for_vectors_are_refused_in_a_ball_by_name(law: Law)
     with pytest.raises(ValueError, match=path) as caught:
         m.build()
     assert f"got {type(law).__name__}" in str(caught.value)
-
-
-def test_friction_independent_of_the_reaction_adds_no_unknown_to_balls_and_crosses() -> None:
-    m = chain()
-    bearing = JointFriction(BrownMcPhee(v_t=0.5), radius=0.05, normal=20.0)
-    m.joints = [replace(j, friction=bearing if j.name in ("j3", "j5") else None) for j in m.joints]
-    model = m.build()
-    assert [v.name for v in model.z if v.name.endswith("_N")] == []
-    pressed = replace(bearing, normal=None)
-    m.joints = [replace(j, friction=j.friction and pressed) for j in m.joints]
-    assert [v.name for v in m.build().z if v.name.endswith("_N")] == ["j3_x_N", "j3_y_N", "j5_N"]
 
 
 def brake(formulation: str = "joint") -> Mechanism:

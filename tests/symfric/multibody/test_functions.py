@@ -30,7 +30,7 @@ def test_inverse_dynamics_undoes_the_model_with_friction() -> None:
     z = np.full(6, 30.0)
     a = model.function("ode")(0, x, z, u, []).full()[6:12]
     # the normal forces the accelerations lead to, for which these are right
-    for _ in range(200):
+    for _ in range(60):
         a = model.function("ode")(0, x, z, u, []).full()[6:12]
         z = z + model.function("alg")(0, x, z, u, []).full().ravel() * 0.5
     missing = f["inverse_dynamics"](x[:6], x[6:12], a, [], x[12:], u, []).full()

@@ -30,7 +30,7 @@ def time_to_lie_down(n: int) -> float:
     return float(np.pi / 4 * (weights / omega).sum())
 
 
-@pytest.mark.parametrize("n", [1, 3])
+@pytest.mark.parametrize("n", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_four_bars_stop_where_all_their_rods_lie_on_one_line(n: int) -> None:
     """Two motions go on from there; the library's pass straight through."""
     with pytest.raises(SolveError, match="the configuration is singular") as caught:

@@ -16,8 +16,8 @@ def test_forces_of_ones_own_move_the_mechanism_as_its_law_would() -> None:
     for scene in (PendulumBox, SliderCrank):
         model = scene(LEVELS).model()
         again = model.with_forces({c.name: c.friction for c in model.contacts})
-        for name, signal in simulate(model, 0.3, rtol=1e-9).signals.items():
-            other = simulate(again, 0.3, rtol=1e-9)
+        one, other = (simulate(m, 0.3, rtol=1e-9) for m in (model, again))
+        for name, signal in one.signals.items():
             np.testing.assert_allclose(other[name][-1], signal[-1], rtol=1e-5, atol=1e-6)
 
 

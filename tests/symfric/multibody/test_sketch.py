@@ -3,19 +3,15 @@
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, Viscous, simulate
-from symfric.model.sketch import Sketch, Symbol
+from symfric import BrownMcPhee, simulate
+from symfric.model.sketch import Sketch
 from symfric.multibody import (
     Distance,
-    Floating,
-    JointFriction,
     Mechanism,
     Planar,
-    Prismatic,
     Revolute,
     SpringDamper,
 )
-from symfric.multibody.joints import ALL_JOINTS
 from symfric.scenes import MECHANISMS, FourMass, Pendulum
 
 LAW = BrownMcPhee(v_t=0.05)
@@ -80,13 +76,6 @@ def test_contacts_stick_below_the_scale_of_their_law() -> None:
     assert marks["rod_12"].slips == ()
 
 
-def test_a_law_without_a_scale_never_sticks() -> None:
-    m = Mechanism("m")
-    m.body("bob", 1.0, (0.1, 0.1, 0.1))
-    m.joint(Prismatic("x", "ground", "bob", friction=JointFriction(Viscous())))
-    assert sketch(m).marks[0].slips == ()
-
-
 def test_joints_on_the_ground_are_known_whichever_way_they_are_written() -> None:
     m = Mechanism("m")
     for name, ends in (("one", ("ground", "one")), ("two", ("two", "ground"))):
@@ -96,8 +85,3 @@ def test_joints_on_the_ground_are_known_whichever_way_they_are_written() -> None
     assert [mark.grounded for mark in drawn.marks] == [True, True]
     fixed = next(part for part in drawn.parts if part.fixed)
     assert {mark.a for mark in drawn.marks} <= {*fixed.corners}
-
-
-def test_every_joint_is_drawn_but_one_that_holds_nothing() -> None:
-    for kind in ALL_JOINTS:
-        assert (kind.symbol != Symbol()) == (kind is not Floating), kind

@@ -86,10 +86,6 @@ def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:
     assert R[:, 2] == pytest.approx([0.0, 0.6, 0.8])
 
 
-def test_a_frame_without_directions_has_those_of_the_body() -> None:
-    assert full(Frame().R) == pytest.approx(np.eye(3))
-
-
 @pytest.mark.parametrize(
     ("z", "x", "message"),
     [
@@ -104,8 +100,3 @@ def test_axes_that_say_nothing_are_refused(
     with pytest.raises(ValueError) as caught:
         Frame(z=z, x=x)
     assert message in str(caught.value)
-
-
-def test_a_place_needs_three_numbers() -> None:
-    with pytest.raises(ValueError, match="frame: at: expected three numbers"):
-        Frame(at=(1.0, 2.0))

@@ -58,10 +58,6 @@ def test_a_joint_whose_child_is_nearer_to_the_ground_is_turned_round() -> None:
     assert (link.base, link.body, link.reverse) == (GROUND, "a", True)
 
 
-def test_what_hangs_on_a_rod_alone_is_left_out() -> None:
-    assert cut(Distance("rod", GROUND, "a")) == ([], ["rod"])
-
-
 def test_absolute_coordinates_cut_every_joint() -> None:
     joints = Revolute("1", GROUND, "a"), Revolute("2", "a", "b")
     topology = absolute(BODIES, joints, {"a": (), "b": ()})

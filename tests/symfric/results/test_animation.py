@@ -22,23 +22,22 @@ from symfric import (
 )
 from symfric.multibody import Mechanism, Prismatic
 from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
-from symfric.scenes import ALL_SCENES, MECHANISMS, DrillString, Pendulum, Prescribed
+from symfric.scenes import MECHANISMS, DrillString, Pendulum, Prescribed
 
 
 @pytest.fixture(scope="module")
 def runs() -> dict[str, Trajectory]:
     law = BrownMcPhee(v_t=0.02)
-    names = ("pendulum", "four_mass", "four_bar")
-    return {n: simulate(MECHANISMS[n](law).model(), 0.2, samples=5) for n in names}
+    names = ("pendulum", "four_mass")
+    return {n: simulate(MECHANISMS[n](law).model(), 0.2, samples=5, backend="vm") for n in names}
 
 
-@pytest.mark.parametrize("name", ["pendulum", "four_mass"])
 def test_gif_has_a_picture_per_frame_that_differ(
-    runs: dict[str, Trajectory], tmp_path: Path, name: str
+    runs: dict[str, Trajectory], tmp_path: Path
 ) -> None:
     told: list[float] = []
     path, open_before = tmp_path / "new" / "motion.gif", plt.get_fignums()
-    runs[name].animate(path, fps=10, speed=0.5, progress=told.append)
+    runs["four_mass"].animate(path, fps=10, speed=0.5, progress=told.append)
     with Image.open(path) as film:
         assert film.n_frames == 5  # 0.2 s at half speed
         assert film.info["duration"] == 100
@@ -160,13 +159,6 @@ def test_what_is_too_fast_or_too_slow_is_shown_in_six_seconds(
     assert (times[0], times[-1]) == (0.0, end)
 
 
-def test_planar_mechanisms_are_flat_and_labelled(runs: dict[str, Trajectory]) -> None:
-    figure, _ = picture(runs["four_bar"], np.linspace(0.0, 0.2, 3))
-    (axis,) = figure.axes
-    assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [m]", "z [m]")
-    assert axis.get_aspect() == 1.0
-
-
 def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Trajectory]) -> None:
     figure, _ = picture(runs["four_mass"], np.linspace(0.0, 0.2, 3))
     (axis,) = figure.axes
@@ -189,19 +181,6 @@ def test_time_and_speed_stand_above_and_joints_show_whether_they_stick(law: Law)
         fills += [fill for fill in found if fill in (STICKS, SLIDES)]
     assert fills == [STICKS, SLIDES]
     assert axis.get_title(loc="left") == "pendulum   t = 0.500 s  (0.1 x)"
-
-
-@pytest.mark.parametrize("name", ["coupled_blocks", "pendulum_box"])
-def test_the_title_stands_in_the_picture(name: str) -> None:
-    """Flat and tall ones, with the words for stick and slip below."""
-    run = simulate(ALL_SCENES[name](BrownMcPhee()).model(), 0.02)
-    figure, show = picture(run, np.linspace(0, 0.02, 3))
-    for k in (0, 2):
-        show(k)
-        figure.draw_without_rendering()
-        seen = figure.get_tightbbox()
-        assert figure.bbox_inches.x0 <= seen.x0 < seen.x1 <= figure.bbox_inches.x1
-        assert figure.bbox_inches.y0 <= seen.y0 < seen.y1 <= figure.bbox_inches.y1
 
 
 def test_the_hands_of_a_drill_string_turn_and_its_bit_sticks_at_first() -> None:

@@ -10,7 +10,7 @@ from symfric import BrownMcPhee, LuGre, parameters, report, simulate
 from symfric.cli import main
 from symfric.page.html import STYLE
 from symfric.results.pictures import plot_trajectories
-from symfric.scenes import Pendulum, Rabinowicz
+from symfric.scenes import Rabinowicz
 
 EMPTY = {"meta", "img", "path", "rect", "br"}
 
@@ -76,17 +76,6 @@ def test_a_law_has_one_colour_on_its_page() -> None:
     positions = plot_trajectories(runs, ["x"]).axes[0].lines
     for kind, line in zip(drawn, positions, strict=True):
         assert f"svg .{kind} {{ stroke: {line.get_color()};" in STYLE
-
-
-def test_a_run_that_failed_is_not_called_done() -> None:
-    run = simulate(Pendulum(BrownMcPhee()).model(), 5.0, max_steps=5, throw=False)
-    text = report({"pendulum": run})
-    assert "Not finished" in text and "verdict good" not in text
-
-
-def test_one_run_needs_no_name() -> None:
-    run = simulate(Rabinowicz(BrownMcPhee()).model(), 1.0)
-    assert f"{run.final['x']:.6g}" in Page(report(run)).cells
 
 
 @pytest.mark.parametrize("bad", [{}, {"x": 1.0}, 3])

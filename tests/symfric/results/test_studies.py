@@ -120,12 +120,6 @@ def test_an_interrupted_ensemble_keeps_and_saves_what_it_has(tmp_path: Path) -> 
     assert made.plot("v", over="mu_s").axes[0].get_title(loc="left").count("3 without a value")
 
 
-def test_a_resumed_folder_has_the_extremes_of_all(tmp_path: Path) -> None:
-    study(backend="vm", out=tmp_path)
-    again = study(backend="vm", out=tmp_path)
-    np.testing.assert_array_equal(again.reach["v"], study(backend="vm").reach["v"])
-
-
 def test_pictures_over_what_was_varied() -> None:
     made = study(backend="vm")
     figure = made.plot("x", "v", over="mu_s")

@@ -67,11 +67,6 @@ def test_columns_of_choice_are_written(run: Trajectory, tmp_path: Path) -> None:
     assert [float(row[2]) for row in rows] == pytest.approx(run["phi_Fx"])
 
 
-def test_details_are_shown_beside_signals(run: Trajectory) -> None:
-    axes = run.plot("phi_N", "phi_Fx").axes
-    assert [axis.get_ylabel() for axis in axes] == ["phi_N [N]", "phi_Fx [N]"]
-
-
 def test_a_model_without_details_has_accelerations_alone() -> None:
     run = simulate(rabinowicz(LuGre()), 0.1, samples=3)
     assert run.details == {"x_acc": "m/s^2"}
