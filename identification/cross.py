@@ -6,7 +6,7 @@ with a gap to the rest.
 Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import final
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.fit import Fit
-from identification.residuals.evaluation import Residuals
 from identification.result.fitted import Fitted
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
@@ -86,10 +85,8 @@ class CrossValidation:
 
     def __str__(self) -> str:
         each = ", ".join(f"{s} {value:.3g}" for s, value in self.rms.items())
-        text = (
-            f"{self.folds} folds by {self.by}: {percent(self.relative)} of the spread ({each} rms)"
-        )
-        return "\n".join([text, *self.failed])
+        error = f"{percent(self.relative)} of the spread ({each} rms)"
+        return "\n".join([f"{self.folds} folds by {self.by}: {error}", *self.failed])
 
 
 def cross_validate(
@@ -127,13 +124,11 @@ def left_of(fit: Fitted, data: Dataset) -> list[Left]:
         ValueError: data that cannot be compared, or a fit from JSON.
     """
     residuals, r = fit.alive("validate").left_on(data)
-    return list(_parts(residuals, [record.name for record in data], r))
-
-
-def _parts(residuals: Residuals, names: Sequence[str], r: Array) -> Iterator[Left]:
+    left = list[Left]()
     for c in residuals.channels:
         spread = float(np.std(c.measured)) or float(np.abs(c.measured).max(initial=0.0)) or 1.0
-        yield Left(names[c.record], c.signal, c.unit, c.t, r[c.rows], spread)
+        left.append(Left(data[c.record].name, c.signal, c.unit, c.t, r[c.rows], spread))
+    return left
 
 
 def relative(left: Sequence[Left]) -> float:
@@ -162,14 +157,12 @@ def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
         for part in left:
             key = (part.record, part.signal)
             common[key] = np.intersect1d(common.get(key, part.t), part.t)
-    return [[_at(part, common[part.record, part.signal]) for part in left] for left in many]
 
+    def at_common(part: Left) -> Left:
+        there = np.isin(part.t, common[part.record, part.signal])
+        return replace(part, t=part.t[there], r=part.r[there]) if there.any() else part
 
-def _at(part: Left, times: Array) -> Left:
-    there = np.isin(part.t, times)
-    if not there.any():  # no common times: unchanged
-        return part
-    return replace(part, t=part.t[there], r=part.r[there])
+    return [[at_common(part) for part in left] for left in many]
 
 
 def _rms(parts: Sequence[Array]) -> float:
@@ -181,41 +174,35 @@ def _divided(data: Dataset, folds: int) -> tuple[list[tuple[Dataset, Dataset]], 
     """Return (rest, part) of each fold, and the type of the parts."""
     if len(data) >= folds:
         groups = [data.records[k::folds] for k in range(folds)]
-        outside = [tuple(r for r in data if r not in group) for group in groups]
-        pairs = zip(outside, groups, strict=True)
-        return [(_named(data, rest), _named(data, part)) for rest, part in pairs], "records"
-    if all(record.t is None for record in data):
-        found = [_strided(data, k, folds) for k in range(folds)]
-        return found, "points"
-    return [_blocked(data, k, folds) for k in range(folds)], "blocks of time"
+        found = [([r for r in data if r not in group], group) for group in groups]
+        by = "records"
+    elif all(record.t is None for record in data):
+        every = [[np.arange(r.size) % folds == k for r in data] for k in range(folds)]
+        found = [
+            tuple([r.at(rows == inside) for r, rows in zip(data, some, strict=True)]
+                  for inside in (False, True))
+            for some in every
+        ]  # fmt: skip
+        by = "points"
+    else:
+        found, by = [_blocked(data, k, folds) for k in range(folds)], "blocks of time"
+    return [(Dataset((*a,), data.name), Dataset((*b,), data.name)) for a, b in found], by
 
 
-def _named(data: Dataset, records: Sequence[Record]) -> Dataset:
-    return Dataset(tuple(records), data.name)
-
-
-def _strided(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
-    rest = tuple(r.at(np.arange(r.size) % folds != k) for r in data)
-    return _named(data, rest), _named(data, [r.at(np.arange(r.size) % folds == k) for r in data])
-
-
-def _blocked(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
+def _blocked(data: Dataset, k: int, folds: int) -> tuple[list[Record], list[Record]]:
     """Return block k of each record, and the samples before and after it beyond a gap."""
     rest, part = list[Record](), list[Record]()
     for record in data:
         first, last = (round(j * record.size / folds) for j in (k, k + 1))
         gap = round(GAP * (last - first))
         part.append(record.at(slice(first, last)))
-        for side, rows in (
-            ("before", slice(0, max(0, first - gap))),
-            ("after", slice(last + gap, None)),
-        ):
-            piece_rows = range(record.size)[rows]
-            if len(piece_rows) >= LEAST:
+        sides = {"before": slice(0, max(0, first - gap)), "after": slice(last + gap, None)}
+        for side, rows in sides.items():
+            if len(range(record.size)[rows]) >= LEAST:
                 rest.append(replace(record.at(rows), name=f"{record.name} {side}"))
     if not rest:
         raise ValueError(
             f"cross_validate: expected records of at least {2 * LEAST} samples, got data "
             f"'{data.name}'; use fewer folds"
         )
-    return _named(data, rest), _named(data, part)
+    return rest, part

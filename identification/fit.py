@@ -6,9 +6,11 @@
 data -> type of residuals -> unknowns -> least squares from many starts -> verdict -> result
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from time import perf_counter
 from typing import Any, final
 
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
+from identification.data.differentiate import differentiate
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Residuals
 from identification.residuals.inverse import InverseDynamics
@@ -27,13 +30,15 @@ from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Point, Task, task
 from identification.starts.measured import Measured
-from identification.starts.start import centre, explained, findings_of, measured, slowest, strongest
+from identification.starts.start import start_values
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import covariance
 from identification.verdict.judge import Verdict, judge
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
+from symfric.laws import Law
+from symfric.scenes import Drive
 
 Array = NDArray[np.float64]
 MOST_STARTS = 10_000
@@ -86,19 +91,16 @@ class Fit:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        for check in (_check_kind, _check_data, _check_loss, _check_counts, _check_start):
+        for name, check in CHECKS.items():
             try:
-                check(self)
+                check(f"Fit: {name}", getattr(self, name))
             except ValueError as error:
                 problems.append(str(error))
         if problems:
             raise ValueError("; ".join(problems))
 
     def solve(
-        self,
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-        throw: bool = True,
+        self, executor: Executor | None = None, progress: Progress | None = None, throw: bool = True
     ) -> Fitted:
         """Solve the fit.
 
@@ -121,11 +123,23 @@ class Fit:
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
         starts = many_starts(made, first, executor, progress, self.evaluations)
         end = best_of(starts)
-        point = made.with_noise(end.noise).at(end.w)
+        made = made.with_noise(end.noise)
+        point = made.at(end.w)
         if isinstance(point, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
-        return self._result(asked, starts, end, point, throw, perf_counter() - begun)
+        verdict = judge(made, point, asked.findings)
+        gain = remaining(made, point) / max(point.cost, 1e-300)
+        status, message = _status(asked, end, verdict, gain)
+        result = fitted(
+            self._live(asked, made, point), starts, verdict, tuple(asked.findings),
+            status=status, message=message, seconds=perf_counter() - begun,
+            call=f"{written(self)}.solve()",
+            asked=Asked(replace(self, kind=asked.kind), dict(made.noise), point.w),
+        )  # fmt: skip
+        if throw and not status.ok:
+            raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
+        return result
 
     def prepared(self) -> "Prepared":
         """Check the data, choose the subject and set up the residuals, without solving."""
@@ -183,7 +197,7 @@ class Fit:
         largest = strongest(asked.kind, self.data, asked.seen, mass)
         levels = levels_of(asked.subject, largest, self.data.rotary)
         certain = covariance(made, point, levels)
-        return Live.of(asked.kind, asked.subject, self.data, made, point, certain)
+        return Live(asked.kind, asked.subject, self.data, made, point, certain)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
         """Return the values of a fit to other data, from one start and without a verdict."""
@@ -203,24 +217,6 @@ class Fit:
                 f"got {rows}; hold some, or add data"
             )
         return task(residuals, unknowns, self.noise, self.loss, found.guard)
-
-    def _result(
-        self, asked: "Prepared", starts: tuple[Start, ...], end: Start, point: Point,
-        throw: bool, seconds: float,
-    ) -> Fitted:  # fmt: skip
-        made = asked.task.with_noise(end.noise)
-        verdict = judge(made, point, asked.findings)
-        status, message = _status(end, verdict, remaining(made, point) / max(point.cost, 1e-300))
-        if status is Status.DOUBTFUL:
-            message += _unseen(asked)
-        question = Asked(replace(self, kind=asked.kind), dict(made.noise), point.w)
-        result = fitted(
-            self._live(asked, made, point), starts, verdict, tuple(asked.findings), status=status,
-            message=message, seconds=seconds, call=f"{written(self)}.solve()", asked=question,
-        )  # fmt: skip
-        if throw and not status.ok:
-            raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
-        return result
 
 
 @final
@@ -245,28 +241,21 @@ class Prepared:
     seen: Measured | None
 
 
-def _status(end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
+def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
     """Return the status of the fit and its message; for `gain` see `Verdict.status`."""
     status, message = verdict.status(end.status, gain), end.message
     if status is Status.DOUBTFUL and not end.status.ok:
         message = f"The search was not finished; a better fit may be near: {message}"
-    messages = [message, *verdict.sentences]
-    return status, " ".join(_sentence(text) for text in messages if text)
-
-
-def _unseen(asked: Prepared) -> str:
-    """Return a message on the limits of inverse dynamics for a law with states."""
-    law = asked.subject.law
-    if law is None or not law.states or not isinstance(asked.kind, InverseDynamics):
-        return ""
-    return (
-        f" The states of {type(law).__name__} follow the measured velocity, which noise and "
-        "sampling make inaccurate near rest: use Fit(Shooting(windows=1.0), ...), which simulates."
-    )
-
-
-def _sentence(text: str) -> str:
-    return text if text.endswith(".") else f"{text[0].upper()}{text[1:]}."
+    texts = [text for text in (message, *verdict.sentences) if text]
+    message = " ".join(t if t.endswith(".") else f"{t[0].upper()}{t[1:]}." for t in texts)
+    law, follows = asked.subject.law, isinstance(asked.kind, InverseDynamics)
+    if status is Status.DOUBTFUL and law is not None and law.states and follows:
+        message += (
+            f" The states of {type(law).__name__} follow the measured velocity, which noise and "
+            "sampling make inaccurate near rest: use Fit(Shooting(windows=1.0), ...), which "
+            "simulates."
+        )
+    return status, message
 
 
 def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
@@ -285,29 +274,103 @@ def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
     return (replace(kind, **mine) if mine else kind), given  # pyright: ignore[reportArgumentType, reportUnknownVariableType]
 
 
-def _check_kind(fit: Fit) -> None:
-    if isinstance(fit.kind, type) or not callable(getattr(fit.kind, "prepare", None)):
+def _check_kind(where: str, kind: object) -> None:
+    if isinstance(kind, type) or not callable(getattr(kind, "prepare", None)):
         such = "a type of residuals, such as Points(), InverseDynamics() or Shooting()"
-        raise checks.refused("Fit: kind", such, fit.kind)
+        raise checks.refused(where, such, kind)
 
 
-def _check_data(fit: Fit) -> None:
-    checks.kind("Fit: data", fit.data, Dataset, "data, such as Dataset.read('run.csv')")
-
-
-def _check_loss(fit: Fit) -> None:
-    checks.choice("Fit: loss", fit.loss, THRESHOLD)
-
-
-def _check_counts(fit: Fit) -> None:
-    checks.count("Fit: starts", fit.starts, most=MOST_STARTS)
-    checks.count("Fit: seed", fit.seed, least=0)
-    checks.count("Fit: evaluations", fit.evaluations, least=2)
-
-
-def _check_start(fit: Fit) -> None:
-    if isinstance(fit.start, str):
-        checks.choice("Fit: start", fit.start, ("data", "law"))
+def _check_start(where: str, start: object) -> None:
+    if isinstance(start, str):
+        checks.choice(where, start, ("data", "law"))
         return
-    for name, value in checks.named("Fit: start", fit.start).items():
-        checks.number(f"Fit: start: {name}", value)
+    for name, value in checks.named(where, start).items():
+        checks.number(f"{where}: {name}", value)
+
+
+CHECKS: Mapping[str, Callable[[str, Any], object]] = {
+    "kind": _check_kind,
+    "data": partial(checks.kind, wanted=Dataset, such_as="data, such as Dataset.read('run.csv')"),
+    "loss": partial(checks.choice, choices=THRESHOLD),
+    "starts": partial(checks.count, most=MOST_STARTS),
+    "seed": partial(checks.count, least=0),
+    "evaluations": partial(checks.count, least=2),
+    "start": _check_start,
+}
+
+
+FEW = 0.01
+"""Share of points with an arbitrarily small speed, such as noise about rest."""
+
+
+def findings_of(kind: object, data: Dataset) -> Findings:
+    """Return the warnings on the data for these residuals."""
+    if isinstance(kind, Points):
+        return data.check()
+    called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
+    return data.check(**called)
+
+
+def explained(error: ValueError, findings: Findings) -> ValueError:
+    """Return the error of failed residuals, preceded by the first error in the data."""
+    if not findings.errors:
+        return error
+    sentence = findings.errors[0].sentence.rstrip(".")
+    return ValueError(f"data '{findings.name}': {sentence}; then {error}")
+
+
+def _roles(kind: object) -> dict[str, str]:
+    """Return the channels of position and force of a drive."""
+    names = {name: getattr(kind, name, name) for name in ("x", "force")}
+    return {name: given if isinstance(given, str) else name for name, given in names.items()}
+
+
+def measured(kind: object, data: Dataset, load: float) -> Measured | None:
+    """Return velocity and force of points or of a drive, all records; None if unavailable."""
+    try:
+        if isinstance(kind, Points):
+            timed = all(r.t is not None for r in data)
+            names = {"v": kind.v, "F": kind.F} | ({"t": "t"} if timed else {})
+            each = [{part: r[name] for part, name in names.items()} for r in data]
+        else:
+            called, chosen = _roles(kind), getattr(kind, "filter", None)
+            motions = [differentiate(r, chosen, **called) for r in data]
+            each = [{"v": m.v, "F": m.force, "x": m.x, "t": m.t, "a": m.a} for m in motions]
+        signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
+        breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())
+        return Measured(**signals, N=load, breaks=breaks)
+    except ValueError:  # the preparation of the residuals reports missing channels
+        return None
+
+
+def strongest(
+    kind: object, data: Dataset, seen: Measured | None, mass: float | None
+) -> float | None:
+    """Return the largest force on the friction of points or of a drive [N]; None if unknown.
+
+    In sliding it is F - m a, at rest F. Unknown for points with a measured normal force.
+    """
+    loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
+    if seen is None or loaded:
+        return None
+    if seen.a is None or mass is None:
+        return float(np.abs(seen.F).max())
+    return float(max(np.abs(seen.F).max(), np.abs(seen.F - mass * seen.a).max()))
+
+
+def slowest(kind: object, seen: Measured | None) -> float:
+    """Return the speed [m/s] above which nearly all points not at rest lie; 0 for motions."""
+    if seen is None or not isinstance(kind, Points):
+        return 0.0
+    speeds = np.abs(seen.v[seen.v != 0])
+    return float(np.quantile(speeds, FEW)) if speeds.size else 0.0
+
+
+def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the start of every free parameter: from the user, else the data, else the law."""
+    values, found = {u.name: u.start for u in subject.unknowns}, dict[str, float]()
+    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
+    if whole is not None and seen is not None:
+        with suppress(ValueError):  # data without motion: keep the values of the law
+            found = start_values(whole, seen, free=[*values])
+    return values | {n: x for n, x in found.items() if n not in subject.started} | dict(given)

@@ -12,23 +12,14 @@ Source: Burnham and Anderson, Model Selection and Multimodel Inference, 2002.
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from math import inf, isfinite, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
-from identification.cross import (
-    DIVERGED,
-    CrossValidation,
-    Left,
-    cross_validate,
-    left_of,
-    percent,
-    relative,
-    shared,
-)
+from identification.cross import DIVERGED, Left, cross_validate, left_of, percent, relative, shared
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
@@ -49,6 +40,8 @@ INTERRUPTED = "interrupted by the user"
 HEADER = ("law", "validation", "fit", "AICc", "BIC", "par.", "op.", "status", "")
 NUMBERS = (1, 2, 3, 4, 5, 6)
 """Header of the table of laws, and its numeric columns."""
+TITLES = {"validation": "validation [%]", "fitted": "fit [%]", "aicc": "AICc", "bic": "BIC"}
+"""Names of fields in plain data, if they differ."""
 LOST = "not fitted"
 OWN = ("kind", "what", "data")
 """Arguments of a fit that `select` sets."""
@@ -98,12 +91,7 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, with None for non-finite numbers."""
-        named: dict[str, Any] = {
-            "law": self.law, "status": self.status, "validation [%]": self.validation,
-            "fit [%]": self.fitted, "AICc": self.aicc, "BIC": self.bic,
-            "parameters": self.parameters, "operations": self.operations,
-            "seconds": self.seconds, "sentence": self.sentence,
-        }  # fmt: skip
+        named = {TITLES.get(f.name, f.name): getattr(self, f.name) for f in fields(self)[:-1]}
         return {
             n: None if isinstance(v, float) and not isfinite(v) else v for n, v in named.items()
         }
@@ -162,10 +150,8 @@ class Ranking:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the fits as plain data."""
-        return {
-            "data": self.data, "how": self.how, "effective": self.effective,
-            "rows": [row.to_dict() for row in self.rows],
-        }  # fmt: skip
+        plain = {name: getattr(self, name) for name in ("data", "how", "effective")}
+        return plain | {"rows": [row.to_dict() for row in self.rows]}
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Plot errors on fitted and other data, and information criteria, as bars for each law.
@@ -228,26 +214,24 @@ def select(
             break
     if progress is not None:
         progress("ranked", 1.0)
-    how = f"validation on {validate.name}" if validate is not None else "no validation"
-    crossed = next((t.crossed for t in tried if t.crossed is not None), None)
-    if crossed is None and validate is None and folds > 1:
+    by = next((t.by for t in tried if t.by), "")
+    how = f"validation by {folds} folds ({by})" if by else "no validation"
+    if validate is not None:
+        how = f"validation on {validate.name}"
+    elif not by and folds > 1:
         how = f"no validation, although {folds} folds were requested"
-    if crossed is not None:
-        how = f"validation by {folds} folds ({crossed.by})"
     return _ranked(tried, data.name, how)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """Outcome of one law."""
+class _Tried(NamedTuple):
+    """Outcome of one law: residuals on the data of the fit and on others, type of the folds."""
 
     name: str
     why: str = ""
     fit: Fitted | None = None
     inside: Sequence[Left] = ()
     outside: Sequence[Left] = ()
-    crossed: CrossValidation | None = None
+    by: str = ""
 
     @property
     def ended(self) -> bool:
@@ -281,19 +265,18 @@ def _try(
     live = found.live
     if live is None:
         return _Tried(name, "the result has no residuals")
-    made = _Tried(name, fit=found, inside=left_of(found, asked.data))
+    inside, outside = left_of(found, asked.data), list[Left]()
+    why = by = ""
     try:
         if validate is not None:
-            return replace(made, outside=left_of(found, validate))
-        if folds and found.status is not Status.INTERRUPTED:
+            outside = left_of(found, validate)
+        elif folds and found.status is not Status.INTERRUPTED:
             start = {n: v for n, v in live.values.items() if n in live.subject.names}
             crossed = cross_validate(asked, folds, start)
-            return replace(
-                made, outside=crossed.left, crossed=crossed, why=" ".join(crossed.failed)
-            )
+            outside, by, why = [*crossed.left], crossed.by, " ".join(crossed.failed)
     except ValueError as error:
-        return replace(made, why=str(error))
-    return made
+        why = str(error)
+    return _Tried(name, why, found, inside, outside, by)
 
 
 def _ranked(tried: Sequence[_Tried], data: str, how: str) -> Ranking:
@@ -307,18 +290,14 @@ def _ranked(tried: Sequence[_Tried], data: str, how: str) -> Ranking:
         fits = sum(effective[s] * np.log(max(ms, 1e-300)) for s, ms in _mean_squares(left).items())
         aicc.append(float(fits) + (2 * k * n / (n - k - 1) if n > k + 1 else inf))
         bic.append(float(fits) + k * float(np.log(n)))
-    first = min(aicc, default=0.0), min(bic, default=0.0)
-    rows = [
-        _row(t, relative(out), relative(ins), _over(a, first[0]), _over(b, first[1]))
-        for t, ins, out, a, b in zip(good, inside, outside, aicc, bic, strict=True)
-    ]
+    least = min(aicc, default=0.0), min(bic, default=0.0)
+    over = ([x - m if isfinite(m) else nan for x in some]
+            for some, m in zip((aicc, bic), least, strict=True))  # fmt: skip
+    errors = ([relative(left) for left in some] for some in (outside, inside))
+    rows = [_row(t, *numbers) for t, *numbers in zip(good, *errors, *over, strict=True)]
     rows.sort(key=lambda row: (row.validation if isfinite(row.validation) else inf, row.bic))
     lost = [Row(t.name, sentence=t.why) for t in tried if t.fit is None]
     return Ranking((*rows, *lost), data, how, n)
-
-
-def _over(value: float, best: float) -> float:
-    return value - best if isfinite(best) else nan
 
 
 def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -> Row:
@@ -329,19 +308,11 @@ def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -
     away = validation > DIVERGED
     far = f"On data that were not fitted its error exceeds {DIVERGED:g} %." if away else ""
     sentence = " ".join(s for s in (*fit.verdict.sentences[:1], far, t.why) if s)
+    error = inf if away else validation
     return Row(
-        law=t.name,
-        status=fit.status.name,
-        validation=inf if away else validation,
-        fitted=fitted,
-        aicc=aicc,
-        bic=bic,
-        parameters=_count(t),
-        operations=operations,
-        seconds=fit.seconds,
-        sentence=sentence,
-        fit=fit,
-    )
+        t.name, fit.status.name, error, fitted, aicc, bic, _count(t), operations, fit.seconds,
+        sentence, fit,
+    )  # fmt: skip
 
 
 def _count(t: _Tried) -> int:

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
-    from ocp.checking.verification import Miss as Miss
-    from ocp.checking.verification import Verification as Verification
     from ocp.checking.verify import verify as verify
     from ocp.formulation.expressions import TIME as TIME
     from ocp.formulation.expressions import Cost as Cost
@@ -42,6 +40,8 @@ if TYPE_CHECKING:
     from ocp.solving.solution import load as load
     from ocp.solving.solution import plot_solutions as plot_solutions
     from ocp.solving.starts import Guess as Guess
+    from ocp.solving.verification import Miss as Miss
+    from ocp.solving.verification import Verification as Verification
     from ocp.transcription.program import Progress as Progress
     from ocp.transcription.program import SolverStatistics as SolverStatistics
     from ocp.transcription.schemes import Legendre as Legendre

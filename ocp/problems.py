@@ -1,16 +1,16 @@
-"""Ready problems: a problem, its known optimum, and the source of that.
+"""Ready problems, each with its known optimum and the source of that.
 
-Those with friction, where bodies stick and reverse on the way, minimise the integral of the squared
-input. `v_t` is the width of the law [m/s or rad/s]: at 1e-6 it is sharp, and the optimum is that of
-Coulomb's law with stiction. Those of others, in which nothing rubs, are stated with the data of
-their sources, so that optima can be compared digit by digit.
+In problems with friction, bodies stick and reverse on the way; they minimise the integral of the
+squared input. Their `v_t` is the width of the law [m/s or rad/s]: at 1e-6 it is sharp, and the
+optimum is that of Coulomb's law with stiction. Problems of other authors, which have no friction,
+use the data of their sources, so that optima can be compared digit by digit.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import Any, TypeVar, final
+from typing import TypeVar, final
 
 import casadi as ca
 
@@ -31,40 +31,48 @@ class Ready:
     """A problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
 
     Attributes:
-        name: as on the command line.
-        title: one line about motion and goal.
-        make: the problem; keyword arguments are its numbers, such as v_t.
+        make: function that returns the problem; its keyword arguments are numbers such as v_t.
         optimum: best known cost J, in the unit of the problem's cost; NaN where none is known.
-        uncertain: what the optimum is good for.
-        source: closed form, publication, or how it was found.
-        friction: whether it has contacts, so that modes are found.
+        uncertain: relative uncertainty of the optimum.
+        source: closed form, publication, or method.
+        friction: True if the problem has contacts.
     """
 
-    name: str
-    title: str
     make: Callable[..., Problem]
     optimum: float
     uncertain: float
     source: str
     friction: bool = False
 
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        return self.make.__name__
 
+    @property
+    def title(self) -> str:
+        """Motion and goal in one line."""
+        return (self.make.__doc__ or "").partition("\n")[0].rstrip(".")
+
+
+READY: dict[str, Ready] = {}
+"""Name -> problem."""
 Make = TypeVar("Make", bound=Callable[..., Problem])
 
 
-def ready(to: list[Ready], *about: Any, friction: bool = False) -> Callable[[Make], Make]:
-    """Add the decorated function to a list: `about` is title, optimum, its error and source."""
+def ready(
+    optimum: float, uncertain: float, source: str, friction: bool = False
+) -> Callable[[Make], Make]:
+    """Add the decorated function to `READY`."""
 
     def add(make: Make) -> Make:
-        title, *numbers = about
-        to.append(Ready(make.__name__, title, make, *numbers, friction=friction))
+        READY[make.__name__] = Ready(make, optimum, uncertain, source, friction)
         return make
 
     return add
 
 
-FRICTION: list[Ready] = []
-frictional = partial(ready, FRICTION, friction=True)
+frictional = partial(ready, friction=True)
 BEST = "best of many starts"
 V_T = 1e-6
 GRAVITY = 9.81
@@ -72,27 +80,28 @@ FORCE = integral(lambda s: s.force**2)
 
 
 def guide(v_t: float) -> BrownMcPhee:
-    """Friction of the linear guides below: 4 N sliding, 6 N at rest, 0.5 N s/m, for N = 1 N."""
+    """Friction of the linear guides: 4 N sliding, 6 N at rest, 0.5 N s/m, for N = 1 N."""
     return BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=0.5, v_t=v_t, N_t=1e-3)
 
 
-@frictional(
-    "1 m out and back in 2 s on a guide with stiction",
-    64.59984,
-    1e-4,
-    "closed form 40 + 0.5 / (1 - 4 tanh 0.25)",
-)
+@frictional(64.59984, 1e-4, "closed form 40 + 0.5 / (1 - 4 tanh 0.25)")
 def out_and_back(v_t: float = V_T) -> Problem:
-    """1 kg goes 1 m out in 1 s, and back to rest in another."""
+    """1 m out and back in 2 s on a guide with stiction.
+
+    The mass of 1 kg passes x = 1 m after 1 s and is back at rest after another.
+    """
     stage = drive(guide(v_t), m=1.0, N=1.0)
     out = Phase(stage, T=1.0, start={"x": 0.0, "v": 0.0}, end={"x": 1.0}, name="out")
     back = Phase(stage, T=1.0, end={"x": 0.0, "v": 0.0}, name="back")
     return Problem(out >> back, FORCE, bounds={"force": (-20.0, 20.0)})
 
 
-@frictional("swing-up with friction in the bearing", 20.979, 1e-2, BEST)
+@frictional(20.979, 1e-2, BEST)
 def pendulum(v_t: float = V_T) -> Problem:
-    """A motor of 3 N m swings a pendulum of 1 kg and 1 m up that it cannot lift at once."""
+    """Swing-up with friction in the bearing.
+
+    A motor of at most 3 N m cannot lift the pendulum of 1 kg and 1 m directly.
+    """
     law = BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=v_t)
     made = Mechanism("pendulum", gravity=(0.0, 0.0, -GRAVITY))
     made.body("bob", 1.0, (1e-9, 1e-9, 1e-9))
@@ -111,9 +120,12 @@ def pendulum(v_t: float = V_T) -> Problem:
     return Problem(up, integral(lambda s: s.torque**2), bounds={"torque": (-3.0, 3.0)})
 
 
-@frictional("swing-up by a cart on a rail", 71.534, 2e-2, BEST)
+@frictional(71.534, 2e-2, BEST)
 def cart_pendulum(v_t: float = V_T) -> Problem:
-    """A cart of 1 kg swings a pendulum of 0.3 kg and 0.5 m up, and stops 0.8 m further on."""
+    """Swing-up by a cart on a rail.
+
+    A cart of 1 kg swings up a pendulum of 0.3 kg and 0.5 m, and stops 0.8 m from its start.
+    """
     law = BrownMcPhee(mu_s=2.2, mu_d=1.5, mu_v=0.1, v_t=v_t, N_t=1e-3)
     made = Mechanism("cart_pendulum", gravity=(0.0, 0.0, -GRAVITY))
     made.body("cart", 1.0, (1e-9, 1e-9, 1e-9))
@@ -172,26 +184,29 @@ def _there_and_back(model: Model) -> Problem:
     return Problem(there >> back, FORCE, bounds={"force": (-40.0, 40.0)})
 
 
-@frictional("a load on a guide, there and back through a spring", 28.480, 3e-2, BEST)
+@frictional(28.480, 3e-2, BEST)
 def load_through_spring(v_t: float = V_T) -> Problem:
-    """A load on a guide goes 0.3 m there and back, moved through a spring."""
+    """A load on a guide, there and back through a spring."""
     return _there_and_back(_coupled("load_through_spring", v_t, 0.0))
 
 
-@frictional("two coupled blocks with a contact each", 59.18, 1e-2, BEST)
+@frictional(59.18, 1e-2, BEST)
 def two_blocks(v_t: float = V_T) -> Problem:
-    """The same with friction under the motor, too: two contacts."""
+    """Two coupled blocks with a contact each.
+
+    As `load_through_spring`, with friction under the motor, too.
+    """
     return _there_and_back(_coupled("two_blocks", v_t, 0.5))
 
 
-@frictional("a parcel slides along a tray that a torque tilts", 8.8827, 1e-2, BEST)
+@frictional(8.8827, 1e-2, BEST)
 def parcel_on_tray(v_t: float = V_T) -> Problem:
-    """A parcel slides 0.3 m along a tray that a torque tilts; its normal force follows the motion.
+    """A parcel slides along a tray that a torque tilts.
 
         m (v' - x w^2) = -m g sin(a) - F,   m (x w' + 2 v w) = N - m g cos(a),   J w' = M - x N
 
-    with position x along the tray from its pivot, and tilt a, w = a'. Nothing in the solver was
-    chosen by looking at this problem.
+    with position x along the tray from its pivot, tilt a and w = a'; the normal force follows the
+    motion. The solver was not tuned on this problem.
     """
     m, J = 1.0, 0.5
     x = Variable("x", "m", start=0.3, nominal=0.3)
@@ -217,19 +232,11 @@ def parcel_on_tray(v_t: float = V_T) -> Problem:
     return Problem(move, integral(lambda s: s.torque**2), bounds=bounds)
 
 
-OTHERS: list[Ready] = []
-"""Brachistochrone, Bryson-Denham, Goddard's rocket, hang glider, alp rider."""
-
-
-@ready(
-    OTHERS,
-    "a bead slides from (0, 10) to (10, 5) m in the least time",
-    1.80160312,
-    1e-8,
-    "closed form, a cycloid; data of the example of Dymos, 1.8016 s",
-)
+@ready(1.80160312, 1e-8, "closed form, a cycloid; data of the example of Dymos, 1.8016 s")
 def brachistochrone() -> Problem:
-    """Fastest slide from (0, 10) to (10, 5) m along a wire of angle theta; the curve is a cycloid.
+    """A bead slides from (0, 10) to (10, 5) m in the least time.
+
+    The angle theta of the wire is the input; the curve is a cycloid.
 
     x' = v sin theta,  y' = -v cos theta,  v' = g cos theta
     """
@@ -242,20 +249,14 @@ def brachistochrone() -> Problem:
     return Problem(Phase(bead, Free(0.5, 10.0), end={"x": 10.0, "y": 5.0}), TIME)
 
 
-@ready(
-    OTHERS,
-    "a cart turns round before a wall with the least squared acceleration",
-    4.0,
-    0.0,
-    "closed form 4 / (9 wall); Bryson and Ho, Applied Optimal Control, 1975, 3.11",
-)
+@ready(4.0, 0.0, "closed form 4 / (9 wall); Bryson and Ho, Applied Optimal Control, 1975, 3.11")
 def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
-    """A cart between walls turns round without touching, with the least squared acceleration.
+    """A cart turns round before a wall with the least squared acceleration.
 
     x' = v,  v' = a,  x <= wall,  (x, v) from (0, 1) to (0, -1) in 1 s; J = integral of a^2 / 2
 
     Args:
-        wall: where it stands [m]; for wall <= 1/6 the cart slows down along it, J = 4 / (9 wall).
+        wall: its position [m]; for wall <= 1/6 the cart slows down along it, J = 4 / (9 wall).
     """
     x, v = Variable("x", "m", nominal=wall), Variable("v", "m/s", start=1.0)
     a = Variable("a", "m/s^2", nominal=10.0)
@@ -268,15 +269,15 @@ def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
 
 
 @ready(
-    OTHERS,
-    "a rocket flies as high as it can",
     -1.01283692,
     1e-8,
     "1.01283 in Dolan, More and Munson, Benchmarking Optimization Software with COPS 3.0, "
     "2004, 10; further digits by 800 intervals here, 3e-9 from those by 200",
 )
 def goddard() -> Problem:
-    """Highest flight of a rocket with 40 % fuel: full thrust, a singular arc against drag, none.
+    """A rocket flies as high as it can.
+
+    The rocket holds 40 % fuel. Its thrust is full, then singular against drag, then zero:
 
     h' = v,  v' = (thrust - D) / m - 1 / h^2,  m' = -thrust / c,  D = 310 v^2 exp(500 (1 - h))
 
@@ -297,16 +298,15 @@ def goddard() -> Problem:
 
 
 @ready(
-    OTHERS,
-    "a hang glider flies as far as it can through a thermal",
     -1248.03,
     5e-3,
     "Dolan, More and Munson, COPS 3.0, 2004, 11; Betts, Practical Methods, 2010, 6.5",
 )
 def hang_glider() -> Problem:
-    """Farthest flight of a hang glider through a thermal, by its lift coefficient.
+    """A hang glider flies as far as it can through a thermal.
 
-    From 1000 m down to 900 m, in steady glide at both ends.
+    The lift coefficient is the input. The glider descends from 1000 m to 900 m, and is in steady
+    glide at both ends.
     """
     x, y = Variable("x", "m", nominal=1000.0), Variable("y", "m", start=1000.0, nominal=1000.0)
     vx = Variable("vx", "m/s", start=13.227567500, nominal=10.0)
@@ -333,20 +333,16 @@ def hang_glider() -> Problem:
     )
 
 
-@ready(
-    OTHERS,
-    "stiff and unstable states ride over four peaks",
-    2030.85609,
-    1e-5,
-    "Betts, Practical Methods for Optimal Control and Estimation, 2010, 6.14",
-)
+@ready(2030.85609, 1e-5, "Betts, Practical Methods for Optimal Control and Estimation, 2010, 6.14")
 def alp_rider() -> Problem:
-    """Four stiff states, two of them unstable together, ride over four peaks that grow from below.
+    """Stiff and unstable states ride over four peaks.
+
+    Two of the four states are unstable together; the peaks are lower bounds of |y|^2:
 
     |y|^2 >= 3 p(t, 3, 12) + 3 p(t, 6, 10) + 3 p(t, 10, 6) + 8 p(t, 15, 4) + 0.01,
     p(t, a, b) = exp(-b (t - a)^2);  J = integral of 100 |y|^2 + 0.01 |u|^2 over 20 s
 
-    Errors of a simulation grow by e^40 over the ride: no control that is only held lands it.
+    Errors of a simulation grow by e^40 over the ride, so no held control lands it.
     """
     starts = (2.0, 1.0, 2.0, 1.0)
     y = [Variable(f"y{i + 1}", "1", start=start) for i, start in enumerate(starts)]
@@ -372,7 +368,3 @@ def alp_rider() -> Problem:
         ),
         bounds={"clearance": (0.0, None)},
     )
-
-
-READY: dict[str, Ready] = {one.name: one for one in (*FRICTION, *OTHERS)}
-"""Name -> problem."""

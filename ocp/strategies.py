@@ -1,29 +1,27 @@
-"""The strategies of `solve`: directly, by homotopy, by modes, and what is done where one fails."""
+"""Strategies of `solve`: directly, by homotopy, by modes, and the fallbacks if one fails."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Literal, final
+from typing import Literal, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
-from ocp.checking.verification import Verification
-from ocp.checking.verify import verified
-from ocp.checking.verify import verify as verify_solution
+from ocp.checking.verify import verified, verify
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
-from ocp.friction.smooth_models import has_jumps, own_level, speeds_at
+from ocp.friction.smooth_models import own_level, speeds_at, sticking
 from ocp.original_law import STEPS, OriginalLaw
 from ocp.solving.methods import Ipopt
-from ocp.solving.motion import Stored
 from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Clock
-from ocp.solving.solution import Solution
+from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
+from ocp.solving.verification import Verification
 from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
@@ -33,22 +31,21 @@ Array = NDArray[np.float64]
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
 INTERVALS = 50
 EARLY = 0.04
-"""Layers, in multiples of the speeds, from which on the modes of a motion may be read."""
+"""Smoothing width, in multiples of the speeds, from which on modes may be deduced."""
 CLOSE_PASSES, CLOSE_INTERVALS, CLOSE_ITERATIONS = 4, 400, 60
-"""Limits of a solve that starts at a motion by modes: its law is near, or not found."""
+"""Limits of a solve from a motion by modes: a solution is near, or not found."""
 SHARED_PASSES, SHARED_ITERATIONS = 4, 150
-"""Limits where scenarios share inputs: their contacts turn round at many instants, and each finer
-mesh is a search among kinks for a thousandth of the cost."""
-STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+"""Limits if scenarios share inputs: their contacts reverse at many instants, and each finer mesh is
+a search among kinks for a thousandth of the cost."""
 EXACT_RTOL = 1e-7
-"""Relative tolerance of the motion with exact friction: a hundredth of what matters."""
+"""Relative tolerance of the motion with exact friction: a hundredth of the required accuracy."""
 SHARPEST = 1e-4
-"""Layers, in multiples of the speeds, that are too narrow for one solve with them."""
+"""Smoothing width, in multiples of the speeds, that is too narrow for a direct solve."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
 FOUND = (*MISSED, Status.UNSTABLE)
-"""How a motion ends that was found and does not do what it should."""
+"""Status of a motion that was found and violates its conditions."""
 FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
-"""What a strategy of friction may raise where it fails: another one is taken then."""
+"""Exceptions of a strategy that fails: another one is used then."""
 
 
 @final
@@ -70,10 +67,15 @@ class Direct:
     clock: Clock
     progress: Report | None
 
+    @property
+    def ipopt(self) -> Ipopt:
+        """The solver if it is Ipopt, else Ipopt without options."""
+        return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
+
     def solved(
         self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
     ) -> Solution:
-        """The problem from `guess`; with `close` a solver that loses its way is stopped early."""
+        """Solve the problem from `guess`; with `close` a solver that diverges is stopped early."""
         goals, solver, most = self.goals, self.solver, 0
         if meshes is None:
             wanted = INTERVALS if self.intervals is None else self.intervals
@@ -87,11 +89,11 @@ class Direct:
             solver = solver.with_options(max_iter=most)
         return refined_solve(
             self.problem, meshes, self.scheme, solver, guess, self.progress,
-            goals=goals, limit=self.clock.within,
+            goals=goals, clock=self.clock,
         )  # fmt: skip
 
     def sharpened(self, guess: Start, starts: int, last: float) -> Iterator[Sharp]:
-        """Motions with narrower and narrower layers, down to `last`."""
+        """Yield motions with decreasing smoothing widths, down to `last`."""
         intervals = FINE
         if self.intervals is not None:
             meshes = make_meshes(self.problem, self.intervals)
@@ -102,80 +104,73 @@ class Direct:
         )  # fmt: skip
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Judged:
+class Judged(NamedTuple):
     """A motion by modes, and whether it is right with the user's laws and with exact friction."""
 
     solution: Solution
     right: bool
 
-    @property
-    def worth(self) -> tuple[bool, bool, float]:
-        """The larger the better: right before wrong, solved before failed, then by cost."""
-        return self.right, self.solution.ok, -self.solution.cost
-
 
 @final
 @dataclass(frozen=True)
 class Verifier:
-    """Verification within a tolerance; none where `active` is False."""
+    """Verification within a tolerance; none if not `active`."""
 
     tolerance: float
     active: bool
 
     def checked(self, solution: Solution) -> Solution:
-        """`solution` with its verification.
+        """Return `solution` with its verification.
 
-        Of a motion by modes the states of laws are not known: their simulated values are no miss,
+        The law states of a motion by modes are unknown: their simulated values are not compared,
         and local errors are not evaluated.
         """
-        if not self.active or solution.status in STOPPED:
+        if not self.active or solution.status.stopped:
             return solution
         chain = solution.problem.chain
         laws = {c.name: c for phase in chain for c in phase.model.contacts if c.states}
         try:
             if not (solution.modes and laws):
                 return verified(solution, self.tolerance)
-            found = _without_states_of_laws(solution, verify_solution(solution, self.tolerance))
+            found = _without_law_states(solution, verify(solution, self.tolerance))
         except FAILURES as error:
-            return _with_sentence(solution, f"It was not verified: {_reason(error)}.")
+            return with_sentence(solution, f"It was not verified: {_reason(error)}.")
         names = ", ".join(f"{name}: {type(c.law).__name__}" for name, c in laws.items())
-        said = f"{solution.message} Friction with states ({names}) was taken as its steady sliding"
-        said += " and its static level, and the motion verified with the law itself."
+        text = f"{solution.message} Friction with states ({names}) was taken as its steady sliding"
+        text += " and its static level, and the motion verified with the law itself."
         if not found.ok and solution.ok:
-            said = f"ocp '{solution.problem.name}': {found.sentence} {said}"
+            text = f"ocp '{solution.problem.name}': {found.sentence} {text}"
             solution = replace(solution, status=found.status)
-        return replace(solution, verification=found, message=said)
+        return replace(solution, verification=found, message=text)
 
-    def judged(self, exact: Solution) -> Judged:
-        """A motion by modes that is checked, simulated with exact friction as well."""
-        if not self.active or exact.status in STOPPED or not (exact.ok or exact.status in MISSED):
-            return Judged(exact, exact.ok)
+    def judged(self, solution: Solution) -> Judged:
+        """Return a verified motion by modes after a simulation with exact friction."""
+        if not self.active or not (solution.ok or solution.status in MISSED):
+            return Judged(solution, solution.ok)
         try:
-            exactly = verify_exactly(exact, self.tolerance, EXACT_RTOL)
-            found = _without_states_of_laws(exact, exactly)
+            exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
+            exact = _without_law_states(solution, exact)
         except FAILURES as error:
-            said = f"With exact Coulomb friction it was not simulated: {_reason(error)}."
-            return Judged(_with_sentence(exact, said), exact.ok)
-        if not found.ok:
-            said = f"{exact.message} With exact Coulomb friction: {found.sentence}"
-            return Judged(replace(exact, message=said), right=False)
-        said = f"{exact.message} With exact Coulomb friction it misses by {found.largest:.1g}"
+            text = f"With exact Coulomb friction it was not simulated: {_reason(error)}."
+            return Judged(with_sentence(solution, text), solution.ok)
         if not exact.ok:
-            said += " only: the layers of the law creep at rest and break away later; make them "
-            said += "narrower, or allow this by `tolerance`"
-        return Judged(replace(exact, message=f"{said}."), exact.ok)
+            text = f"With exact Coulomb friction: {exact.sentence}"
+            return Judged(with_sentence(solution, text), right=False)
+        text = f"With exact Coulomb friction it misses by {exact.largest:.1g}"
+        if not solution.ok:
+            text += " only: the layers of the law creep at rest and break away later; make them "
+            text += "narrower, or allow this by `tolerance`"
+        return Judged(with_sentence(solution, f"{text}."), solution.ok)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ModeSearch:
-    """The search for an exact motion next to a sharpened one.
+    """The search for an exact motion near a sharpened one.
 
     Attributes:
         direct: solves of the problem itself.
-        verifier: of what is found.
+        verifier: of the motions.
         margin: share of its static level that a contact at rest keeps from it.
     """
 
@@ -184,23 +179,22 @@ class ModeSearch:
     margin: float
 
     def near(self, sharp: Sharp) -> Judged:
-        """The exact motion next to a sharpened one, verified with the user's laws."""
+        """Return the exact motion near a sharpened one, verified with the user's laws."""
         direct, problem = self.direct, self.direct.problem
         speeds = speeds_at(problem, sharp.scales, sharp.level)
-        solver = direct.solver if isinstance(direct.solver, Ipopt) else Ipopt()
-        found = optimise_modes(
-            sharp.solution, problem, speeds, solver=solver, scheme=direct.scheme,
+        motions = optimise_modes(
+            sharp.solution, problem, speeds, solver=direct.ipopt, scheme=direct.scheme,
             progress=direct.progress, margin=self.margin, clock=direct.clock,
         )  # fmt: skip
-        exact, margin = next(found)
-        if exact.status in STOPPED and not exact.modes:
+        exact, margin = next(motions)
+        if exact.status.stopped and not exact.modes:
             by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
-            said = f"ocp '{problem.name}': {by} while modes were sought; friction is still smooth."
+            text = f"ocp '{problem.name}': {by} while modes were sought; friction is still smooth."
             both = _after(exact, sharp.solution)
-            stopped = replace(both, status=exact.status, message=said, cause=exact.cause)
+            stopped = replace(both, status=exact.status, message=text, cause=exact.cause)
             return Judged(stopped, right=False)
         exact = self.verifier.checked(_after(sharp.solution, exact))
-        if exact.status in MISSED and states_of_laws(problem) and not direct.clock.over:
+        if exact.status in MISSED and law_states(problem) and not direct.clock.over:
             exact = self.by_original_law(exact)
             if exact.verified:
                 return Judged(exact, True)
@@ -210,160 +204,153 @@ class ModeSearch:
             if own.verified:
                 return Judged(_after(exact, replace(own, modes=exact.modes)), True)
             exact = _after(own, exact)
-        one = self.verifier.judged(exact)
-        return self._closer(one, margin, found, sharp.solution) if one.right else one
+        first = self.verifier.judged(exact)
+        return self._closer(first, margin, motions, sharp.solution) if first.right else first
 
     def _closer(
-        self, one: Judged, margin: float, others: Iterator[tuple[Solution, float]], sharp: Solution
+        self,
+        first: Judged,
+        margin: float,
+        motions: Iterator[tuple[Solution, float]],
+        sharp: Solution,
     ) -> Judged:
-        """The motion whose rests come closest to their levels of those that are right."""
-        kept, slope, best, last = margin, nan, one, one.solution
-        for exact, less in others:
+        """Return the right motion whose rests come closest to their levels."""
+        kept, slope, best, last = margin, nan, first, first.solution
+        for exact, less in motions:
             last = _after(sharp, exact)
             if exact.status is Status.INTERRUPTED:
                 return Judged(last, right=False)
             if exact.ok:
-                slope = max(0.0, one.solution.cost - exact.cost) / (margin - less)
-            if exact.status in STOPPED or less < self.margin:
+                slope = max(0.0, first.solution.cost - exact.cost) / (margin - less)
+            if exact.status.stopped or less < self.margin:
                 break
-            nearer = self.verifier.judged(self.verifier.checked(last)) if exact.ok else one
+            nearer = self.verifier.judged(self.verifier.checked(last)) if exact.ok else first
             if exact.ok and nearer.right:
                 best, kept = nearer, less
                 break
-        if last is one.solution:
-            return one
+        if last is first.solution:
+            return first
         found = replace(best.solution, statistics=last.statistics)
         costs = f"about {slope * kept:.2g} of {found.cost:.6g}" if isfinite(slope) else "is open"
         few = "" if kept <= self.margin else "; with less none was found that is right"
-        said = f"Rests keep {kept:.2g} of their static levels, which costs {costs}{few}."
-        return Judged(_with_sentence(found, said), right=True)
+        text = f"Rests keep {kept:.2g} of their static levels, which costs {costs}{few}."
+        return Judged(with_sentence(found, text), right=True)
 
     def by_original_law(self, exact: Solution) -> Solution:
-        """A motion that misses with a law with states, found with that law itself by shooting.
+        """Return a motion with the law and its states, by shooting from one that misses with it.
 
-        `exact`, with the reason, where that does not succeed.
+        If that fails, return `exact` with the reason.
         """
-        direct, tolerance = self.direct, self.verifier.tolerance
-        scheme = direct.scheme
+        direct, scheme = self.direct, self.direct.scheme
         scheme = scheme if isinstance(scheme, Shooting) else Shooting("exponential", STEPS)
-        solver = direct.solver if isinstance(direct.solver, Ipopt) else Ipopt()
-        common = direct.problem, scheme, solver, tolerance, direct.clock, direct.progress
+        settings = direct.ipopt, self.verifier.tolerance, direct.clock, direct.progress
         try:
-            own = OriginalLaw(*common).solved(exact)
+            own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
         except FAILURES as error:  # mechanisms, algebraic variables
-            return _with_sentence(exact, f"With the law itself: {_reason(error)}.")
+            return with_sentence(exact, f"With the law itself: {_reason(error)}.")
         own = _after(exact, own)
-        if not own.verified:
-            said = f"{exact.message} By {scheme} with the law itself: {own.message}"
-            kept = replace(exact, message=said, statistics=own.statistics)
-            stopped = own.status in STOPPED
-            return replace(kept, status=own.status, cause=own.cause) if stopped else kept
-        return replace(own, modes=exact.modes)
+        if own.verified:
+            return replace(own, modes=exact.modes)
+        kept = with_sentence(exact, f"By {scheme} with the law itself: {own.message}")
+        kept = replace(kept, statistics=own.statistics)
+        stopped = own.status.stopped
+        return replace(kept, status=own.status, cause=own.cause) if stopped else kept
 
 
 def solved(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
-    """The solution by the strategy that the problem of `search.direct` needs."""
-    problem, scheme = search.direct.problem, search.direct.scheme
-    holding, shooting = has_jumps(problem), isinstance(scheme, Shooting)
-    known = isinstance(guess, Solution | Stored)
-    static = friction == "auto" and not known and bool(states_of_laws(problem))
+    """Return the solution by the strategy that the problem of `search.direct` requires."""
+    direct, check = search.direct, search.verifier.checked
+    problem, shooting = direct.problem, isinstance(direct.scheme, Shooting)
+    holding = any(sticking(phase.model) for phase in problem.chain)
+    static = friction == "auto" and not isinstance(guess, Solution) and bool(law_states(problem))
     if shooting and static and not (_refused(problem) or _events(problem)):
         return _by_shooting(search, guess, starts)
     if friction in ("sharpen", "modes") and (shooting or not holding):
         what = "collocation, such as Radau(3)" if shooting else "a contact that holds at rest"
         raise ValueError(f"solve: friction '{friction}': expected {what}, got none")
-    if friction == "smooth" or shooting or not holding:
-        if events := _events(problem):
-            raise ValueError(
-                f"solve: expected models without events, got {checks.listed(events)}; with "
-                "collocation friction='modes' or 'sharpen' replaces laws that have them"
-            )
-        return search.verifier.checked(search.direct.solved(guess))
-    return _by_homotopy(search, friction, guess, starts)
+    if friction != "smooth" and holding and not shooting:
+        return _by_homotopy(search, friction, guess, starts)
+    if events := _events(problem):
+        raise ValueError(
+            f"solve: expected models without events, got {checks.listed(events)}; with "
+            "collocation friction='modes' or 'sharpen' replaces laws that have them"
+        )
+    return check(direct.solved(guess))
 
 
 def _by_shooting(search: ModeSearch, guess: Start, starts: int) -> Solution:
-    """Laws with states by the user's shooting, from the motion with their static side."""
+    """Return the motion of laws with states by shooting, from the motion with static friction."""
     collocation = replace(search.direct, scheme=Radau())
     unverified = replace(search.verifier, active=False)
     static = _by_homotopy(
         replace(search, direct=collocation, verifier=unverified), "modes", guess, starts
     )
-    if static.status in STOPPED or not static.ok:
+    if static.status.stopped or not static.ok:
         return static
     own = search.by_original_law(static)
     return own if own.verification is not None else search.verifier.checked(own)
 
 
 def _by_homotopy(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
-    """Layers from wide to narrow, and modes where these are found; directly where layers fail."""
-    problem = search.direct.problem
+    """Return the first right motion on the path of decreasing widths.
+
+    Else the best one, with a message about what failed.
+    """
+    problem, check = search.direct.problem, search.verifier.checked
     reason = _refused(problem) if friction != "sharpen" else "not requested"
     if reason and friction == "modes":
         raise ValueError(f"solve: friction 'modes': {reason}")
     path = search.direct.sharpened(guess, starts, 0.0 if reason else LAST)
     try:
-        reached = next(path)
+        sharp = next(path)
     except FAILURES as error:
         if _events(problem):
             raise
-        smooth = search.verifier.checked(search.direct.solved(guess))
-        return _with_sentence(smooth, f"Friction was not sharpened: {_reason(error)}.")
-    return _along(search, friction, path, reached, reason)
-
-
-def _along(
-    search: ModeSearch, friction: Friction, path: Iterator[Sharp], reached: Sharp, reason: str
-) -> Solution:
-    """The first right motion on `path` from `reached`; else the best one, and what was not done.
-
-    With a `reason` modes are not sought.
-    """
-    problem, check = search.direct.problem, search.verifier.checked
-    tried, said = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
-    while reached.solution.ok:
-        if friction != "modes" and reached.level <= own_level(problem, reached.scales) * 1.001:
-            smooth = search.direct.solved(reached.solution, reached.solution.meshes)
-            return check(_after(reached.solution, smooth))
-        early = reached.level <= EARLY and not reached.steady
-        if not reason and (early or reached.level <= LAST * 1.001):
+        smooth = check(search.direct.solved(guess))
+        return with_sentence(smooth, f"Friction was not sharpened: {_reason(error)}.")
+    tried, text = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
+    while sharp.solution.ok:
+        if friction != "modes" and sharp.level <= own_level(problem, sharp.scales) * 1.001:
+            smooth = search.direct.solved(sharp.solution, sharp.solution.meshes)
+            return check(_after(sharp.solution, smooth))
+        early = sharp.level <= EARLY and not sharp.steady
+        if not reason and (early or sharp.level <= LAST * 1.001):
             try:
-                tried.append(search.near(reached))
-                if tried[-1].right or tried[-1].solution.status in STOPPED:
+                tried.append(search.near(sharp))
+                if tried[-1].right or tried[-1].solution.status.stopped:
                     return tried[-1].solution
             except FAILURES as error:
-                said = f"Modes were not found: {_reason(error)}."
+                text = f"Modes were not found: {_reason(error)}."
         try:
-            following = next(path, None)
+            sharp, before = next(path, sharp), sharp
         except FAILURES as error:
-            said, following = f"{said} Friction was not sharpened further: {_reason(error)}.", None
-        if following is None:
+            text, before = f"{text} Friction was not sharpened further: {_reason(error)}.", sharp
+        if sharp is before:
             break
-        reached = following
     if any(one.solution.ok or one.solution.status in FOUND for one in tried):
-        return max(tried, key=lambda one: one.worth).solution
+        best = max(tried, key=lambda one: (one.right, one.solution.ok, -one.solution.cost))
+        return best.solution
     if tried:
         last = tried[-1].solution.message.removeprefix(f"ocp '{problem.name}': ")
-        said = f"{said} Modes were not found: {last}".lstrip()
-    said = "" if friction == "sharpen" else said
-    found = reached.solution
-    if found.status in STOPPED or not found.ok:
-        return _with_sentence(found, said)
-    widths = speeds_at(problem, reached.scales, reached.level)
-    told = ", ".join(f"{name} over {width:.2g}" for name, width in widths.items())
-    said = f"Friction is still smooth: {told} (m/s or rad/s). {said}"
-    return _with_sentence(check(found), said)
+        text = f"{text} Modes were not found: {last}".lstrip()
+    text = "" if friction == "sharpen" else text
+    if not sharp.solution.ok:
+        return with_sentence(sharp.solution, text)
+    widths = speeds_at(problem, sharp.scales, sharp.level)
+    layers = ", ".join(f"{name} over {width:.2g}" for name, width in widths.items())
+    text = f"Friction is still smooth: {layers} (m/s or rad/s). {text}"
+    return with_sentence(check(sharp.solution), text)
 
 
-def states_of_laws(problem: Problem) -> set[str]:
-    """States of laws, which a motion by modes does not know."""
+def law_states(problem: Problem) -> set[str]:
+    """Return the states of laws, which a motion by modes does not have."""
     contacts = [c for phase in problem.chain for c in phase.model.contacts]
     return {v.name for c in contacts for v in c.states}
 
 
-def _without_states_of_laws(solution: Solution, found: Verification) -> Verification:
-    """The verification of a motion by modes without states of laws and intervals that need them."""
-    hidden = states_of_laws(solution.problem)
+def _without_law_states(solution: Solution, found: Verification) -> Verification:
+    """Return a verification of a motion by modes without law states and local errors."""
+    hidden = law_states(solution.problem)
     if not hidden:
         return found
     kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
@@ -371,7 +358,7 @@ def _without_states_of_laws(solution: Solution, found: Verification) -> Verifica
 
 
 def _events(problem: Problem) -> list[str]:
-    """Names of events of the models, which no direct solve of the problem follows."""
+    """Return the names of events of the models, which direct solves ignore."""
     return [*dict.fromkeys(e.name for span in problem.spans for e in span.model.events)]
 
 
@@ -383,18 +370,14 @@ def _refused(problem: Problem) -> str:
         return _reason(error)
 
 
-def _with_sentence(solution: Solution, sentence: str) -> Solution:
-    """`solution` with a sentence more."""
-    return replace(solution, message=f"{solution.message} {sentence}".rstrip())
-
-
 def _reason(error: Exception) -> str:
-    """The failure as a clause: one that is not written for users begins with its kind."""
+    """Return the failure as a clause; the type is added if it is not written for users."""
     first = (str(error).strip().splitlines() or [""])[0].rstrip(".")
-    told = isinstance(error, ValueError | SolveError)
-    return first if told else f"internal error, {type(error).__name__}: {first}"
+    if isinstance(error, ValueError | SolveError):
+        return first
+    return f"internal error, {type(error).__name__}: {first}"
 
 
 def _after(first: Solution, later: Solution) -> Solution:
-    """`later` with what both have cost."""
+    """Return `later` with the effort of both."""
     return replace(later, statistics=first.statistics.then(later.statistics))

@@ -58,6 +58,22 @@ def values(name: str, *more: Any) -> list[Any]:
     return [*outside, *({name: x} for x in number()), *more]
 
 
+def each(name: str, *wrong: Any) -> list[Any]:
+    """A mapping with one name for each of these values."""
+    return [{name: x} for x in wrong]
+
+
+def vectors(*more: Any) -> list[Any]:
+    """What is no row of three finite numbers."""
+    wrong = (NAN, INF, None, "a", 1j)
+    return [None, 3, "abc", (1.0,), Thing(), *((1.0, x, 1.0) for x in wrong), *more]
+
+
+def expression(*more: Any) -> list[Any]:
+    """What is no expression of a model."""
+    return [None, "x", Thing(), 1j, ca.SX.sym("a"), ca.MX.sym("a"), *more]
+
+
 def names(known: str) -> list[Any]:
     return [3, known, ["nonsense"], [3], [None], Thing(), [known, known], True, [[known]]]
 
@@ -95,6 +111,13 @@ class Door:
             for value in tried:
                 arguments = dict(self.good) | {argument: value}
                 yield f"{self.name}({argument}={_text(value)})", _call(self.call, arguments)
+
+
+def door(
+    name: str, call: Callable[..., Any], good: Mapping[str, Any] | None = None, /, **bad: list[Any]
+) -> Door:
+    """Return a door with its bad values by argument."""
+    return Door(name, call, good or {}, bad)
 
 
 def _call(function: Callable[..., Any], arguments: dict[str, Any]) -> Callable[[], Any]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import exp, sin
 
 import casadi as ca
@@ -28,11 +29,13 @@ class ClosedForm:
     exact: Callable[[float], Sequence[float]]
 
 
+@cache
 def assemble(model: Model) -> System:
     """The model without driven inputs, as an integration step sees it."""
     return system(model, input_data(model, None, 0.0, T))
 
 
+@cache
 def smooth_ode() -> ClosedForm:
     """Problem of Kaps, mu = 1: x = exp(-2t), y = exp(-t)."""
     x, y = Variable("x", "1", start=1.0), Variable("y", "1", start=1.0)
@@ -41,6 +44,7 @@ def smooth_ode() -> ClosedForm:
     return ClosedForm(Model("kaps", x=(x, y), ode=rates), lambda t: (exp(-2 * t), exp(-t)))
 
 
+@cache
 def smooth_dae() -> ClosedForm:
     """Index 1, nonlinear: x = exp(-2t), y = z = exp(-t)."""
     x, y = Variable("x", "1", start=1.0), Variable("y", "1", start=1.0)
@@ -51,6 +55,7 @@ def smooth_dae() -> ClosedForm:
     return ClosedForm(model, lambda t: (exp(-2 * t), exp(-t), exp(-t)))
 
 
+@cache
 def timed_ode() -> ClosedForm:
     """Explicit time: x' = -(1 + t) x^2, x = 1 / (1 + t + t^2/2); time is an unknown, too."""
     x, t = Variable("x", "1", start=1.0), ca.SX.sym("t")
@@ -58,6 +63,7 @@ def timed_ode() -> ClosedForm:
     return ClosedForm(model, lambda s: (1 / (1 + s + s * s / 2), s))
 
 
+@cache
 def prothero_robinson(rate: float) -> ClosedForm:
     """x' = -rate (x - sin(t + 1/2)) + cos(t + 1/2), x = sin(t + 1/2): stiff, with smooth x."""
     x, t = Variable("x", "1", start=sin(0.5)), ca.SX.sym("t")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
-from identification.residuals.evaluation import Channel, Evaluation
+from identification.residuals.evaluation import Channel, Evaluation, Residuals
 from identification.result.build import fitted
 from identification.result.fitted import Fitted
 from identification.result.live import Live
@@ -113,6 +113,26 @@ def make(
     if isinstance(point, str):
         raise ValueError(point)
     verdict = judge(problem, point)
-    live = Live.of(kind, what, data, problem, point, covariance(problem, point))
+    live = Live(kind, what, data, problem, point, covariance(problem, point))
     status = verdict.status(best.status)
     return fitted(live, tried, verdict, findings, status=status, seconds=0.1, call=call)
+
+
+def evaluated(rows: Residuals, values: NDArray[np.float64]) -> Evaluation:
+    """Residuals and derivatives, which exist there."""
+    found = rows.at(values)
+    assert not isinstance(found, str), found
+    return found
+
+
+def check_slopes(
+    rows: Residuals, values: NDArray[np.float64], least: float = 1e-4, rtol: float = 1e-5
+) -> None:
+    """Derivatives against central differences, value by value."""
+    J = evaluated(rows, values).J
+    for k, x in enumerate(values):
+        d = 1e-5 * max(abs(float(x)), least) * np.eye(values.size)[k]
+        change = evaluated(rows, values + d).r - evaluated(rows, values - d).r
+        slope = change / (2 * d[k])
+        size = max(float(np.abs(slope).max()), 1e-3)
+        np.testing.assert_allclose(J[:, k], slope, atol=rtol * size, err_msg=rows.names[k])

@@ -100,7 +100,7 @@ class OneProgram:
             data += np.array([k, len(inputs), len(parameters)], "l").tobytes() + numbers
             shapes.append((len(inputs), len(self.several[k].signals)))
         done = finished([str(self.executable)], data)
-        assert done.status == 0, done.said[-2000:]
+        assert done.status == 0, done.messages[-2000:]
         numbers = np.frombuffer(done.output, kind).astype(float)
         for steps, columns in shapes:
             found.append(numbers[: steps * columns].reshape(steps, columns))

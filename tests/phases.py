@@ -1,12 +1,22 @@
 """Small problems in phases, for tests of what comes behind their text."""
 
+from dataclasses import replace
 from typing import Any
 
 from motions import double_integrator, stage
 
+from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
+from ocp.solving.one_solve import Solver
+from ocp.solving.solution import Solution
+from ocp.solving.starts import Start
+from ocp.transcription.program import Report
+from ocp.transcription.schemes import Scheme, make_meshes
+from symfric import BrownMcPhee, Model
+from symfric.multibody import JointSpringDamper
+from symfric.scenes import SliderCrank
 
 UNIT = double_integrator()
 
@@ -30,3 +40,27 @@ def fastest_move(v_t: float = 1e-3) -> Problem:
     """1 m from rest to rest with |force| <= 20 N in the shortest time, against friction."""
     phase = Phase(stage(v_t), Free(0.1, 10.0, guess=1.0), end={"x": 1.0, "v": 0.0})
     return Problem(phase, TIME, bounds={"force": (-20.0, 20.0)})
+
+
+def solve_once(
+    problem: Problem,
+    intervals: Any = 50,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    guess: Start = None,
+    progress: Report | None = None,
+) -> Solution:
+    """Solve on one mesh."""
+    goals, meshes = replace(Goals.of(1e-3), passes=1), make_meshes(problem, intervals)
+    return refined_solve(problem, meshes, scheme, solver, guess, progress, goals=goals)
+
+
+SLIDER_CRANK = SliderCrank(BrownMcPhee(mu_s=0.2, mu_d=0.15, v_t=0.02), omega=0.0)
+
+
+def slider_crank(scene: SliderCrank = SLIDER_CRANK) -> Model:
+    """A slider-crank with a motor, at rest at the start."""
+    m = scene.mechanism()
+    torque = m.input("torque", "N m", nominal=10.0)
+    m.force(JointSpringDamper("motor", "crank", "turn", actuator=torque))
+    return m.build()

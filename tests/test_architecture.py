@@ -1,14 +1,16 @@
 """Structure of the source: import directions, sizes, and what may stand where."""
 
 import ast
+import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from floors import FLOORS, ON_TOP
-
 ROOT = Path(__file__).parents[1]
+ALLOWED = tomllib.loads((ROOT / "tests" / "floors.toml").read_text(encoding="utf-8"))
+FLOORS = {folder: set(known) for folder, known in ALLOWED["floors"].items()}
+ON_TOP = tuple(ALLOWED["on_top"])
 PACKAGES = ("symfric", "ocp", "identification")
 SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
@@ -26,9 +28,11 @@ def within(module: str, unit: str) -> bool:
     return module == unit or module.startswith(f"{unit}.")
 
 
-def imported(tree: ast.AST) -> Iterator[str]:
+@cache
+def imported(path: Path) -> frozenset[str]:
     """Modules of this project that a file names, `from symfric import x` resolved to the module."""
-    for node in ast.walk(tree):
+    found = set[str]()
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -38,7 +42,8 @@ def imported(tree: ast.AST) -> Iterator[str]:
             ]
         else:
             continue
-        yield from (name for name in names if name.split(".")[0] in PACKAGES)
+        found.update(name for name in names if name.split(".")[0] in PACKAGES)
+    return frozenset(found)
 
 
 @cache
@@ -52,6 +57,7 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
+@cache
 def folder_of(module: str) -> str:
     return max((f for f in FRONTS if within(module, f)), key=len)
 
@@ -98,8 +104,8 @@ def test_imports_point_down(path: Path) -> None:
     if module == "symfric" or on_top(module):
         return
     folder = folder_of(module)
-    assert folder in FLOORS, f"{module}: say in FLOORS what it may know"
-    wrong = sorted({name for name in imported(parsed(path)) if not allowed(name, folder)})
+    assert folder in FLOORS, f"{module}: list in tests/floors.toml what it may import"
+    wrong = sorted({name for name in imported(path) if not allowed(name, folder)})
     assert not wrong, f"{module} must not import {', '.join(wrong)}"
 
 
@@ -107,7 +113,7 @@ def test_imports_point_down(path: Path) -> None:
 def test_nobody_enters_through_the_front_of_his_own_house(path: Path) -> None:
     module = dotted(path)
     if path.stem != "__init__" and not on_top(module):
-        assert not {n for n in imported(parsed(path)) if n in FRONTS and within(module, n)}
+        assert not {n for n in imported(path) if n in FRONTS and within(module, n)}
 
 
 def test_no_circle_between_folders() -> None:
@@ -116,7 +122,7 @@ def test_no_circle_between_folders() -> None:
     for path in SOURCES:
         if path.stem != "__init__" and not on_top(dotted(path)):
             here = folder_of(dotted(path))
-            there = {folder_of(name) for name in imported(parsed(path))}
+            there = {folder_of(name) for name in imported(path)}
             arrows.setdefault(here, set()).update(there - {here})
     while leaves := {f for f, to in arrows.items() if not to & arrows.keys()}:
         arrows = {f: to for f, to in arrows.items() if f not in leaves}
@@ -127,7 +133,7 @@ def test_no_circle_between_files() -> None:
     """Imports inside functions and for type checkers count; `__init__.py` files do not."""
     files = {dotted(path): path for path in SOURCES if path.stem != "__init__"}
     arrows = {
-        name: {other for other in imported(parsed(path)) if other in files and other != name}
+        name: {other for other in imported(path) if other in files and other != name}
         for name, path in files.items()
     }
     TopologicalSorter(arrows).prepare()  # CycleError names a circle

@@ -41,7 +41,8 @@ print(files(lambda: simulate(scene, 20.0)), files(lambda: simulate(scene, 20.0))
 FIT = """
 from identification import Fit, InverseDynamics, synthetic_drive_data
 
-print(files(Fit(InverseDynamics(), "stribeck", synthetic_drive_data(seed=1)).solve))
+data = synthetic_drive_data(seed=1, rate=250.0)
+print(files(Fit(InverseDynamics(), "stribeck", data, starts=1).solve))
 """
 SOLVE = """
 from ocp import Phase, Problem, integral, solve
@@ -63,7 +64,7 @@ print(files(lambda: generate(LuGre(), "c")))
 
 @pytest.mark.parametrize(
     ("call", "most"),
-    [(SIMULATE, (35, 20)), (FIT, (59,)), (SOLVE, (99,)), (GENERATE, (34,))],
+    [(SIMULATE, (33, 20)), (FIT, (54,)), (SOLVE, (99,)), (GENERATE, (34,))],
     ids=["simulate, first and second", "Fit.solve", "ocp.solve", "generate"],
 )
 def test_a_call_runs_code_in_few_files(call: str, most: tuple[int, ...], tmp_path: Path) -> None:

@@ -1,20 +1,20 @@
-"""Complete check of a data set, and the checks of times, points, units, velocity and motion."""
+"""Check of a data set; checks of times, points and units, and of the force against the motion."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from identification.data.check_drive import of_direction, of_excitation, of_residue
 from identification.data.check_signals import (
     of_clipping,
     of_frozen,
     of_jumps,
+    of_motion,
     of_resolution,
     of_spikes,
+    of_velocity,
 )
-from identification.data.findings import Array, Finding, Findings, View, count_of
+from identification.data.findings import Finding, Findings, Rough, View, rough_model
 from identification.data.record import GAP, JITTER, Record
-from identification.data.rough import Rough, rough_model, smoothed, white_part
 
 FEWEST, FEW = 20, 50
 """Numbers of samples below which a record is an error, and a warning."""
@@ -26,8 +26,8 @@ def of_times(view: View) -> Iterator[Finding]:
     """Find gaps, irregular intervals, too few samples, times that may be in another unit."""
     record, t = view.record, view.record.time
     if record.size < FEW:
-        text = f"The record has only {record.size} samples."
-        yield view.finding("error" if record.size < FEWEST else "warning", "short", "t", text)
+        severity = "error" if record.size < FEWEST else "warning"
+        yield view.finding(severity, "short", "t", size=record.size)
     if record.size < 3:
         return
     intervals = np.diff(t)
@@ -35,27 +35,15 @@ def of_times(view: View) -> Iterator[Finding]:
     gaps = np.flatnonzero(intervals > GAP * usual)
     if gaps.size:
         k = int(gaps[np.argmax(intervals[gaps])])
-        text = (
-            f"The times have {gaps.size} gap(s), the longest of {intervals[k]:.3g} s at "
-            f"{view.at(k)}: data.resampled() makes one record of each piece."
-        )
-        yield view.warning("gap", "t", text, k, k + 1)
+        yield view.warning("gap", "t", "gap", k, k + 1, count=gaps.size, longest=intervals[k])
     off = np.abs(intervals - usual)
     off[gaps] = 0.0
     k = int(np.argmax(off))
-    if off[k] > 2 * JITTER * usual:
-        uneven = float(np.mean(off > 2 * JITTER * usual))
-        text = (
-            f"The sample intervals are not equal: {uneven:.1%} are off {usual:.4g} s by more than "
-            f"{2 * JITTER:.0%}, most {intervals[k]:.4g} s at {view.at(k)}: use data.resampled()."
-        )
-        yield view.warning("irregular", "t", text, k, k + 1)
+    if off[k] > (limit := 2 * JITTER) * usual:
+        values = {"share": np.mean(off > limit * usual), "usual": usual, "worst": intervals[k]}
+        yield view.warning("irregular", "t", "irregular", k, k + 1, limit=limit, **values)
     if usual >= SLOW and record.size >= 200 and np.all(np.abs(t - np.rint(t)) < 1e-9):
-        text = (
-            f"The samples are {usual:g} s apart over {np.ptp(t) / 3600:.2g} hours, at whole "
-            "seconds: are the times in ms, or row numbers?"
-        )
-        yield view.warning("units", "t", text)
+        yield view.warning("units", "t", "times", step=usual, hours=np.ptp(t) / 3600)
 
 
 FEWEST_POINTS = 4
@@ -70,23 +58,18 @@ def of_points(view: View) -> Iterator[Finding]:
         return
     v, force = record["v"], record["F"]
     if record.size < FEWEST_POINTS:
-        yield view.warning("short", "v", f"The data have only {record.size} points.")
+        yield view.warning("short", "v", "few_points", size=record.size)
     for name in ("v", "F"):
         if np.ptp(record[name]) == 0:
-            yield view.error("constant", name, f"{name} is {record[name][0]:g} throughout.")
+            yield view.error("constant", name, "same_points", value=record[name][0])
             return
     moving = np.abs(v) > 0.01 * np.abs(v).max()
     both = min(np.mean(v > 0), np.mean(v < 0)) > 0.1
     around = float(np.median(force)) if both else 0.0
     if np.mean(v[moving] * (force[moving] - around) > 0) < WRONG:
-        text = (
-            "F is opposite to v in most points: friction counts as the force that the drive needs, "
-            "so F v > 0; reverse one sign."
-        )
-        yield view.error("sign", "F", text)
+        yield view.error("sign", "F", "points_against")
     if not both:
-        text = "All points have one direction: friction and a constant force are not separable."
-        yield view.warning("one-way", "v", text)
+        yield view.warning("one-way", "v", "points_one_way")
 
 
 LIMITS = {
@@ -106,120 +89,187 @@ TOGETHER = (("m", "N"), ("rad", "N m"))
 def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
     """Find units that do not belong together, and implausible ranges."""
     record = view.record
-    x, force = view.name("x"), view.name("force")
     mixed = tuple(view.unit(r) for r in ("x", "force") if r in view.roles)
     if len(mixed) == 2 and "" not in mixed and mixed not in TOGETHER:
-        text = f"{x} is in {mixed[0]} and {force} in {mixed[1]}: a slide "
-        yield view.error("units", force, f"{text}needs m and N, a shaft rad and N m.")
+        of_x, of_force = mixed
+        yield view.error("units", view.name("force"), "apart", of_x=of_x, of_force=of_force)
     for signal in view.roles.values():
         low, doubt, high = LIMITS.get(record.units[signal], (0.0, np.inf, np.inf))
         range_ = float(np.ptp(record.signals[signal]))
         if 0 < range_ < low or range_ > doubt:
-            text = f"{signal} has a range of {range_:.3g} {record.units[signal]}: check its unit."
             severity = "error" if range_ < low or range_ > high else "warning"
-            yield view.finding(severity, "units", signal, text)
+            yield view.finding(severity, "units", signal, "range", range=range_)
     if model is not None and model.clean:
         fastest = float(np.quantile(np.abs(model.v), 0.99))
         doubt, high = FASTEST.get(view.unit("x"), (np.inf, np.inf))
         if fastest > doubt:
-            text = f"{x} moves at {fastest:.3g} {view.unit('x')}/s: check its unit and that of "
             severity = "error" if fastest > high else "warning"
-            yield view.finding(severity, "units", x, f"{text}the times.")
+            yield view.finding(severity, "units", view.name("x"), "speed", fastest=fastest)
 
 
-WIDTH = 12.0
-"""Standard deviation of the smoothing window of both signals, in samples."""
-ALIKE = 0.7
-"""Least correlation of both."""
-OFF = 0.2
-"""Relative error of the scale above which it is reported."""
-KNOWN = {
-    57.2958: "deg/s taken as rad/s",
-    0.0174533: "rad/s taken as deg/s",
-    9.5493: "rpm taken as rad/s",
-    0.10472: "rad/s taken as rpm",
-    6.28319: "rad/s taken as rev/s",
-    0.159155: "rev/s taken as rad/s",
-    1000.0: "mm/s taken as m/s",
-    0.001: "m/s taken as mm/s",
-    1e6: "um/s taken as m/s",
-    100.0: "cm/s taken as m/s",
-    60.0: "per minute taken as per second",
-}
+SURE = 5.0
+"""Significance level, in standard errors."""
+LITTLE, MUCH = 0.5, 0.8
+"""Shares of the force that the rough model explains: for exchanged and for correct columns."""
+NOTHING = 0.05
+"""Share of the force below which it is unrelated to the motion."""
+ONE_WAY = 0.005
+"""Share of the path in the other direction below which the drive moves in one direction only."""
 
 
-def of_velocity(view: View) -> Iterator[Finding]:
-    """Find a velocity that differs from the slope of the position, or an acceleration likewise."""
-    record = view.steady
-    if record is None or record.size < 100:
+def of_direction(view: View, model: Rough) -> Iterator[Finding]:
+    """Find friction that supplies power, exchanged columns, motion in one direction only."""
+    swapped, given = rough_model(view, exchanged=True), model.explained
+    exchanged = 0.0 if swapped is None else swapped.explained
+    if given < LITTLE and exchanged > max(MUCH, given + 0.4):
+        yield view.error("swapped", view.name("force"), exchanged=exchanged, given=given)
+    elif not model.one_way():
+        yield from _against(view, model, view.name("force"))
+    if model.clean and model.one_way(ONE_WAY):
+        way = "forwards" if model.v.sum() > 0 else "backwards"
+        yield view.warning("one-way", view.name("x"), way=way)
+
+
+def _against(view: View, model: Rough, force: str) -> Iterator[Finding]:
+    """Find a force that brakes the motion that it drives, or is unrelated to it."""
+    _, level, viscous, *_ = model.values
+    put_in = level * np.sum(np.abs(model.v[model.moving])) + viscous * np.sum(model.v**2)
+    sure = max(-model.sure(1) if level < 0 else 0.0, -model.sure(2) if viscous < 0 else 0.0)
+    if put_in < 0 and sure > SURE and model.explained > LITTLE:
+        against = " and accelerates against it" if model.sure(0) < -SURE else ""
+        yield view.error("sign", force, "brakes", against=against)
+    elif model.clean and model.explained < NOTHING and model.force.size / model.every > 100:
+        signal = view.signal("force")
+        white = signal is not None and abs(np.corrcoef(signal[1:], signal[:-1])[0, 1]) < 0.2
+        severity = "error" if white else "warning"
+        yield view.finding(severity, "unrelated", force, share=max(model.explained, 0.0))
+    if model.sure(0) < -SURE and put_in > 0 and model.explained > LITTLE:
+        mass, error = model.values[0], model.errors[0]
+        yield view.warning("sign", force, "negative_mass", mass=mass, error=error)
+
+
+UNSURE = 3.0
+"""Rough mass over its standard error below which the accelerations are too small."""
+SPREAD = 1.7
+"""Ratio of the 90 % and 10 % quantiles of the speed below which there is only one speed."""
+MOST = 0.97
+"""Share of the time at rest above which there is too little motion."""
+
+
+def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
+    """Find too small accelerations, a single speed, too little motion."""
+    name = view.name("x")
+    if not model.clean:
+        yield view.warning("excitation", name, "no_acceleration")
         return
-    edge = int(3 * WIDTH)
-    for pair in (("x", "v"), ("v", "a")):
-        if not {*pair} <= view.roles.keys():
-            continue
-        other, name = (view.roles[r] for r in pair)
-        if np.ptp(record[name]) == 0 or np.ptp(record[other]) == 0:
-            continue
-        derived = (smoothed(record[other], WIDTH, 1) / record.step)[edge:-edge]
-        given = smoothed(record[name], WIDTH)[edge:-edge]
-        if derived.std() == 0 or given.std() == 0:
-            continue
-        alike = float(np.corrcoef(derived, given)[0, 1])
-        scale = float(given.std() / derived.std())
-        slope = f"the slope of {other}"
-        if alike < -ALIKE:
-            text = f"{name} is opposite to {slope} (correlation {alike:.2f}): the sign "
-            yield view.error("sign", name, f"{text}of one is wrong.")
-        elif alike < ALIKE:
-            text = f"{name} is not {slope} (correlation {alike:.2f})."
-            yield view.warning("velocity", name, text)
-        elif abs(scale - 1) > OFF:
-            near = [text for known, text in KNOWN.items() if abs(scale / known - 1) < 0.1]
-            why = near[0] if near else "a wrong unit or scale"
-            severity = "warning" if not near and 0.2 <= scale <= 5 else "error"
-            text = f"{name} is {scale:.4g} times {slope}: {why}."
-            yield view.finding(severity, "units", name, text)
+    if abs(model.sure(0)) < UNSURE:
+        values = {"mass": model.values[0], "error": model.errors[0]}
+        of_mass = "kg m^2" if view.unit("x") == "rad" else "kg"
+        yield view.warning("excitation", name, "no_mass", of_mass=of_mass, **values)
+    if (share := model.moving.mean()) < 1 - MOST:
+        yield view.warning("excitation", name, "rest", share=share)
+    speed = np.abs(model.v[model.moving])
+    low, high = np.quantile(speed, (0.1, 0.9)) if speed.size > 20 else (0.0, 0.0)
+    if high < SPREAD * low:
+        yield view.warning("speeds", name, low=low, high=high)
 
 
-MOVED = 6.0
-"""Range of the position over its noise (standard deviation) below which nothing moved."""
-COUNTS = 4
-"""Encoder counts below which nothing moved."""
-WHITE = 0.3
-"""Correlation of neighbours below which a position is noise."""
+LARGE = 0.12
+"""Drift over the robust spread of the force above which it is reported."""
+DRIFTS = 4.5
+LAGS = (-20, -10, -5, -3, -2, -1, 1, 2, 3, 5, 10, 20)
+"""Delays that are tried first, in samples; then those between the neighbours of the best one."""
+BETTER = 0.88
+"""Largest ratio of the unexplained parts with and without a reported delay ..."""
+WORSE = 1.05
+"""... if the opposite delay has at least this ratio."""
+LINE = 0.45
+"""Share of the residuals in one spectral line above which it is a hum."""
+LOUD = 0.02
+"""Its amplitude over the spread of the force above which it is reported."""
+PERIODS, CLEAR, ANSWER = 8, 20.0, 0.01
+"""Spectral line of the velocity: periods in the record, power over background, power share."""
+HARMONICS = (1, 2)
+"""Harmonics of an excitation that friction may leave in the force."""
+UNEQUAL, DIFFERS = 0.04, 6.0
+"""Difference of the mass between both directions, relative, and in standard errors."""
 
 
-def of_motion(view: View) -> Iterator[Finding]:
-    """Find signals without motion."""
-    x, force = view.signal("x"), view.signal("force")
-    if x is not None and x.size >= 20:
-        yield from _still(view, x)
-    if force is not None and force.size >= 20 and np.ptp(force) == 0:
-        name = view.name("force")
-        text = f"{name} is {force[0]:g} {view.unit('force')} throughout: "
-        if float(force[0]) == 0:
-            text += "motion without a drive determines only friction over mass."
-            yield view.warning("constant", name, text)
-        else:
-            yield view.error("constant", name, f"{text}nothing was measured.")
+def of_residue(view: View, model: Rough) -> Iterator[Finding]:
+    """Find drift, delay and hum of the force, and a mass that differs by direction.
 
-
-def _still(view: View, x: Array) -> Iterator[Finding]:
-    name, unit = view.name("x"), view.unit("x")
-    if np.ptp(x) == 0 or np.ptp(x) < COUNTS * count_of(x):
-        text = f"{name} never changes by more than {np.ptp(x):.3g} {unit}: nothing moved."
-        yield view.error("standstill", name, text)
+    The model of these checks has a free curve of friction and a drift.
+    """
+    free = rough_model(view, curve=True)
+    if free is None or not model.clean:
         return
-    centred, middle = x - x.mean(), float(np.ptp(np.quantile(x, (0.02, 0.98))))
-    if float(centred[1:] @ centred[:-1] / (centred @ centred)) < WHITE:
-        text = (
-            f"{name} is noise of {float(np.std(np.diff(x))) / np.sqrt(2):.3g} {unit}: neighbouring "
-            "samples are uncorrelated, which is not the motion of a body."
-        )
-        yield view.error("noise", name, text)
-    elif middle < MOVED * white_part(x):
-        text = f"{name} moves by {middle:.3g} {unit}, no more than its noise."
-        yield view.error("standstill", name, text)
+    if model.explained >= 0.5:
+        rise = float(free.values[-1])
+        drifts = abs(rise) > LARGE * model.spread and abs(free.sure(-1)) > DRIFTS
+        if drifts and not model.one_way():
+            yield view.warning("drift", view.name("force"), rise=rise)
+        if abs(model.sure(0)) >= 5:
+            yield from _dead_time(view, model, free)
+    if free.explained >= 0.5:
+        yield from _hum(view, free)
+        if not free.one_way() and abs(free.sure(0)) > DIFFERS:
+            yield from _unequal(view, free)
+
+
+def _dead_time(view: View, model: Rough, free: Rough) -> Iterator[Finding]:
+    """Find a force that explains the motion better when it is shifted in time."""
+    now = max(1 - free.explained, 1e-9)
+
+    def unexplained(lag: int) -> float:
+        return free.unexplained_when_late(lag * model.step) / now
+
+    left = {lag: unexplained(lag) for lag in LAGS}
+    best = min(left, key=lambda lag: left[lag])
+    if not (left[best] < BETTER and left[-best] > WORSE and abs(best) > 1):
+        return
+    k = LAGS.index(best)
+    best = min(range(LAGS[max(k - 1, 0)], LAGS[min(k + 1, len(LAGS) - 1)] + 1), key=unexplained)
+    when, shift = "late" if best > 0 else "early", -best * model.step
+    values = {"when": when, "time": abs(shift), "samples": abs(best), "shift": shift}
+    yield view.warning("delay", view.name("force"), **values)
+
+
+def _hum(view: View, free: Rough) -> Iterator[Finding]:
+    """Find a periodic force in addition to the drive's."""
+    limit = 5 * float(np.median(np.abs(free.residual)))
+    left, window = np.clip(free.residual, -limit, limit), np.hanning(free.residual.size)
+    power = np.abs(np.fft.rfft(left * window)) ** 2
+    k = int(np.argmax(power[2:])) + 2
+    share = float(power[max(k - 2, 0) : k + 3].sum() / (power.sum() + 1e-300))
+    size = 2 * float(np.sqrt(power[k])) / float(window.sum())
+    if share <= LINE or size <= LOUD * free.spread:
+        return
+    if not any(_answered(free, round(k / n)) for n in HARMONICS):
+        values = {"size": size, "frequency": k / left.size / free.step, "share": share}
+        yield view.warning("hum", view.name("force"), **values)
+
+
+def _answered(free: Rough, k: int) -> bool:
+    """Return True if the velocity has a spectral line at bin k: an excitation, not a hum.
+
+    Not tested below `PERIODS` periods, where a line and a move are indistinguishable; so a slow
+    excitation that only bends bristles can still be reported as a hum.
+    """
+    if k < PERIODS:
+        return False
+    power = np.abs(np.fft.rfft((free.v - free.v.mean()) * np.hanning(free.v.size))) ** 2
+    line = power[k - 2 : k + 3]
+    background = np.median(np.concatenate([power[k // 2 : k - 3], power[k + 4 : 2 * k]]))
+    return bool(line.max() > CLEAR * background and line.sum() > ANSWER * power.sum())
+
+
+def _unequal(view: View, free: Rough) -> Iterator[Finding]:
+    """Find a mass that differs by direction."""
+    value, error = free.with_column(free.a * np.sign(free.v) * free.moving)
+    ratio = value / free.values[0]
+    if abs(ratio) > UNEQUAL and abs(value) > DIFFERS * error:
+        way = "forwards" if ratio > 0 else "backwards"
+        yield view.warning("unequal", view.name("force"), more=2 * abs(ratio), way=way)
 
 
 HOPELESS = {"standstill", "noise", "constant", "short", "wrap", "swapped", "glitch", "frozen"}

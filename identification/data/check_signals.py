@@ -1,12 +1,22 @@
-"""Checks of single signals: spikes, clipping, frozen intervals, jumps, resolution."""
+"""Checks of single signals: spikes, clipping, frozen intervals, jumps, resolution, motion."""
 
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.findings import Array, Finding, Severity, View, constant_runs, count_of
-from identification.data.rough import Rough, rough_model
+from identification.data.findings import (
+    Array,
+    Finding,
+    Rough,
+    Severity,
+    View,
+    constant_runs,
+    count_of,
+    rough_model,
+    smoothed,
+    white_part,
+)
 
 FAR = 12.0
 """Distance of a spike from the running median, over that of the farthest 5 % ..."""
@@ -22,7 +32,7 @@ HEAVY = 0.5
 
 def of_spikes(view: View) -> Iterator[Finding]:
     """Find spikes of every signal; those that outweigh the signal are an error."""
-    for signal, y, unit in view.known():
+    for signal, y, _ in view.known():
         position = signal == view.name("x")
         far, off = spike_samples(y, position=position)
         if not far.size:
@@ -30,13 +40,10 @@ def of_spikes(view: View) -> Iterator[Finding]:
         k = int(far[np.argmax(off[far])])
         weight = float((off[far] ** 2).sum() / (((y - np.median(y)) ** 2).sum() + 1e-300))
         heavy = weight > HEAVY and signal in view.roles.values()
-        text = (
-            f"{signal} is far off its neighbours in {far.size} sample(s), most at {view.at(k)} by "
-            f"{off[k]:.3g} {unit}: remove them with data.without_spikes()."
-        )
         kind = "glitch" if position else "spikes"
         severity = "error" if position or heavy else "warning"
-        yield view.finding(severity, kind, signal, text, int(far[0]), int(far[-1]))
+        values = {"count": far.size, "worst": view.at(k), "off": off[k]}
+        yield view.finding(severity, kind, signal, "spikes", int(far[0]), int(far[-1]), **values)
 
 
 def spike_samples(y: Array, *, position: bool) -> tuple[NDArray[np.intp], Array]:
@@ -92,12 +99,10 @@ def of_clipping(view: View) -> Iterator[Finding]:
         k = int(np.argmax(np.where(at_ends, length, 0)))
         where = " and ".join(f"its {side} value {top:.4g} {unit}" for side, top in tops.items())
         severity, why = _limited(view, signal, [*tops.values()])
-        text = (
-            f"{signal} stays at {where} in {samples / y.size:.1%} of the samples, longest from "
-            f"{view.at(int(first[k]))} on: {why}."
-        )
-        end = int(first[k] + length[k] - 1)
-        yield view.finding(severity, "clipping", signal, text, int(first[k]), end)
+        values = {"where": where, "share": samples / y.size, "why": why}
+        begin = int(first[k])
+        end = begin + int(length[k]) - 1
+        yield view.finding(severity, "clipping", signal, "clipping", begin, end, **values)
 
 
 def _limited(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
@@ -150,14 +155,11 @@ def of_frozen(view: View) -> Iterator[Finding]:
         k = int(np.argmax(np.where(jumps if jumped else long, length, 0)))
         begin, end = int(first[k]), int(first[k] + length[k] - 1)
         then = f", then jumps by {after[k]:.3g} {unit}" if jumped else ""
+        then += ", although it never repeats elsewhere" if noisy else ""
         lost = length[k] > LOST * y.size and noisy and signal in view.roles.values()
-        elsewhere = ", although it never repeats elsewhere" if noisy else ""
-        text = (
-            f"{signal} keeps the value {y[begin]:.6g} for {length[k]} samples from "
-            f"{view.at(begin)} on{then}{elsewhere}: the sensor or the recorder was stuck."
-        )
         severity = "error" if (jumped and position) or lost else "warning"
-        yield view.finding(severity, "frozen", signal, text, begin, end)
+        values = {"value": y[begin], "length": length[k], "then": then}
+        yield view.finding(severity, "frozen", signal, "frozen", begin, end, **values)
 
 
 JUMPED = 15.0
@@ -183,8 +185,7 @@ def of_jumps(view: View) -> Iterator[Finding]:
         return
     if np.corrcoef(x[1:], x[:-1])[0, 1] < WHITE:  # noise always jumps
         return
-    name, unit = view.name("x"), view.unit("x")
-    size = np.abs(np.diff(median_of_five(x)))
+    name, size = view.name("x"), np.abs(np.diff(median_of_five(x)))
     usual = max(float(np.quantile(size, 0.995)), count_of(x))
     nearby = np.maximum(np.roll(size, 2), np.roll(size, -2))
     far = np.flatnonzero((size > JUMPED * usual) & (size > NEAR * np.maximum(nearby, usual)))
@@ -198,18 +199,13 @@ def of_jumps(view: View) -> Iterator[Finding]:
     period = _period(x, far)
     alike = float(np.quantile(heights, 0.9) - np.quantile(heights, 0.1)) <= ALIKE * heights.max()
     if alike and period > 0.8 * np.ptp(x):
-        text = (
-            f"{name} jumps {far.size} time(s) by {period:.4g} {unit}, its whole range, first at "
-            f"{view.at(begin)}: it is counted modulo a period; use "
-            f"data.unwrapped({{'{name}': {period:.5g}}})."
-        )
-        yield view.error("wrap", name, text, begin, end)
+        yield view.error("wrap", name, "wrap", begin, end, count=far.size, period=period)
         return
     pushed = _force_jumps(view, k)
     why = "a motion too fast for the sample rate" if pushed else "a sensor that lost its reference"
-    text = f"{name} jumps {far.size} time(s), most by {size[k]:.3g} {unit} at {view.at(k)}: {why}."
     severity = "warning" if pushed or far.size >= OFTEN else "error"
-    yield view.finding(severity, "jump", name, text, begin, end)
+    values = {"count": far.size, "size": size[k], "worst": view.at(k), "why": why}
+    yield view.finding(severity, "jump", name, "jump", begin, end, **values)
 
 
 def _force_jumps(view: View, k: int) -> bool:
@@ -245,21 +241,93 @@ def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
         usual = float(np.ptp(np.quantile(force, (0.01, 0.99))))
         step, spread = count_of(force), usual or float(np.ptp(force))
         if step > COARSE * spread:
-            name = view.name("force")
-            text = (
-                f"{name} has steps of {step:.3g} {view.unit('force')}, {step / spread:.0%} of "
-                "its range: finer differences of friction are not resolved."
-            )
-            yield view.warning("resolution", name, text)
+            values = {"step": step, "share": step / spread}
+            yield view.warning("resolution", view.name("force"), "coarse_force", **values)
     moved = np.abs(model.v[model.moving])
     if x is None or not model.clean or not moved.size or not (count := count_of(x)) > 0:
         return
     slow = float(np.quantile(moved, 0.25)) * model.step
     if slow < PER_SAMPLE * count:
-        name = view.name("x")
-        text = (
-            f"{name} has counts of {count:.3g} {view.unit('x')}, and a quarter of the "
-            f"motion is less than {slow / count:.2g} counts per sample: velocities there "
-            "are averages over several samples."
-        )
-        yield view.warning("resolution", name, text)
+        values = {"count": count, "slow": slow / count}
+        yield view.warning("resolution", view.name("x"), "coarse_position", **values)
+
+
+WIDTH = 12.0
+"""Standard deviation of the smoothing window of both signals, in samples."""
+RELATED = 0.7
+"""Least correlation of both."""
+OFF = 0.2
+"""Relative error of the scale above which it is reported."""
+KNOWN = {
+    57.2958: "deg/s taken as rad/s",
+    0.0174533: "rad/s taken as deg/s",
+    9.5493: "rpm taken as rad/s",
+    0.10472: "rad/s taken as rpm",
+    6.28319: "rad/s taken as rev/s",
+    0.159155: "rev/s taken as rad/s",
+    1000.0: "mm/s taken as m/s",
+    0.001: "m/s taken as mm/s",
+    1e6: "um/s taken as m/s",
+    100.0: "cm/s taken as m/s",
+    60.0: "per minute taken as per second",
+}
+
+
+def of_velocity(view: View) -> Iterator[Finding]:
+    """Find a velocity that differs from the slope of the position, or an acceleration likewise."""
+    record = view.steady
+    if record is None or record.size < 100:
+        return
+    edge = int(3 * WIDTH)
+    for pair in (("x", "v"), ("v", "a")):
+        if not {*pair} <= view.roles.keys():
+            continue
+        other, name = (view.roles[r] for r in pair)
+        if np.ptp(record[name]) == 0 or np.ptp(record[other]) == 0:
+            continue
+        derived = (smoothed(record[other], WIDTH, 1) / record.step)[edge:-edge]
+        given = smoothed(record[name], WIDTH)[edge:-edge]
+        if derived.std() == 0 or given.std() == 0:
+            continue
+        alike = float(np.corrcoef(derived, given)[0, 1])
+        scale = float(given.std() / derived.std())
+        values = {"other": other, "alike": alike, "scale": scale}
+        if alike < -RELATED:
+            yield view.error("sign", name, "opposite", **values)
+        elif alike < RELATED:
+            yield view.warning("velocity", name, **values)
+        elif abs(scale - 1) > OFF:
+            near = [text for known, text in KNOWN.items() if abs(scale / known - 1) < 0.1]
+            why = near[0] if near else "a wrong unit or scale"
+            severity = "warning" if not near and 0.2 <= scale <= 5 else "error"
+            yield view.finding(severity, "units", name, "scale", why=why, **values)
+
+
+MOVED = 6.0
+"""Range of the position over its noise (standard deviation) below which nothing moved."""
+COUNTS = 4
+"""Encoder counts below which nothing moved."""
+NOISE = 0.3
+"""Correlation of neighbours below which a position is noise."""
+
+
+def of_motion(view: View) -> Iterator[Finding]:
+    """Find signals without motion."""
+    x, force = view.signal("x"), view.signal("force")
+    if x is not None and x.size >= 20:
+        yield from _still(view, x)
+    if force is not None and force.size >= 20 and np.ptp(force) == 0:
+        severity, case = ("error", "constant") if force[0] else ("warning", "undriven")
+        yield view.finding(severity, "constant", view.name("force"), case, value=force[0])
+
+
+def _still(view: View, x: Array) -> Iterator[Finding]:
+    name = view.name("x")
+    if np.ptp(x) == 0 or np.ptp(x) < COUNTS * count_of(x):
+        yield view.error("standstill", name, range=np.ptp(x))
+        return
+    centred, middle = x - x.mean(), float(np.ptp(np.quantile(x, (0.02, 0.98))))
+    if float(centred[1:] @ centred[:-1] / (centred @ centred)) < NOISE:
+        yield view.error("noise", name, size=float(np.std(np.diff(x))) / np.sqrt(2))
+    elif middle < MOVED * white_part(x):
+        yield view.error("standstill", name, "hidden", range=middle)

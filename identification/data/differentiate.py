@@ -22,7 +22,7 @@ from identification.data.filters import (
     central_difference,
     choose_filter,
     lowpass,
-)
+)  # fmt: skip
 from identification.data.record import Record, runs
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
@@ -94,21 +94,17 @@ def derivatives(
         filter: cut-off and order.
         mixer: `Velocity.of(x, v, step)`.
     """
-    one: list[Array] = []
-    other: list[Array] = []
+    by_x: list[Array] = []
+    by_v: list[Array] = []
     if x is not None:
         x = lowpass(x, filter.cutoff, step, filter.order)
-        a = np.empty_like(x)
-        a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / step**2
-        a[0], a[-1] = a[1], a[-2]
-        one = [central_difference(x, step), a]
+        inner = (x[2:] - 2 * x[1:-1] + x[:-2]) / step**2
+        by_x = [central_difference(x, step), np.pad(inner, 1, mode="edge")]
     if v is not None:
         v = lowpass(v, filter.cutoff, step, filter.order)
-        other = [v, central_difference(v, step)]
-    if one and other:
-        one = [mixer.mixed(by_x, by_v) for by_x, by_v in zip(one, other, strict=True)]
-    velocity, acceleration = one or other
-    return np.zeros_like(velocity) if x is None else x, velocity, acceleration
+        by_v = [v, central_difference(v, step)]
+    both = [*map(mixer.mixed, by_x, by_v)] if by_x and by_v else by_x or by_v
+    return np.zeros_like(both[0]) if x is None else x, both[0], both[1]
 
 
 def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
@@ -215,8 +211,11 @@ def plateaus(
         name = v or ("v" if "v" in record else x)
         step, F = record.uniform().step, record[force]
         velocity = record[name] if v or name != x else central_difference(record[x], step)
-        begins = _stretches(velocity, step, shortest, change)
-        cut = [slice(b + ceil(settle * (e - b)), e) for b, e in begins]
+        smooth = lowpass(velocity, min(SMOOTHINGS / shortest, 0.45 / step), step)
+        steady = np.abs(central_difference(smooth, step)) * shortest < change * np.abs(smooth)
+        steady &= np.abs(smooth) > REST * np.abs(smooth).max()
+        long = [(b, e) for b, e in runs(steady) if (e - b) * step >= shortest]
+        cut = [slice(b + ceil(settle * (e - b)), e) for b, e in long]
         if len(cut) < 2:
             continue
         unit = record.unit(force) or "N"
@@ -236,15 +235,6 @@ def plateaus(
             f"a velocity constant to {change:.0%}, got none; lower shortest= or raise change="
         )
     return Dataset(tuple(found), f"plateaus of {data.name}")
-
-
-def _stretches(v: Array, step: float, shortest: float, change: float) -> list[tuple[int, int]]:
-    """Return begin and end of each plateau."""
-    cutoff = min(SMOOTHINGS / shortest, 0.45 / step)
-    smooth = lowpass(v, cutoff, step)
-    steady = np.abs(central_difference(smooth, step)) * shortest < change * np.abs(smooth)
-    steady &= np.abs(smooth) > REST * np.abs(smooth).max()
-    return [(b, e) for b, e in runs(steady) if (e - b) * step >= shortest]
 
 
 RANK = 1e-7
@@ -299,13 +289,11 @@ def linear_regression(
 
 def _regressors(signals: MotionSignals, directions: bool) -> dict[str, Array]:
     v, sign = signals.v, np.sign(signals.v)
-    columns: dict[str, Array] = {"m": signals.a}
+    columns: dict[str, Array] = {"F_v": v, "F_c": sign, "offset": np.ones_like(v)}
     if directions:
-        for side, mask in (("pos", v > 0), ("neg", v < 0)):
-            columns |= {f"F_v_{side}": v * mask, f"F_c_{side}": sign * mask}
-    else:
-        columns |= {"F_v": v, "F_c": sign, "offset": np.ones_like(v)}
-    return {name: signals.equations(column) for name, column in columns.items()}
+        sides = {"pos": v > 0, "neg": v < 0}.items()
+        columns = {f"F_{k}_{s}": y * on for s, on in sides for k, y in (("v", v), ("c", sign))}
+    return {name: signals.equations(y) for name, y in {"m": signals.a, **columns}.items()}
 
 
 def _standard_errors(X: Array, error: Array) -> list[float | None]:

@@ -47,14 +47,15 @@ class Filter:
     v_min: float | None = None
 
     def __post_init__(self) -> None:
-        cutoff = checks.number("Filter: cutoff", self.cutoff, unit="Hz", above=0.0)
-        object.__setattr__(self, "cutoff", cutoff)
-        for name in ("decimation", "order"):
-            whole = checks.count(f"Filter: {name}", getattr(self, name))
-            object.__setattr__(self, name, whole)
+        checked: dict[str, Any] = {
+            "cutoff": checks.number("Filter: cutoff", self.cutoff, unit="Hz", above=0.0),
+            "decimation": checks.count("Filter: decimation", self.decimation),
+            "order": checks.count("Filter: order", self.order),
+        }
         if self.v_min is not None:
-            v_min = checks.number("Filter: v_min", self.v_min, unit="m/s", lower=0.0)
-            object.__setattr__(self, "v_min", v_min)
+            checked["v_min"] = checks.number("Filter: v_min", self.v_min, unit="m/s", lower=0.0)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     def inside(self, size: int, step: float) -> slice:
         """Return the samples away from both ends, where reflection affects the result."""
@@ -85,10 +86,8 @@ def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
         ValueError: a cut-off at or above the Nyquist frequency.
     """
     if not 0 < cutoff * step < 0.5:
-        raise ValueError(
-            f"lowpass: cutoff: expected below the Nyquist frequency {0.5 / step:g} Hz, "
-            f"got {cutoff:g} Hz"
-        )
+        such = f"below the Nyquist frequency {0.5 / step:g} Hz"
+        raise ValueError(f"lowpass: cutoff: expected {such}, got {cutoff:g} Hz")
     n = signal.size
     line = np.linspace(signal[0], signal[-1], n)
     rest = signal - line
@@ -272,21 +271,21 @@ class Velocity:
         if known is None:
             raise ValueError("velocity: expected a position or a velocity, got neither")
         frequency: Array = np.asarray(np.fft.rfftfreq(known.size), np.float64)
-        s = np.sin(2 * np.pi * frequency) / step
-        of_x = np.zeros(s.size) if x is None else noise_level(spectrum(without_line(x))) * s**2
+        power = spectrum(without_line(known))
+        of_x = noise_level(power) * (np.sin(2 * np.pi * frequency) / step) ** 2
         if v is None:
-            return Velocity(frequency, np.zeros(s.size), of_x)
-        measured = spectrum(without_line(v))
-        of_v = np.full(s.size, noise_level(measured))
+            return Velocity(frequency, np.zeros(of_x.size), of_x)
+        measured = power if x is None else spectrum(without_line(v))
+        of_v = np.full(of_x.size, noise_level(measured))
         if x is None:
-            return Velocity(frequency, np.ones(s.size), of_v)
+            return Velocity(frequency, np.ones(of_x.size), of_v)
         deficit = 1 - np.sinc(2 * frequency)
         of_x = _averaged(of_x + deficit**2 * measured, step)
         apart = _averaged(spectrum(v - central_difference(x, step)), step)
         differ = (apart > SURE * of_x) | (SURE * apart < of_x)
         of_v = np.maximum(of_v, np.where(differ, np.abs(apart - of_x), 0.0))
         both = of_x + of_v
-        weight = np.divide(of_x, both, out=np.ones(s.size), where=both > 0)
+        weight = np.divide(of_x, both, out=np.ones(both.size), where=both > 0)
         return Velocity(frequency, weight, weight * of_v)
 
     def mixed(self, of_x: Array, of_v: Array) -> Array:

@@ -94,14 +94,8 @@ def synthetic_drive_data(
         DRIVE.law if law is None else law, m=m, N=normal_force, offset=offset, turning=turning
     )
     reference = trapezoids(speeds, dwell, ramp, 1 / rate)
-    loop = PositionLoop(
-        kp=2 * np.pi * 5,
-        kv=2 * np.pi * 40 * m,
-        gain=1.0,
-        limit=1e6 * m,
-        reference=reference,
-        disturbance=np.zeros(reference.size),
-    )
+    still = np.zeros(reference.size)
+    loop = PositionLoop(2 * np.pi * 5, 2 * np.pi * 40 * m, 1.0, 1e6 * m, reference, still)
     x, held = _simulated(drive.model(), loop, 1 / rate)
     mean = np.append(held[0], (held[1:] + held[:-1]) / 2)
     seen = mean if force == "sensor" else held

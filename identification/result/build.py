@@ -28,7 +28,7 @@ from identification.solving.task import Task
 from identification.unknowns.roles import is_coefficient
 from identification.unknowns.spec import Above, Range, Tied
 from identification.unknowns.subject import Subject
-from identification.verdict.covariance import Covariance, Levels
+from identification.verdict.covariance import Levels
 from identification.verdict.judge import Verdict
 from symfric import __version__
 from symfric.foundation.parameters import Parametric, parameters
@@ -39,6 +39,8 @@ from symfric.scenes import Drive
 
 SHOWN = 6
 """Longest array that is written out."""
+PLAIN = (str, int, float, tuple)
+"""Types of values that are compared with defaults."""
 
 
 def written(value: object) -> str:
@@ -64,17 +66,12 @@ def written(value: object) -> str:
         return repr(value)
     given: list[str] = []
     for item in fields(value):
-        own = getattr(value, item.name)
-        if item.default is MISSING:
+        own, default = getattr(value, item.name), item.default
+        if default is MISSING:
             given.append(written(own))
-        elif own is not item.default and not _same(own, item.default):
+        elif own is not default and not (isinstance(own, PLAIN) and own == default):
             given.append(f"{item.name}={written(own)}")
     return f"{type(value).__name__}({', '.join(given)})"
-
-
-def _same(value: object, default: object) -> bool:
-    plain = (str, int, float, tuple)
-    return isinstance(value, plain) and isinstance(default, plain) and value == default
 
 
 def _rule(rule: Range | Above | Tied) -> str:
@@ -123,7 +120,8 @@ def fitted(
     """
     task, certain, kind = live.task, live.covariance, written(live.kind)
     records = tuple(r.name for r in live.data)
-    shown = _correlated(task, certain)
+    left_out = set(task.unknowns.nuisance) if len(certain.names) > MOST else set[str]()
+    shown = [i for i, name in enumerate(certain.names) if name not in left_out]
     return Fitted(
         name=live.subject.name,
         kind=kind,
@@ -173,25 +171,13 @@ def _estimates(live: Live) -> dict[str, Estimate]:
             estimates[name] = Estimate(held, unit, fixed=True, note=note)
             continue
         i = made.names.index(name)
-        error, low, high, white = (_known(column[i]) for column in columns)
+        numbers = (float(column[i]) for column in columns)
+        error, low, high, white = (x if isfinite(x) else None for x in numbers)
         other = "tied" if name in subject.ties else "not identifiable" * (error is None)
         note, nuisance = notes.get(name, other), unknown is not None and unknown.nuisance
         value = found[name]
         estimates[name] = Estimate(value, unit, error, low, high, white, False, note, nuisance)
     return estimates
-
-
-def _correlated(task: Task, made: Covariance) -> list[int]:
-    """Return the indices of the values whose correlation is kept: of many, the requested ones."""
-    every = range(len(made.names))
-    if len(made.names) <= MOST:
-        return list(every)
-    nuisance = set(task.unknowns.nuisance)
-    return [i for i in every if made.names[i] not in nuisance]
-
-
-def _known(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
 
 
 def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
@@ -230,28 +216,20 @@ def _tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
     """Return the ends of the starts, best first."""
     best = min([s.objective for s in starts if isfinite(s.objective)], default=0.0)
     return tuple(
-        Tried(
-            number=s.number,
-            above=s.objective - best,
-            cost=s.cost,
-            status=s.status,
-            message=s.message,
-            evaluations=s.evaluations,
-            values=task.unknowns.named(s.w),
-        )
+        Tried(s.number, s.objective - best, s.cost, s.status, s.message, s.evaluations,
+              task.unknowns.named(s.w))
         for s in sorted(starts, key=lambda s: (s.objective, s.number))
-    )
+    )  # fmt: skip
 
 
 def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Series, ...]:
     residuals, data = live.task.residuals, live.data
-    channels, r = residuals.channels, live.point.evaluation.r
     timed = all(record.t is not None for record in data)
     abscissa = "t [s]" if timed else ("v [rad/s]" if data.rotary else "v [m/s]")
-    most = points_each(len(channels))
+    most, r = points_each(len(residuals.channels)), live.point.evaluation.r
     return tuple(
         series(c, records[c.record], r, verdict.whiteness[label], abscissa, most)
-        for c, label in zip(channels, labels(residuals), strict=True)
+        for c, label in zip(residuals.channels, labels(residuals), strict=True)
     )
 
 

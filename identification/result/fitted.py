@@ -103,7 +103,7 @@ class Fitted(packed.Portable, Outcome):
         """
         if isinstance(self.machine, Scene):
             return self.machine.model()
-        return self.alive("model").model
+        return self.alive("model").closed.model
 
     def validate(self, data: Dataset) -> Errors:
         """Return the errors on other data with these parameters; start values are estimated there.

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan
-from typing import Any, Protocol, final
+from typing import Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,10 @@ from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task
-from identification.unknowns.spec import Tied
 from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import Covariance
 from symfric.foundation import checks
-from symfric.model import Model
 
 Array = NDArray[np.float64]
 
@@ -31,19 +29,6 @@ class Kind(Protocol):
     def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Residuals:
         """Return the residuals of `subject` on `data`; start values are guessed near `start`."""
         ...
-
-
-@final
-@dataclass(frozen=True)
-class Constant:
-    """A rule that ties a parameter to a number."""
-
-    value: float
-
-    def __call__(self, values: Mapping[str, object]) -> float:
-        """Return the number."""
-        del values
-        return self.value
 
 
 class Question(Protocol):
@@ -85,7 +70,6 @@ class Live:
         task: with the noise levels at the end.
         point: the minimum.
         covariance: of the values there.
-        closed: law, machine and model with numbers.
     """
 
     kind: Kind
@@ -94,21 +78,11 @@ class Live:
     task: Task
     point: Point
     covariance: Covariance
-    closed: Closed
 
-    @classmethod
-    def of(
-        cls, kind: Kind, subject: Subject, data: Dataset, task: Task, point: Point,
-        covariance: Covariance,
-    ) -> "Live":  # fmt: skip
-        """Return the problem with the numbers of `point`."""
-        found = dict(zip(task.residuals.names, point.values.tolist(), strict=True))
-        return cls(kind, subject, data, task, point, covariance, subject.close(found))
-
-    @property
-    def model(self) -> Model:
-        """The model with numbers."""
-        return self.closed.model
+    @cached_property
+    def closed(self) -> Closed:
+        """Law, machine and model with the numbers of `point`."""
+        return self.subject.close(self.values)
 
     @property
     def values(self) -> dict[str, float]:
@@ -119,7 +93,7 @@ class Live:
     def errors_on(self, data: Dataset) -> Errors:
         """Return the errors of the parameters on other data, see `left_on`."""
         residuals, r = self.left_on(data)
-        return errors_of(residuals, [r.name for r in data], r)
+        return errors_of(residuals, [r.name for r in data], r, {})
 
     def left_on(self, data: Dataset) -> tuple[Residuals, Array]:
         """Return the residuals of other data with these parameters, and their values [SI].
@@ -131,23 +105,20 @@ class Live:
         """
         data = checks.kind("validate", data, Dataset, "data, such as Dataset.read('v.csv')")
         start = {n: v for n, v in self.values.items() if n in self.subject.names}
-        kind = settled(self.kind, self.task.residuals, data)
-        residuals = kind.prepare(self.subject, data, start)
-        ties = {name: Tied(Constant(value)) for name, value in start.items()}
-        unknowns = unknowns_of(residuals.own, ties, residuals.names)
+        residuals = _settled(self.kind, self.task.residuals, data).prepare(
+            self.subject, data, start
+        )
+        unknowns = unknowns_of(residuals.own, {}, residuals.names, start)
         signals = {c.signal for c in residuals.channels}
         noise = {s: sigma for s, sigma in self.task.noise.items() if s in signals}
-        task = Task(residuals, unknowns, noise, (), self.task.loss)
-        w = unknowns.start
-        if w.size:
-            w = best_of(many_starts(task, [w])).w
-        point = task.at(w)
+        task, w = Task(residuals, unknowns, noise, (), self.task.loss), unknowns.start
+        point = task.at(best_of(many_starts(task, [w])).w if w.size else w)
         if isinstance(point, str):
             raise ValueError(f"validate: expected data '{data.name}' that can be compared: {point}")
         return residuals, point.evaluation.r
 
 
-def settled(kind: Any, residuals: Any, data: Dataset) -> Any:
+def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
     """Return `kind` with the filter chosen on the data of the fit, to filter other data alike."""
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind
@@ -159,18 +130,11 @@ def settled(kind: Any, residuals: Any, data: Dataset) -> Any:
 
 
 def errors_of(
-    residuals: Residuals,
-    records: Sequence[str],
-    r: Array,
-    effective: Mapping[str, float] | None = None,
+    residuals: Residuals, records: Sequence[str], r: Array, effective: Mapping[str, float]
 ) -> Errors:
     """Return (record, signal) -> errors [SI]; `effective` samples by label of the channel."""
-    known = effective or {}
-    names = labels(residuals)
-    return {
-        (records[c.record], c.signal): error(c, r, known.get(names[k], nan))
-        for k, c in enumerate(residuals.channels)
-    }
+    both = zip(residuals.channels, labels(residuals), strict=True)
+    return {(records[c.record], c.signal): error(c, r, effective.get(n, nan)) for c, n in both}
 
 
 def labels(residuals: Residuals) -> list[str]:

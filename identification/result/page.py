@@ -66,11 +66,7 @@ def left(one: Series) -> str:
     """Return the chart of the residuals."""
     shape = Path if one.ordered else Dots
     y = around("difference", one.unit, [one.residual.y, np.zeros(1)])
-    marks = [
-        *_windows(one),
-        Level("zero", 0.0),
-        shape("residual", one.residual.t, one.residual.y),
-    ]
+    marks = [*_windows(one), Level("zero", 0.0), shape("residual", one.residual.t, one.residual.y)]
     size = float(np.abs(one.residual.y).max(initial=0.0))
     says = f"fitted minus measured {one.signal}, at most {number(size, 3)} {one.unit}"
     title = f"{one.record}: residuals of {one.signal}"
@@ -202,10 +198,9 @@ def _parameters(fit: Outcome) -> Iterator[str]:
     some = dict(list(nuisance.items())[:MANY])
     more = f", the first {MANY} of {len(nuisance)}" if len(nuisance) > MANY else ""
     yield _estimates(f"Of single records: start values, dead times{more}", some)
-    matrix = [[float(c) if isfinite(c) else None for c in row] for row in fit.correlation]
     shown = [i for i, n in enumerate(fit.names) if not fit.parameters[n].nuisance]
-    names = [fit.names[i] for i in shown]
-    values = [[matrix[i][j] for j in shown] for i in shown]
+    names, rows = [fit.names[i] for i in shown], fit.correlation[np.ix_(shown, shown)].tolist()
+    values = [[c if isfinite(c) else None for c in row] for row in rows]
     yield html.triangle("Correlation of the estimates", names, values)
     close = correlated(fit)
     if close:

@@ -109,29 +109,20 @@ def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> Fi
     ):  # fmt: skip
         values = [row[key] or 0.0 for row in rows]
         errors.barh(places + shift, values, height=0.38, color=shade, label=label)
-    errors.set_yticks(
-        places,
-        labels=[f"{row['law']}\n{row['parameters']} par., {_operations(row)}" for row in rows],
-    )
+    costs = ["no law" if (n := row["operations"]) is None else f"{n} op." for row in rows]
+    names = [f"{r['law']}\n{r['parameters']} par., {c}" for r, c in zip(rows, costs, strict=True)]
+    errors.set_yticks(places, labels=names)
     errors.set_xlabel("rms error over the spread [%]")
     errors.legend(fontsize="small")
     colours = [colour(2) if row["status"] == "SOLVED" else colour(1) for row in rows]
     criterion.barh(places, [row["BIC"] or 0.0 for row in rows], height=0.5, color=colours)
     for place, row in zip(places, rows, strict=True):
         criterion.annotate(
-            row["status"],
-            (0.0, place),
-            (4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize="small",
-        )
+            row["status"], (0.0, place), (4, 0),
+            textcoords="offset points", va="center", fontsize="small",
+        )  # fmt: skip
     criterion.set_xlabel("BIC over that of the best")
     for axis in (errors, criterion):
         axis.grid(visible=False, axis="y")
     figure.suptitle(f"{found['data']}: {found['how']}", fontsize="medium")
     return save(figure, path)
-
-
-def _operations(row: Mapping[str, Any]) -> str:
-    return "no law" if row["operations"] is None else f"{row['operations']} op."

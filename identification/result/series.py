@@ -1,9 +1,9 @@
 """Parts of a result: estimates, errors, signals for plots, friction over velocity."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import nan
+from math import inf, nan
 from typing import final
 
 import numpy as np
@@ -192,9 +192,10 @@ def cut_envelope(t: Array, y: Array, most: int = MOST) -> Line:
     lines: list[Line] = []
     for a, b in pairwise([0, *gaps.tolist(), t.size]):
         lines.append(envelope(t[a:b], y[a:b], max(4, most * (b - a) // t.size)))
-        lines.append(Line(np.array([t[b - 1]]), np.array([nan])))
-    lines.pop()
-    return Line(*(np.concatenate([getattr(line, name) for line in lines]) for name in ("t", "y")))
+        lines.append(Line(t[b - 1 : b], np.array([nan])))
+    return Line(
+        *(np.concatenate(part[:-1]) for part in ([x.t for x in lines], [x.y for x in lines]))
+    )
 
 
 def series(
@@ -213,22 +214,12 @@ def series(
     order = slice(None) if channel.ordered else np.argsort(channel.t, kind="stable")
     t, measured, left = channel.t[order], channel.measured[order], r[channel.rows][order]
     line = cut_envelope if channel.ordered else envelope
+    seen, predicted, residual = (line(t, y, most) for y in (measured, measured + left, left))
     return Series(
-        record=record,
-        signal=channel.signal,
-        unit=channel.unit,
-        abscissa=abscissa,
-        ordered=channel.ordered,
-        rows=left.size,
-        measured=line(t, measured, most),
-        predicted=line(t, measured + left, most),
-        residual=line(t, left, most),
-        breaks=channel.t[list(channel.breaks)],
-        lags=white.lags,
-        correlation=white.correlation,
-        low=white.low,
-        high=white.high,
-    )
+        record, channel.signal, channel.unit, abscissa, channel.ordered, left.size,
+        seen, predicted, residual, channel.t[list(channel.breaks)],
+        white.lags, white.correlation, white.low, white.high,
+    )  # fmt: skip
 
 
 def points_each(channels: int) -> int:
@@ -240,14 +231,10 @@ def error(channel: Channel, r: Array, effective: float = nan) -> Error:
     """Return the errors of one channel; `r` holds the residuals of all rows."""
     left = r[channel.rows]
     size = float(np.linalg.norm(channel.measured))
-    return Error(
-        unit=channel.unit,
-        rms=float(np.sqrt(np.mean(left**2))) if left.size else 0.0,
-        relative=100.0 * float(np.linalg.norm(left)) / size if size > 0 else float("inf"),
-        largest=float(np.abs(left).max(initial=0.0)),
-        rows=left.size,
-        effective=effective,
-    )
+    rms = float(np.sqrt(np.mean(left**2))) if left.size else 0.0
+    relative = 100.0 * float(np.linalg.norm(left)) / size if size > 0 else inf
+    largest = float(np.abs(left).max(initial=0.0))
+    return Error(channel.unit, rms, relative, largest, left.size, effective)
 
 
 SIDE = 300
@@ -277,8 +264,8 @@ class Curve:
 
 def of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
     """Return the curve with measured points (v, F) of each record."""
-    measured = _thinned({name: Line(v, F) for name, (v, F) in points.items()})
-    return _curve(law, N, measured, turning, "measured points")
+    lines = {name: Line(v, F) for name, (v, F) in points.items()}
+    return _curve(law, N, lines, turning, "measured points")
 
 
 def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
@@ -286,12 +273,7 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
 
     Records without position, force or equal intervals have no points.
     """
-    measured = _thinned(dict(_frictions(drive, records)))
-    says = "measured: force - m a - offset" if measured else "no record has force and position"
-    return _curve(drive.law, float(drive.N), measured, drive.turning, says)
-
-
-def _frictions(drive: Drive, records: Sequence[Record]) -> Iterator[tuple[str, Line]]:
+    lines = dict[str, Line]()
     for record in records:
         if record.t is None or "force" not in record or "x" not in record:
             continue
@@ -300,17 +282,15 @@ def _frictions(drive: Drive, records: Sequence[Record]) -> Iterator[tuple[str, L
         except ValueError:  # unequal intervals, too short: there is no acceleration
             continue
         friction = signals.force - float(drive.m) * signals.a - float(drive.offset)
-        yield record.name, Line(signals.equations(signals.v), signals.equations(friction))
+        lines[record.name] = Line(signals.equations(signals.v), signals.equations(friction))
+    says = "measured: force - m a - offset" if lines else "no record has force and position"
+    return _curve(drive.law, float(drive.N), lines, drive.turning, says)
 
 
-def _thinned(lines: dict[str, Line]) -> dict[str, Line]:
-    """Return every n-th point, so that at most about `DOTS` remain."""
-    total = sum(line.t.size for line in lines.values())
-    every = max(1, -(-total // DOTS))
-    return {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
-
-
-def _curve(law: Law, N: float, measured: dict[str, Line], turning: bool, says: str) -> Curve:
+def _curve(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str) -> Curve:
+    """Return the curve with every n-th point of the lines: in total about `DOTS` at most."""
+    every = max(1, -(-sum(line.t.size for line in lines.values()) // DOTS))
+    measured = {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
     top = max([float(np.abs(line.t).max(initial=0.0)) for line in measured.values()], default=0.0)
     if top == 0.0:
         scale = law.velocity_scale

@@ -41,39 +41,27 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, Enum):
         return value.name
-    if isinstance(value, float | np.floating):
-        return _number(float(value))
-    if isinstance(value, np.integer | np.bool_):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return _array(value)  # pyright: ignore[reportUnknownArgumentType]
+    if isinstance(value, float):
+        return None if isnan(value) else str(value) if value in (inf, -inf) else value
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "f":
+        return [plain(float(f"{x:.{DIGITS}g}")) for x in value.tolist()]
     if isinstance(value, Mapping):
         return _mapping(value)  # pyright: ignore[reportUnknownArgumentType]
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | np.ndarray):
         return [plain(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
     if is_dataclass(value):
         return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
     raise TypeError(f"expected plain data, got {type(value).__name__}")
 
 
-def _number(value: float) -> Any:
-    if isnan(value):
-        return None
-    return str(value) if value in (inf, -inf) else value
-
-
-def _array(value: np.ndarray[Any, Any]) -> Any:
-    if value.ndim != 1 or value.dtype.kind != "f":
-        return [plain(one) for one in value]
-    return [_number(float(f"{x:.{DIGITS}g}")) for x in value.tolist()]
-
-
 def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, one in value.items():
         if isinstance(key, tuple):
-            first, second = key  # pyright: ignore[reportUnknownVariableType]
-            found.setdefault(str(first), {})[str(second)] = plain(one)  # pyright: ignore[reportUnknownArgumentType]
+            first, second = map(str, key)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+            found.setdefault(first, {})[second] = plain(one)
         else:
             found[str(key)] = plain(one)
     return found
@@ -106,8 +94,15 @@ def revived(kind: Any, data: Any) -> Any:
             }
         return {name: revived(inner[1], one) for name, one in data.items()}
     if kind is np.ndarray or origin is np.ndarray:
-        return _revived_array(data)
-    return _single(kind, data)
+        return np.array(_real(data))
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return kind[data]
+    if is_dataclass(kind):
+        hints = get_type_hints(kind)
+        wanted = {item.name for item in fields(kind) if item.init}
+        given = {name: revived(hints[name], one) for name, one in data.items() if name in wanted}
+        return kind(**given)  # pyright: ignore[reportCallIssue]
+    return float(_real(data)) if kind is float else data
 
 
 def _one_of(kinds: tuple[Any, ...], data: Any) -> Any:
@@ -118,29 +113,11 @@ def _one_of(kinds: tuple[Any, ...], data: Any) -> Any:
     return revived((matching or others)[0], data)
 
 
-def _revived_array(data: Any) -> Any:
-    if data and isinstance(data[0], list):
-        return np.array([_revived_array(row) for row in data])
-    return np.array([_real(x) for x in data])
-
-
 def _real(value: Any) -> Any:
-    if value is None:
-        return nan
-    return INFINITE[value] if isinstance(value, str) else value
-
-
-def _single(kind: Any, data: Any) -> Any:
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return kind[data]
-    if is_dataclass(kind):
-        hints = get_type_hints(kind)
-        wanted = {item.name for item in fields(kind) if item.init}
-        given = {name: revived(hints[name], one) for name, one in data.items() if name in wanted}
-        return kind(**given)  # pyright: ignore[reportCallIssue]
-    if kind is float:
-        return float(_real(data))
-    return data
+    """Return a number, or a list of them, that `plain` wrote."""
+    if isinstance(value, list):
+        return [_real(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
+    return nan if value is None else INFINITE[value] if isinstance(value, str) else value
 
 
 KINDS: dict[str, type[Parametric]] = {

@@ -48,25 +48,18 @@ def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Ar
     n, others = centre.size, max(count - 1, 0)
     cells = np.stack([rng.permutation(others) for _ in range(n)], axis=1).reshape(others, n)
     shares = (cells + rng.random((others, n))) / max(others, 1)
-    starts = [at.inside(centre)]
-    for row in shares:
-        w = [
-            _moved(u, float(x), float(share), *box)
-            for u, x, share, *box in zip(at.unknowns, centre, row, at.lower, at.upper, strict=True)
-        ]
-        starts.append(at.inside(np.array(w)))
-    return starts
+    box = at.unknowns, *(x.tolist() for x in (centre, at.lower, at.upper))
+    moved = (np.array([*map(_moved, *box, row)], float) for row in shares.tolist())
+    return [at.inside(w) for w in (centre, *moved)]
 
 
-def _moved(unknown: Unknown, w: float, share: float, lower: float, upper: float) -> float:
+def _moved(unknown: Unknown, w: float, lower: float, upper: float, share: float) -> float:
     """Return one moved coordinate, for `share` in (0, 1)."""
-    side = 2 * share - 1
-    if unknown.nuisance and not (np.isfinite(lower) and np.isfinite(upper)):
+    side, bounded = 2 * share - 1, np.isfinite(upper) and np.isfinite(lower)
+    if unknown.nuisance and not bounded:
         return w
-    whole = bool(np.isfinite(upper) and np.isfinite(lower))
-    if unknown.logarithmic and not unknown.above:
-        whole = upper - lower < np.log(WIDE)
-    if whole:
+    narrow = upper - lower < np.log(WIDE) or not unknown.logarithmic or unknown.above
+    if bounded and narrow:
         return lower + share * (upper - lower)
     if unknown.logarithmic or unknown.above:
         return w + side * np.log(REACH)

@@ -10,19 +10,14 @@ Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteres
 Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
 """
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.starts.measured import DEAD, Measured, turning_points
-from identification.starts.stribeck import StribeckCurve
-from identification.unknowns.roles import parts
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parameter, parameters
-from symfric.laws.base.law import Law
 
 Array = NDArray[np.float64]
 
@@ -251,121 +246,3 @@ def _improved(
     shift = float(rest[-2] - rest[-1]) if offset else 0.0
     rms = left / float(np.sqrt(measured.F.size))
     return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, loaded, rms)
-
-
-FIELDS = ("k", "mu", "alpha")
-"""Fields of an element: stiffness, friction coefficient or share."""
-ENOUGH = 1500
-"""Samples sufficient for a start."""
-SLOW = 0.75
-"""Median share of the static level that friction keeps in a record of pre-sliding."""
-LEAST = 0.05
-"""Lower bound of this share as a divisor of forces."""
-APART = 1.25
-"""Ratio of radii into which an element is split if the law has more elements than the fit."""
-HEADROOM = 1.1
-"""Sum of a law's elements over its static level, if it has one."""
-
-
-def element_names(law: Law) -> dict[str, tuple[str, ...]]:
-    """Return field of an element -> names of the parameters of all elements, in their order.
-
-    Empty for a law without elements, or with two sets of them (one for each direction).
-    """
-    sets = [e for part in parts(law) if isinstance(e := getattr(part, "elements", None), tuple)]
-    if len(sets) != 1:
-        return {}
-    known = parameters(law)
-    own = {f: tuple(n for n, p in known.items() if p.field == f) for f in FIELDS}
-    return {f: names for f, names in own.items() if len(names) == len(sets[0])}
-
-
-def element_values(
-    law: Law, measured: Measured, curve: StribeckCurve, *, offset: float, free: Collection[str]
-) -> dict[str, float]:
-    """Return stiffness and level of each element of `law`, in the order in which they slip.
-
-    They come from `fit_elements`. For a law with a Stribeck curve the force is first divided by
-    this curve, so that pre-sliding and sliding are comparable. Empty if the data or the law have no
-    elements.
-
-    Args:
-        law: with N = measured.N.
-        measured: friction alone, with positions or times.
-        curve: its Stribeck curve.
-        offset: constant force [N] in addition to friction.
-        free: names of requested parameters. Only the ratios of the shares alpha_i count; if some
-            are held, the others are scaled relative to the first held one.
-    """
-    names = element_names(law)
-    if not names or measured.x is None:
-        return {}
-    falls = "mu_s" in parameters(law)
-    viscous = any(p.role == "viscous" for p in parameters(law).values())
-    force = measured.F - offset
-    friction = replace(measured, F=force, a=None)
-    if falls:
-        friction = _as_if_slow(friction, curve)
-    count = len(next(iter(names.values())))
-    try:
-        found = fit_elements(friction, count, viscous=viscous and not falls, most=ENOUGH)
-    except ValueError:
-        return {}  # no hysteresis in these data: keep the values of the law
-    k, levels = _as_many(found, count)
-    total = float(levels.sum())
-    carried = HEADROOM * curve.F_S / total if falls else 1.0
-    shares = levels / total
-    held = [(i, n) for i, n in enumerate(names.get("alpha", ())) if n not in free]
-    if held:
-        i, name = held[0]
-        shares = shares / shares[i] * float(parameters(law)[name].value)
-    each = {"k": k, "alpha": shares, "mu": carried * levels / measured.N}
-    return {n: float(x) for f, own in names.items() for n, x in zip(own, each[f], strict=True)}
-
-
-def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
-    """Return forces over the Stribeck curve, times its maximum; only slow records if any."""
-    side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
-    sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
-    sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
-    share = np.maximum(sliding / max(curve.F_S, float(sliding.max())), LEAST)
-    force = (friction.F - curve.sigma_2 * friction.v) / share
-    slow = [r for r in friction.records if float(np.median(share[r])) > SLOW]
-    kept = slow or list(friction.records)
-    return friction.at([np.arange(r.start, r.stop) for r in kept], force)
-
-
-def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
-    """Return coefficients of elements, scaled up to carry mu_s if the law requires it."""
-    mine, known = element_names(law).get("mu", ()), parameters(law)
-    if "mu_s" not in known or not set(mine) & values.keys():
-        return {}
-    at = {n: values.get(n, float(known[n].value)) for n in (*mine, "mu_s")}
-    missing = HEADROOM * at["mu_s"] - sum(at[n] for n in mine)
-    free = [n for n in mine if n in values]
-    carried = sum(at[n] for n in free)
-    return {n: at[n] * (1 + max(missing, 0.0) / carried) for n in free}
-
-
-def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
-    """Return stiffnesses and levels of `count` elements: the strongest ones are split."""
-    levels, radii = elements.levels, elements.radii
-    while levels.size < count:
-        i = int(np.argmax(levels))
-        levels = np.r_[levels[:i], levels[i] / 2, levels[i] / 2, levels[i + 1 :]]
-        radii = np.r_[radii[:i], radii[i] / APART, radii[i] * APART, radii[i + 1 :]]
-    order = np.argsort(radii)
-    return (levels / radii)[order], levels[order]
-
-
-def shared(parameter: Parameter, law: Law) -> int:
-    """Return the number of elements that share a parameter's field; else 1."""
-    if parameter.field not in FIELDS:
-        return 1
-    return max(len(getattr(part, "elements", "1")) for part in parts(law))
-
-
-def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
-    """Return the sum of the values of one field over `count` elements."""
-    same = [float(p.value) for p in values.values() if p.field == field]
-    return sum(same) * count / len(same)

@@ -1,27 +1,23 @@
 """Start values of any law from data, assigned by the roles of its parameters."""
 
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from math import isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from identification.data.dataset import Dataset
-from identification.data.differentiate import differentiate
-from identification.data.findings import Findings
-from identification.residuals.points import Points
-from identification.starts.law_fit import fit_law, velocity
-from identification.starts.maxwell_slip import HEADROOM, carrying, element_values, scaled, shared
+from identification.starts.maxwell_slip import Elements, fit_elements
 from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled
-from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve
-from identification.unknowns.roles import orders, parts
-from identification.unknowns.subject import Subject
+from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
+from identification.unknowns.roles import orders, parts, velocity
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
 from symfric.scenes.blocks import Drive
+
+Array = NDArray[np.float64]
 
 STEADY = ("level", "viscous", "velocity scale", "")
 """Roles that the steady curve of a law determines."""
@@ -241,78 +237,119 @@ def _inside(parameter: Parameter, value: float) -> float:
     return min(max(value if isfinite(value) else own, least), parameter.upper)
 
 
-FEW = 0.01
-"""Share of points with an arbitrarily small speed, such as noise about rest."""
+FIELDS = ("k", "mu", "alpha")
+"""Fields of an element: stiffness, friction coefficient or share."""
+ENOUGH = 1500
+"""Samples sufficient for a start."""
+SLOW = 0.75
+"""Median share of the static level that friction keeps in a record of pre-sliding."""
+LEAST = 0.05
+"""Lower bound of this share as a divisor of forces."""
+SPLIT = 1.25
+"""Ratio of radii into which an element is split if the law has more elements than the fit."""
+HEADROOM = 1.1
+"""Sum of a law's elements over its static level, if it has one."""
 
 
-def findings_of(kind: object, data: Dataset) -> Findings:
-    """Return the warnings on the data for these residuals."""
-    if isinstance(kind, Points):
-        return data.check()
-    called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
-    return data.check(**called)
+def element_names(law: Law) -> dict[str, tuple[str, ...]]:
+    """Return field of an element -> names of the parameters of all elements, in their order.
 
-
-def explained(error: ValueError, findings: Findings) -> ValueError:
-    """Return the error of failed residuals, preceded by the first error in the data."""
-    if not findings.errors:
-        return error
-    sentence = findings.errors[0].sentence.rstrip(".")
-    return ValueError(f"data '{findings.name}': {sentence}; then {error}")
-
-
-def _roles(kind: object) -> dict[str, str]:
-    """Return the channels of position and force of a drive."""
-    names = {name: getattr(kind, name, name) for name in ("x", "force")}
-    return {name: given if isinstance(given, str) else name for name, given in names.items()}
-
-
-def measured(kind: object, data: Dataset, load: float) -> Measured | None:
-    """Return velocity and force of points or of a drive, all records; None if unavailable."""
-    try:
-        if isinstance(kind, Points):
-            timed = all(r.t is not None for r in data)
-            names = {"v": kind.v, "F": kind.F} | ({"t": "t"} if timed else {})
-            each = [{part: r[name] for part, name in names.items()} for r in data]
-        else:
-            called, chosen = _roles(kind), getattr(kind, "filter", None)
-            motions = [differentiate(r, chosen, **called) for r in data]
-            each = [{"v": m.v, "F": m.force, "x": m.x, "t": m.t, "a": m.a} for m in motions]
-        signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
-        breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())
-        return Measured(**signals, N=load, breaks=breaks)
-    except ValueError:  # the preparation of the residuals reports missing channels
-        return None
-
-
-def strongest(
-    kind: object, data: Dataset, seen: Measured | None, mass: float | None
-) -> float | None:
-    """Return the largest force on the friction of points or of a drive [N]; None if unknown.
-
-    In sliding it is F - m a, at rest F. Unknown for points with a measured normal force.
+    Empty for a law without elements, or with two sets of them (one for each direction).
     """
-    loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
-    if seen is None or loaded:
-        return None
-    if seen.a is None or mass is None:
-        return float(np.abs(seen.F).max())
-    return float(max(np.abs(seen.F).max(), np.abs(seen.F - mass * seen.a).max()))
+    sets = [e for part in parts(law) if isinstance(e := getattr(part, "elements", None), tuple)]
+    if len(sets) != 1:
+        return {}
+    known = parameters(law)
+    own = {f: tuple(n for n, p in known.items() if p.field == f) for f in FIELDS}
+    return {f: names for f, names in own.items() if len(names) == len(sets[0])}
 
 
-def slowest(kind: object, seen: Measured | None) -> float:
-    """Return the speed [m/s] above which nearly all points not at rest lie; 0 for motions."""
-    if seen is None or not isinstance(kind, Points):
-        return 0.0
-    speeds = np.abs(seen.v[seen.v != 0])
-    return float(np.quantile(speeds, FEW)) if speeds.size else 0.0
+def element_values(
+    law: Law, measured: Measured, curve: StribeckCurve, *, offset: float, free: Collection[str]
+) -> dict[str, float]:
+    """Return stiffness and level of each element of `law`, in the order in which they slip.
+
+    They come from `fit_elements`. For a law with a Stribeck curve the force is first divided by
+    this curve, so that pre-sliding and sliding are comparable. Empty if the data or the law have no
+    elements.
+
+    Args:
+        law: with N = measured.N.
+        measured: friction alone, with positions or times.
+        curve: its Stribeck curve.
+        offset: constant force [N] in addition to friction.
+        free: names of requested parameters. Only the ratios of the shares alpha_i count; if some
+            are held, the others are scaled relative to the first held one.
+    """
+    names = element_names(law)
+    if not names or measured.x is None:
+        return {}
+    falls = "mu_s" in parameters(law)
+    viscous = any(p.role == "viscous" for p in parameters(law).values())
+    force = measured.F - offset
+    friction = replace(measured, F=force, a=None)
+    if falls:
+        friction = _as_if_slow(friction, curve)
+    count = len(next(iter(names.values())))
+    try:
+        found = fit_elements(friction, count, viscous=viscous and not falls, most=ENOUGH)
+    except ValueError:
+        return {}  # no hysteresis in these data: keep the values of the law
+    k, levels = _as_many(found, count)
+    total = float(levels.sum())
+    carried = HEADROOM * curve.F_S / total if falls else 1.0
+    shares = levels / total
+    held = [(i, n) for i, n in enumerate(names.get("alpha", ())) if n not in free]
+    if held:
+        i, name = held[0]
+        shares = shares / shares[i] * float(parameters(law)[name].value)
+    each = {"k": k, "alpha": shares, "mu": carried * levels / measured.N}
+    return {n: float(x) for f, own in names.items() for n, x in zip(own, each[f], strict=True)}
 
 
-def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
-    """Return the start of every free parameter: from the user, else the data, else the law."""
-    values, found = {u.name: u.start for u in subject.unknowns}, dict[str, float]()
-    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
-    if whole is not None and seen is not None:
-        with suppress(ValueError):  # data without motion: keep the values of the law
-            found = start_values(whole, seen, free=[*values])
-    return values | {n: x for n, x in found.items() if n not in subject.started} | dict(given)
+def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
+    """Return forces over the Stribeck curve, times its maximum; only slow records if any."""
+    side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
+    sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
+    sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
+    share = np.maximum(sliding / max(curve.F_S, float(sliding.max())), LEAST)
+    force = (friction.F - curve.sigma_2 * friction.v) / share
+    slow = [r for r in friction.records if float(np.median(share[r])) > SLOW]
+    kept = slow or list(friction.records)
+    return friction.at([np.arange(r.start, r.stop) for r in kept], force)
+
+
+def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
+    """Return coefficients of elements, scaled up to carry mu_s if the law requires it."""
+    mine, known = element_names(law).get("mu", ()), parameters(law)
+    if "mu_s" not in known or not set(mine) & values.keys():
+        return {}
+    at = {n: values.get(n, float(known[n].value)) for n in (*mine, "mu_s")}
+    missing = HEADROOM * at["mu_s"] - sum(at[n] for n in mine)
+    free = [n for n in mine if n in values]
+    carried = sum(at[n] for n in free)
+    return {n: at[n] * (1 + max(missing, 0.0) / carried) for n in free}
+
+
+def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
+    """Return stiffnesses and levels of `count` elements: the strongest ones are split."""
+    levels, radii = elements.levels, elements.radii
+    while levels.size < count:
+        i = int(np.argmax(levels))
+        levels = np.r_[levels[:i], levels[i] / 2, levels[i] / 2, levels[i + 1 :]]
+        radii = np.r_[radii[:i], radii[i] / SPLIT, radii[i] * SPLIT, radii[i + 1 :]]
+    order = np.argsort(radii)
+    return (levels / radii)[order], levels[order]
+
+
+def shared(parameter: Parameter, law: Law) -> int:
+    """Return the number of elements that share a parameter's field; else 1."""
+    if parameter.field not in FIELDS:
+        return 1
+    return max(len(getattr(part, "elements", "1")) for part in parts(law))
+
+
+def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
+    """Return the sum of the values of one field over `count` elements."""
+    same = [float(p.value) for p in values.values() if p.field == field]
+    return sum(same) * count / len(same)

@@ -91,6 +91,16 @@ def is_logarithmic(parameter: Parameter) -> bool:
     return parameter.role not in LINEAR or (parameter.role == "level" and parameter.lower > 0)
 
 
+def is_scale(parameter: Parameter) -> bool:
+    """Return True if a parameter is a positive velocity scale, or the inverse of one."""
+    return parameter.role == "velocity scale" and parameter.lower >= 0
+
+
+def velocity(parameter: Parameter, scale: float) -> float:
+    """Return a velocity scale in the unit of the parameter: itself, or its inverse."""
+    return scale if parameter.unit in VELOCITIES else 1 / scale
+
+
 @final
 @dataclass(frozen=True)
 class Speeds:

@@ -3,12 +3,14 @@
 free={"sigma_0": log(1e3, 1e7), "mu_s": above("mu_d"), "sigma_1": tied(lambda p: ...)}
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from math import inf
-from typing import Any, final
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+from typing import Any, NamedTuple, final
 
+from identification.unknowns import roles
 from symfric.foundation import checks
+from symfric.foundation.parameters import Parameter, Variable
 
 
 @final
@@ -172,3 +174,218 @@ def _range(
 def _is_infinite(value: object) -> bool:
     number = checks.as_number(value)
     return number is not None and abs(number) == inf
+
+
+OTHERS = "others"
+"""`fixed="others"`: every parameter that is not in `free` is held at its value."""
+APART = 1.2
+"""Ratio of the start values of two ordered parameters after one was moved."""
+Order = tuple[str, str, bool]
+
+
+class Requests:
+    """Arguments `free` and `fixed` of a fit.
+
+    Attributes:
+        free: name -> specification.
+        fixed: name -> value of a held parameter.
+        only: True if only the parameters in `free` are fitted.
+        problems: errors in the specifications and values, which `check` raises.
+
+    Raises:
+        ValueError: an argument that is neither names nor values by name.
+    """
+
+    def __init__(self, free: object, fixed: object, start: Iterable[str] = ()) -> None:
+        given: dict[str, Any] = (
+            checks.named("Fit: free", free)
+            if free is None or isinstance(free, Mapping)
+            else dict.fromkeys(checks.names("Fit: free", free))
+        )
+        self.only = isinstance(fixed, str)
+        if self.only and fixed != OTHERS:
+            raise checks.refused("Fit: fixed", f"values by name or '{OTHERS}'", fixed)
+        numbers = {} if self.only else checks.named("Fit: fixed", fixed)
+        self.free, self.fixed, self.problems = dict[str, Spec](), dict[str, float](), list[str]()
+        for argument, entries in (("free", given), ("fixed", numbers)):
+            for name, value in entries.items():
+                try:
+                    if argument == "free":
+                        self.free[name] = as_spec(f"free {name}", value)
+                    else:
+                        self.fixed[name] = checks.number(f"fixed {name}", value)
+                except ValueError as error:
+                    self.problems.append(str(error))
+        self.problems += [f"{n}: expected free or fixed, got both" for n in given if n in numbers]
+        self.names = {"free": [*given], "fixed": [*numbers], "start": [*start]}
+
+    @property
+    def started(self) -> frozenset[str]:
+        """Names with a given start value."""
+        return frozenset(n for n, s in self.free.items() if getattr(s, "start", None) is not None)
+
+    @property
+    def ties(self) -> dict[str, Tied]:
+        """Parameters computed from others."""
+        return {n: s for n, s in self.free.items() if isinstance(s, Tied)}
+
+    def check(self, known: Sequence[str]) -> None:
+        """Raise one error for all names that are not `known` and all other problems."""
+        problems = list[str]()
+        for where, given in self.names.items():
+            try:
+                checks.check_names(where, given, known)
+            except ValueError as error:
+                problems.append(str(error))
+        refuse([*problems, *self.problems])
+
+
+def refuse(problems: Sequence[str]) -> None:
+    """Raise one error for all problems of a fit, if there are any."""
+    if problems:
+        raise ValueError("Fit: " + "; ".join(problems))
+
+
+class Draft(NamedTuple):
+    """An unknown with the bounds of its definition.
+
+    Its own bounds are those of what the data can resolve, used if the user gives no bounds.
+    """
+
+    unknown: Unknown
+    lower: float
+    upper: float
+
+
+def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Draft:
+    """Return the draft of a parameter of a law or a scene, by its role."""
+    value = float(parameter.value)
+    unknown = Unknown(
+        parameter.name, unit, value, *roles.window(parameter, speeds),
+        scale=abs(value) or abs(parameter.default) or 1.0,
+        logarithmic=roles.is_logarithmic(parameter),
+    )  # fmt: skip
+    return Draft(unknown, parameter.lower, parameter.upper)
+
+
+def of_variable(v: Variable) -> Draft:
+    """Return the draft of a model parameter: logarithmic if it starts and stays positive."""
+    value, logarithmic = float(v.start), v.lower >= 0 and float(v.start) > 0
+    scale = abs(value) or v.nominal
+    unknown = Unknown(v.name, v.unit, value, v.lower, v.upper, scale, logarithmic)
+    return Draft(unknown, v.lower, v.upper)
+
+
+def drafted(
+    free: Sequence[Draft], requests: Requests, held: Mapping[str, float], orders: Iterable[Order]
+) -> dict[str, Unknown]:
+    """Return the unknowns of the `free` parameters, by name; tied ones included, for their start.
+
+    Raises:
+        ValueError: all bounds, starts and orders that contradict each other.
+    """
+    problems: list[str] = []
+    specs = requests.free
+    found = {d.unknown.name: _first(d, specs.get(d.unknown.name, Range()), problems) for d in free}
+    for order in orders:
+        _order(found, requests, held, order, problems)
+    for name, spec in specs.items():
+        if isinstance(spec, Above) and name in found:
+            if spec.name in held:
+                low = max(held[spec.name], found[name].lower)
+                found[name] = replace(found[name], lower=low, above="")
+            elif spec.name not in found:
+                problems.append(f"{name}: above: expected a parameter, got {spec.name}")
+            else:
+                _put_above(found, requests, spec.name, name, False)
+    for u in found.values():
+        if not u.lower < u.upper:
+            such = f"expected lower < upper, got {u.lower:g} and {u.upper:g}; fix it instead"
+            problems.append(f"{u.name}: {such}")
+        elif u.logarithmic and not u.above and not u.upper > 0:
+            such = f"expected positive bounds of a logarithm, got {u.lower:g} and {u.upper:g}"
+            problems.append(f"{u.name}: {such}")
+    refuse(problems)
+    return {n: u if u.partner else replace(u, start=_between(u)) for n, u in found.items()}
+
+
+def _first(draft: Draft, spec: Spec, problems: list[str]) -> Unknown:
+    """Return one unknown, without orders."""
+    unknown, lowest, highest = draft
+    low, high, start = unknown.lower, unknown.upper, unknown.start
+    logarithmic = unknown.logarithmic
+
+    def check(what: str, such: str, value: float) -> None:
+        if not lowest <= value <= highest:
+            such = f"expected {such} in [{lowest:g}, {highest:g}], got {value:g}"
+            problems.append(f"free {unknown.name}: {what}: {such}")
+
+    if isinstance(spec, Range):
+        for side, bound in (("lower", spec.lower), ("upper", spec.upper)):
+            if abs(bound) < inf:
+                low, high = lowest, highest
+                check(side, "a bound", bound)
+        low, high = max(low, spec.lower), min(high, spec.upper)
+        logarithmic = logarithmic if spec.logarithmic is None else spec.logarithmic
+    elif isinstance(spec, Above):
+        high = min(highest, spec.upper)
+    if not isinstance(spec, Tied) and spec.start is not None:
+        start = spec.start
+        check("start", "a value", start)
+        low, high = min(low, start), max(high, start)
+    if logarithmic and not start > 0:
+        start = sqrt(low * high) if low > 0 and high < inf else unknown.scale
+    return replace(unknown, start=start, lower=low, upper=high, logarithmic=logarithmic)
+
+
+def _order(
+    found: dict[str, Unknown], requests: Requests, held: Mapping[str, float], order: Order,
+    problems: list[str],
+) -> None:  # fmt: skip
+    """Enforce low <= high by a bound, or by a coordinate if both are free."""
+    low, high, strictly = order
+    step = 1 + 1e-6 * strictly
+    if high in found and low in found and not {low, high} & requests.ties.keys():
+        if found[low].upper > found[high].lower:
+            _put_above(found, requests, low, high, strictly)
+    elif high in found and low in held:
+        lower = max(found[high].lower, held[low] * step)
+        found[high] = replace(found[high], lower=lower)
+    elif low in found and high in held:
+        upper = min(found[low].upper, held[high] / step)
+        found[low] = replace(found[low], upper=upper)
+    elif low in held and high in held and held[low] > held[high]:
+        got = f"{low} = {held[low]:g} and {high} = {held[high]:g}"
+        problems.append(f"expected {low} <= {high}, got {got}")
+
+
+def _put_above(
+    found: dict[str, Unknown], requests: Requests, low: str, high: str, strictly: bool
+) -> None:
+    """Express `high` relative to `low`, or `low` relative to `high` if `high` has a lower bound."""
+    a, b = found[low], found[high]
+    spec = requests.free.get(high)
+    if isinstance(spec, Range) and spec.lower > a.lower:
+        # a lower value with its own upper bound keeps its box: no coordinate satisfies both,
+        # and trials out of order are refused when the law is made
+        if a.upper >= b.upper:
+            start = min(a.start, _between(b))
+            found[low] = replace(a, below=high, start=start, logarithmic=False)
+        found[high] = replace(b, start=_between(b))
+        return
+    upper = min(a.upper, b.upper / (1.01 if strictly else 1.0))
+    a = replace(a, lower=max(a.lower, b.lower), upper=upper)
+    a = replace(a, start=_between(a))
+    if not a.start < b.start:
+        if high in requests.started and low not in requests.started and b.start > 0:
+            a = replace(a, start=b.start / APART)
+        else:
+            b = replace(b, start=a.start * APART if a.start > 0 else a.start + b.scale)
+    found[low] = replace(a, start=_between(a))
+    both = strictly and a.logarithmic and b.logarithmic
+    found[high] = replace(b, above=low, logarithmic=both, scale=abs(b.start) or b.scale)
+
+
+def _between(unknown: Unknown) -> float:
+    """Return the start value, clipped to the bounds."""
+    return min(max(unknown.start, unknown.lower), unknown.upper)

@@ -8,15 +8,16 @@ from typing import NamedTuple, final
 import casadi as ca
 
 from identification.unknowns import roles
-from identification.unknowns.drafts import (
+from identification.unknowns.spec import (
     Draft,
     Requests,
+    Tied,
+    Unknown,
     drafted,
     of_parameter,
     of_variable,
     refuse,
 )
-from identification.unknowns.spec import Tied, Unknown
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.parameters import Variable, parameters, symbolise, with_values

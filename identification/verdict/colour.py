@@ -259,21 +259,15 @@ def whiteness(r: Array, J: Array, position: Count) -> Whiteness:
     if not lags or not power > 0:
         none = np.zeros(0)
         return Whiteness(none, none, none, none, 0.0, 1.0)
-    found, mean, spread = np.zeros(len(lags)), np.zeros(len(lags)), np.zeros(len(lags))
-    for i, lag in enumerate(lags):
-        pair = np.flatnonzero(position >= lag)
-        found[i] = float(r[pair] @ r[pair - lag]) / power
-        mean[i], spread[i] = _moments(Q, pair, lag)
+    pairs = [np.flatnonzero(position >= lag) for lag in lags]
+    each = [*zip(pairs, lags, strict=True)]
+    found = np.array([float(r[pair] @ r[pair - lag]) / power for pair, lag in each])
+    mean, spread = np.array([_moments(Q, pair, lag) for pair, lag in each]).T
     score = (found - mean) / spread
     statistic = float(score @ score)
-    return Whiteness(
-        np.array(lags, dtype=float),
-        found,
-        mean - 1.96 * spread,
-        mean + 1.96 * spread,
-        statistic,
-        float(chdtrc(len(lags), statistic)),
-    )
+    low, high = mean - 1.96 * spread, mean + 1.96 * spread
+    p = float(chdtrc(len(lags), statistic))
+    return Whiteness(np.array(lags, dtype=float), found, low, high, statistic, p)
 
 
 def _moments(Q: Array, pair: Count, lag: int) -> tuple[float, float]:

@@ -24,9 +24,8 @@ Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 
 Ljung, System Identification, 1999, section 16.6.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal, final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -49,9 +48,7 @@ MOVING = 1e-3
 """Speed below which there is no direction of motion, over the largest one."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Regressor:
+class Regressor(NamedTuple):
     """A signal that residuals may depend on, shape (n,), with its name and type."""
 
     name: str
@@ -59,9 +56,7 @@ class Regressor:
     kind: Kind = ""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Family:
+class Family(NamedTuple):
     """Columns that test for one type of dependence.
 
     Attributes:
@@ -81,60 +76,34 @@ def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Famil
     """Yield the families of all `regressors`, with fewer columns if there are few rows."""
     n = position.size
     delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
-    for one in regressors:
-        name, signal = one.name, one.signal
+    most = n // (2 * ROWS_EACH)
+    bins = max(2, min(BINS, most))
+    for name, signal, kind in regressors:
         if not np.ptp(signal) > 0:
             continue
-        if one.kind == "position":
-            yield _of_place(name, signal, n)
+        if kind == "position":
+            turns = 2 * np.pi * (signal - signal.min()) / np.ptp(signal)
+            waves = np.outer(turns, np.arange(1, max(1, min(HARMONICS, most)) + 1) / 2)
+            hint = "an effect of the position is missing: ripple, cogging, a spring, gravity"
+            columns = np.column_stack([np.cos(waves), np.sin(waves)])
+            yield Family(f"the position {name}", hint, columns)
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
         hint = f"dynamics or a delay from {name} is missing"
-        yield Family(f"the present and past of {name}", hint, columns, one.kind == "acceleration")
-        if one.kind == "velocity":
-            yield from _of_speed(name, signal, n)
-            if position.any():
-                since = _since_reversal(signal, position)
-                yield Family(
-                    f"the distance since {name} last changed its sign",
-                    "hysteresis or pre-sliding is not modelled",
-                    _bins(since, _way(signal), _count(n)),
-                )
-
-
-def _of_place(name: str, x: Array, n: int) -> Family:
-    turns = 2 * np.pi * (x - x.min()) / np.ptp(x)
-    orders = np.arange(1, max(1, min(HARMONICS, n // (2 * ROWS_EACH))) + 1) / 2
-    waves = np.outer(turns, orders)
-    return Family(
-        f"the position {name}",
-        "an effect of the position is missing: ripple, cogging, a spring, gravity",
-        np.column_stack([np.cos(waves), np.sin(waves)]),
-    )
-
-
-def _count(n: int) -> int:
-    """Return the number of bins in each direction for n rows."""
-    return max(2, min(BINS, n // (2 * ROWS_EACH)))
-
-
-def _of_speed(name: str, v: Array, n: int) -> Iterator[Family]:
-    size = np.abs(v).max()
-    yield Family(
-        f"the direction and size of {name}",
-        "the friction level or its dependence on the speed is wrong",
-        np.column_stack([_way(v), v * np.abs(v) / size**2, (v / size) ** 3, np.abs(v) / size]),
-    )
-    yield Family(
-        f"the speed {name}",
-        "the friction curve has another shape, such as a Stribeck peak",
-        _bins(np.abs(v), _way(v), _count(n)),
-    )
-
-
-def _way(v: Array) -> Array:
-    """Return the sign of v; 0 at standstill."""
-    return np.where(np.abs(v) > MOVING * np.abs(v).max(), np.sign(v), 0.0)
+        yield Family(f"the present and past of {name}", hint, columns, kind == "acceleration")
+        if kind != "velocity":
+            continue
+        speed, size = np.abs(signal), np.abs(signal).max()
+        way = np.where(speed > MOVING * size, np.sign(signal), 0.0)  # 0 at standstill
+        powers = (way, signal * speed / size**2, (signal / size) ** 3, speed / size)
+        hint = "the friction level or its dependence on the speed is wrong"
+        yield Family(f"the direction and size of {name}", hint, np.column_stack(powers))
+        hint = "the friction curve has another shape, such as a Stribeck peak"
+        yield Family(f"the speed {name}", hint, _bins(speed, way, bins))
+        if position.any():
+            columns = _bins(_since_reversal(signal, position), way, bins)
+            hint = "hysteresis or pre-sliding is not modelled"
+            yield Family(f"the distance since {name} last changed its sign", hint, columns)
 
 
 def _bins(signal: Array, way: Array, count: int) -> Array:
@@ -159,13 +128,18 @@ def _since_reversal(v: Array, position: Count) -> Array:
 
 
 POSITIONS, VELOCITIES = ("m", "rad"), ("m/s", "rad/s")
+KINDS: Mapping[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleration"}
+"""Types of regressors by the first part of their names."""
 
 
 def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
     """Return the regressors of a channel, and the simulated motion of its record."""
-    regressors = {n: Regressor(n, s, _kind(n)) for n, s in channel.regressors.items()}
+    regressors = dict[str, Regressor]()
+    for name, signal in channel.regressors.items():
+        stem = name.replace(".", "_").replace("[", "_").split("_")[0]
+        regressors[name] = Regressor(name, signal, KINDS.get(stem, ""))
     for other in found.channels:
-        if other.record != channel.record or not _same_times(other, channel):
+        if other.record != channel.record or not np.array_equal(other.t, channel.t):
             continue
         predicted = other.measured + found.raw[other.rows]
         if other.unit in VELOCITIES:
@@ -176,17 +150,6 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
             speed = _rate(predicted, other.t, positions(other))
             regressors.setdefault(rate, Regressor(rate, speed, "velocity"))
     return list(regressors.values())
-
-
-def _kind(name: str) -> Kind:
-    """Return the type of a regressor, deduced from its name."""
-    stem = name.replace(".", "_").replace("[", "_").split("_")[0]
-    kinds: dict[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleration"}
-    return kinds.get(stem, "")
-
-
-def _same_times(one: Channel, other: Channel) -> bool:
-    return one.t.size == other.t.size and bool(np.array_equal(one.t, other.t))
 
 
 def _rate(x: Array, t: Array, position: Count) -> Array:
@@ -206,34 +169,23 @@ MANY = 25
 """Rows for each column above which a model of the remaining residuals is reliable."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Dependence:
-    """Part of the residuals of one channel that one family explains.
+class Dependence(NamedTuple):
+    """Part of the residuals of one channel that added columns explain.
 
     Attributes:
-        what, hint: see `Family`.
         statistic: F.
-        columns: q.
         p: probability of a larger F without dependence.
         size: root mean square of the explained part of the residuals, in their unit.
-        share: its square over that of the residuals.
-        smoothed: see `Family`.
     """
 
-    what: str
-    hint: str
     statistic: float
-    columns: int
     p: float
     size: float
-    share: float
-    smoothed: bool
 
 
 def dependences(
     r: Array, J: Array, colour: Colour, regressors: Sequence[Regressor], position: Count
-) -> Iterator[Dependence]:
+) -> Iterator[tuple[Family, Dependence]]:
     """Test the residuals against every family of `regressors`.
 
     Args:
@@ -246,7 +198,6 @@ def dependences(
     if not np.any(r):
         return
     basis = span(J)
-    power = float(r @ r) / r.size
     for family in families(regressors, position):
         columns = family.columns - family.columns.mean(axis=0)
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
@@ -261,33 +212,12 @@ def dependences(
             if found.p < UNSURE and other.order:
                 other = autoregressive(rest, both, position)
                 found = _added(r, basis, columns, other.partial, position) or found
-        share = found.size**2 / power
-        yield Dependence(
-            what=family.what,
-            hint=family.hint,
-            statistic=found.statistic,
-            columns=found.q,
-            p=found.p,
-            size=found.size,
-            share=share,
-            smoothed=family.smoothed,
-        )
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Added:
-    """F of added columns, its p-value, their number, and the size of the explained part."""
-
-    statistic: float
-    p: float
-    q: int
-    size: float
+        yield family, found
 
 
 def _added(
     r: Array, basis: Array, columns: Array, partial: Array, position: Count
-) -> _Added | None:
+) -> Dependence | None:
     """Return F of `columns` added to `basis`, in noise with partial autocorrelations `partial`."""
     from scipy.special import fdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
@@ -302,17 +232,12 @@ def _added(
     explained = float(weights @ weights)
     left = max(float(rest @ rest) - explained, np.finfo(float).tiny)
     statistic = explained / q / (left / free)
-    size = _explained(columns, basis, clean, rest)
-    return _Added(statistic, float(fdtrc(q, free, statistic)), q, size)
+    weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
+    part = _without(basis, columns @ weights)  # of the residuals before whitening
+    size = float(np.sqrt(np.mean(part**2)))
+    return Dependence(statistic, float(fdtrc(q, free, statistic)), size)
 
 
 def _without(basis: Array, x: Array) -> Array:
     """Return x without its projection on an orthonormal basis."""
     return x - basis @ (basis.T @ x)
-
-
-def _explained(columns: Array, basis: Array, clean: Array, rest: Array) -> float:
-    """Return the root mean square of the explained part of the residuals, before whitening."""
-    weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
-    part = _without(basis, columns @ weights)
-    return float(np.sqrt(np.mean(part**2)))

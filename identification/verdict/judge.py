@@ -31,7 +31,7 @@ from identification.residuals.sampled import moving_start
 from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour, Whiteness, whiteness
 from identification.verdict.covariance import sandwich
-from identification.verdict.independence import Dependence, dependences, inputs_of
+from identification.verdict.independence import Dependence, Family, dependences, inputs_of
 from identification.verdict.minimum import Minimum, minimum, positions
 from symfric.foundation.status import Status
 
@@ -78,23 +78,18 @@ def beginnings(found: Minimum) -> Iterator[str]:
     at the beginning for another reason, such as a decay from its largest swing, looks the same.
     """
     for channel in found.channels:
-        ratio, count = _ratio(found, channel)
+        v, r = channel.regressors.get("v"), found.r[channel.rows]
+        count = int(FIRST * r.size)
+        if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
+            continue
+        first, later = (float(np.sqrt(np.mean(part**2))) for part in (r[:count], r[count:]))
+        ratio = first / max(later, 1e-300)
         if ratio > LARGER:
             yield (
                 f"The residuals of {found.label(channel)} are {ratio:.2g} times as large in its "
                 f"first {count} samples as after: the record starts under load or in another "
                 "unknown state; start it in sliding, or unloaded."
             )
-
-
-def _ratio(found: Minimum, channel: Channel) -> tuple[float, int]:
-    """Return the ratio of initial to later residuals, and the number of initial samples."""
-    v, r = channel.regressors.get("v"), found.r[channel.rows]
-    count = int(FIRST * r.size)
-    if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
-        return 0.0, count
-    first, later = (float(np.sqrt(np.mean(part**2))) for part in (r[:count], r[count:]))
-    return first / max(later, 1e-300), count
 
 
 ALARM = 0.02
@@ -195,7 +190,7 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
     inside = sandwich(found)
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
-    each = list[tuple[Channel, list[Dependence]]]()
+    each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
     for channel, colour in zip(found.channels, inside.colours, strict=True):
         name = found.label(channel)
         effective[name] = colour.effective
@@ -212,7 +207,8 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
     tests += _explained(found)
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
     nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
-    bounds = tuple(_bounds(found))
+    at = _at_bound(found)
+    bounds = [f"Values at a bound: {', '.join(at)}."] if at else []
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
     messages = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)
@@ -238,31 +234,24 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
 
 
 def _independent(
-    found: Minimum, channel: Channel, some: list[Dependence], limit: float
+    found: Minimum, channel: Channel, some: list[tuple[Family, Dependence]], limit: float
 ) -> Iterator[Test]:
     """Yield one test for each family; effects below the resolution or with a small share pass."""
-    name, unit = found.label(channel), channel.unit
-    fine = resolution(channel.measured, channel.unit)
-    level = _level(found, channel)
-    for d in some:
-        size = d.size * level
-        least = SMOOTHED * float(np.ptp(channel.measured)) if d.smoothed else fine
-        passed = d.p >= limit or size <= least or d.share < SHARE
+    name, unit, r = found.label(channel), channel.unit, found.r[channel.rows]
+    fine, weighted = resolution(channel.measured, channel.unit), float(np.linalg.norm(r))
+    level = float(np.linalg.norm(found.raw[channel.rows])) / weighted if weighted > 0 else 1.0
+    for family, (statistic, p, explained) in some:
+        size, share = explained * level, explained**2 / (float(r @ r) / r.size)
+        least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
+        passed = p >= limit or size <= least or share < SHARE
         text = (
-            f"The residuals of {name} depend on {d.what}: {size:.2g} {unit} rms, "
-            f"{100 * min(d.share, 1.0):.0f} % of their variance ({d.hint})."
+            f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
+            f"{100 * min(share, 1.0):.0f} % of their variance ({family.hint})."
         )
         if passed:
-            text = f"The residuals of {name} do not depend on {d.what}."
-        test = f"independence of {d.what}"
-        yield Test(name, test, d.statistic, d.p, limit, passed, True, text)
-
-
-def _level(found: Minimum, channel: Channel) -> float:
-    """Return the unit of the signal over that of the weighted residuals."""
-    raw, r = found.raw[channel.rows], found.r[channel.rows]
-    size = float(np.linalg.norm(r))
-    return float(np.linalg.norm(raw)) / size if size > 0 else 1.0
+            text = f"The residuals of {name} do not depend on {family.what}."
+        test = f"independence of {family.what}"
+        yield Test(name, test, statistic, p, limit, passed, True, text)
 
 
 def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
@@ -345,9 +334,3 @@ def _no_mass(found: Minimum) -> Iterator[str]:
 def _at_bound(found: Minimum) -> list[str]:
     both = zip(found.unknowns, found.held, strict=True)
     return [u.name for u, held in both if held and not u.nuisance]
-
-
-def _bounds(found: Minimum) -> Iterator[str]:
-    at = _at_bound(found)
-    if at:
-        yield f"Values at a bound: {', '.join(at)}."

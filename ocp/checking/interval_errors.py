@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
-from ocp.transcription.blocks import Entries, Piece, Selection
-from ocp.transcription.schemes import split
-from ocp.transcription.transcription import LARGEST, Transcription
-from ocp.transcription.unknowns import SpanLayout
+from ocp.transcription.blocks import Entries
+from ocp.transcription.program import Iterate
+from ocp.transcription.transcribe import Transcription
 from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate_many
 from symfric.model import Model
@@ -59,7 +58,12 @@ def cut_meshes(
         error = np.max([errors[k] for k in range(number % phases, len(meshes), phases)], axis=0)
         shares = np.where(np.isfinite(error), error / allowed, float(most) ** order)
         parts = np.clip(np.ceil(shares ** (1 / order)), 2, most)
-        made.append(split(mesh, np.where(shares > 1.0, parts, 1).astype(int).tolist()))
+        counts = np.where(shares > 1.0, parts, 1).astype(int)
+        pieces = [
+            np.linspace(low, high, n, endpoint=False)
+            for low, high, n in zip(mesh[:-1], mesh[1:], counts, strict=True)
+        ]
+        made.append(np.concatenate([*pieces, mesh[-1:]]))
     return made
 
 
@@ -93,41 +97,24 @@ def _local(model: Model) -> Model:
     """
     kept = model.memory.get("ocp local")
     if kept is None:
-        kept = model
-        if ca.depends_on(ca.vertcat(_explicit(model), model.alg), model.t):
-            kept = _from_zero(model)
+        kept, ode = model, ca.SX(0, 1) if model.ode is None else model.ode
+        if ca.depends_on(ca.vertcat(ode, model.alg), model.t):
+            taken = {v.name for group in (model.x, model.z, model.u, model.p) for v in group}
+            names = (f"t_node{'_' * k}" for k in range(len(taken) + 1))
+            begin = Variable(next(name for name in names if name not in taken), "s")
+            ode, alg = ca.substitute([ode, model.alg], [model.t], [model.t + begin.symbol])
+            x, z, u, p = model.x, model.z, model.u, (*model.p, begin)
+            name = f"{model.name}_from_each_node"
+            kept = Model(name, x=x, z=z, u=u, p=p, ode=ode, alg=alg, t=model.t)
         model.memory["ocp local"] = kept
     return kept
 
 
-def _explicit(model: Model) -> ca.SX:
-    return ca.SX(0, 1) if model.ode is None else model.ode
-
-
-def _from_zero(model: Model) -> Model:
-    taken = {v.name for group in (model.x, model.z, model.u, model.p) for v in group}
-    names = (f"t_node{'_' * k}" for k in range(len(taken) + 1))
-    begin = Variable(next(name for name in names if name not in taken), "s")
-    old, new = [model.t], [model.t + begin.symbol]
-    ode, alg = ca.substitute([_explicit(model), model.alg], old, new)
-    return Model(
-        f"{model.name}_from_each_node",
-        x=model.x,
-        z=model.z,
-        u=model.u,
-        p=(*model.p, begin),
-        ode=ode,
-        alg=alg,
-        t=model.t,
-    )
-
-
-def zoh_losses(transcription: Transcription, w: Array, lam_g: Array) -> tuple[Array, ...]:
+def zoh_losses(transcription: Transcription, iterate: Iterate) -> tuple[Array, ...]:
     """Estimate the reduction of J with inputs free to vary in each interval, (N,) for each phase.
 
     With costates lam the minimum principle requires of the input at every time what a held input
     satisfies only on average. The loss is, to second order in the length h,
-    held can give on the average only. What is lost is, to second order in the length h,
 
         E_k = sum_j w_j (H(u_k) - min_u H(u)),   H(u) = H + H_u (u - u_k) + H_uu (u - u_k)^2 / 2
 
@@ -138,7 +125,7 @@ def zoh_losses(transcription: Transcription, w: Array, lam_g: Array) -> tuple[Ar
 
     Args:
         transcription: the solved transcription.
-        w, lam_g: unknowns and multipliers of the rows at a solution.
+        iterate: unknowns and multipliers of the rows at a solution.
 
     Returns:
         For each phase, in units of J; zeros without collocation points (shooting) or without
@@ -148,30 +135,22 @@ def zoh_losses(transcription: Transcription, w: Array, lam_g: Array) -> tuple[Ar
     is too large by a factor of up to 4.
     """
     losses: list[Array] = []
-    layout = transcription.layout
-    slopes = [_slopes(transcription, w, lam_g, i) for i in range(len(layout.spans))]
-    for number, own in enumerate(layout.spans):
+    spans = transcription.layout.spans
+    slopes = [_slopes(transcription, iterate, number) for number in range(len(spans))]
+    for number, own in enumerate(spans):
         loss = np.zeros(own.intervals)
         for columns in own.u:
-            owners = list(_sharing(layout.spans, columns))
-            if not own.degree or owners[0][0] != number:
-                continue
-            H_u = sum(slopes[other][0][row] for other, row in owners)
-            H_uu = sum(slopes[other][1][row] for other, row in owners)
-            low, high = _reach(transcription, w, columns)
-            loss += _drop(np.asarray(H_u), np.asarray(H_uu), low, high)
+            sharing = [  # (span, input) with the same unknowns
+                (k, i)
+                for k, other in enumerate(spans)
+                for i, row in enumerate(other.u)
+                if np.array_equal(row, columns)
+            ]
+            if own.degree and sharing[0][0] == number:
+                H_u, H_uu = (np.sum([slopes[k][n][i] for k, i in sharing], axis=0) for n in (0, 1))
+                loss += _drop(H_u, H_uu, *_reach(transcription, iterate.w, columns))
         losses.append(loss)
     return tuple(losses)
-
-
-def _sharing(
-    spans: tuple[SpanLayout, ...], columns: NDArray[np.int64]
-) -> Iterator[tuple[int, int]]:
-    """Yield (span, input) of all inputs with the same unknowns."""
-    for number, own in enumerate(spans):
-        for i, other in enumerate(own.u):
-            if np.array_equal(other, columns):
-                yield number, i
 
 
 def _drop(H_u: Array, H_uu: Array, low: Array, high: Array) -> Array:
@@ -199,50 +178,41 @@ def _reach(
     return np.minimum(low - u, 0.0), np.maximum(high - u, 0.0)
 
 
-def _slopes(
-    transcription: Transcription, w: Array, lam_g: Array, number: int
-) -> tuple[Array, Array]:
+def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tuple[Array, Array]:
     """Return H_u and H_uu of each input at the collocation points of a phase, (nu, N, d) each."""
-    own = transcription.layout.spans[number]
-    nu, N, d = *own.u.shape, own.degree
-    skeleton = transcription.skeleton
-    mine = (i for i, piece in enumerate(skeleton.pieces) if piece.span == number)
-    at = next((i for i in mine if _of_points(skeleton.pieces[i], N * d)), -1)
-    piece = skeleton.pieces[at]
-    if at < 0 or piece.block is None or piece.selection is None:
-        return np.zeros((nu, N, 0)), np.zeros((nu, N, 0))
-    block, lam = piece.block, lam_g[skeleton.assembled.at[at]]
-    inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(nu)
-    v = _local_unknowns(piece.selection, block.n, w)
-    theta = ca.Function("theta", [skeleton.p], [piece.theta])(transcription.program.values)
-    sigma, places = _weight(transcription, lam_g, number), v.shape[1]
-    arguments = [ca.DM(v), ca.DM(theta)]
-    H_u = np.zeros((nu, places))
+    skeleton, own = transcription.skeleton, transcription.layout.spans[number]
+    shape = (*own.u.shape, own.degree)
+    pairs = zip(skeleton.pieces, skeleton.assembled.at, strict=True)
+    equations = (
+        (piece, at)
+        for piece, at in pairs
+        if piece.span == number and any(n.startswith("the equation of") for n in piece.names)
+    )
+    piece, at = next(equations, (skeleton.pieces[0], np.zeros(0, np.int64)))
+    block, selection, places = piece.block, piece.selection, piece.places
+    if not at.size or block is None or selection is None:
+        return np.zeros(shape), np.zeros(shape)
+    lam, sigma = iterate.lam_g[at], _weight(transcription, iterate.lam_g, number)
+    v = np.zeros((block.n, places))
+    np.add.at(v, selection.local, (selection.weights * iterate.w[selection.columns]).T)
+    theta = ca.Function("theta", [skeleton.program.p], [piece.theta])(transcription.program.values)
+    inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(shape[0])
+    H_u, H_uu = np.zeros((shape[0], places)), np.zeros((shape[0], places))
+
+    def mapped(function: ca.Function, *more: ca.DM) -> Array:
+        """Return the last output of a function of the block at all places."""
+        return np.array(function.map(places).call([ca.DM(v), ca.DM(theta), *more])[-1])
+
     if block.share is not None:
-        (dq,) = _mapped(block.slopes, places, arguments)
-        for _, j, values in _entries(block.of_slopes, dq, inputs):
+        for _, j, values in _entries(block.of_slopes, mapped(block.slopes), inputs):
             H_u[j] += sigma * values
-    _, dr = _mapped(block.jacobian, places, arguments)
-    for row, j, values in _entries(block.of_jacobian, dr, inputs):
+    for row, j, values in _entries(block.of_jacobian, mapped(block.jacobian), inputs):
         H_u[j] += lam[row] * values
-    arguments += [ca.DM(np.full((1, places), sigma)), ca.DM(lam)]
-    (second,) = _mapped(block.hessian, places, arguments)
-    H_uu = np.zeros((nu, places))
+    second = mapped(block.hessian, ca.DM(np.full((1, places), sigma)), ca.DM(lam))
     for row, j, values in _entries(block.of_hessian, second, inputs):
         if row == inputs[j]:
             H_uu[j] += values
-    return H_u.reshape(nu, N, d), H_uu.reshape(nu, N, d)
-
-
-def _of_points(piece: Piece, count: int) -> bool:
-    """Return True for equations at the collocation points, False for loop constraints."""
-    equations = any(name.startswith("the equation of") for name in piece.names)
-    return piece.block is not None and piece.places == count and equations
-
-
-def _mapped(function: ca.Function, places: int, arguments: list[ca.DM]) -> list[Array]:
-    """Return the outputs of a function of the block at all places."""
-    return [np.array(part) for part in function.map(places).call(arguments)]
+    return H_u.reshape(shape), H_uu.reshape(shape)
 
 
 def _entries(
@@ -256,20 +226,9 @@ def _entries(
         yield int(entries.rows[e]), int(entries.columns[e] - columns[0]), values[e]
 
 
-def _local_unknowns(selection: Selection, n: int, w: Array) -> Array:
-    """Return the local unknowns at all places, (n, places)."""
-    v = np.zeros((n, selection.columns.shape[0]))
-    np.add.at(v, selection.local, (selection.weights * w[selection.columns]).T)
-    return v
-
-
 def _weight(transcription: Transcription, lam_g: Array, number: int) -> float:
     """Return the weight of a phase's cost in J: of the mean, or the multiplier of the largest."""
-    problem = transcription.problem
-    phases = len(problem.chain)
-    if problem.kind == "mean":
-        return phases / len(problem.spans)
-    if problem.kind == "sum":
-        return 1.0
-    rows = [i for i, place in enumerate(transcription.program.rows) if place.name == LARGEST]
-    return float(lam_g[rows[number // phases]])
+    problem, phases = transcription.problem, len(transcription.problem.chain)
+    if problem.kind == "worst":
+        return float(lam_g[transcription.skeleton.largest[number // phases]])
+    return phases / len(problem.spans) if problem.kind == "mean" else 1.0

@@ -3,29 +3,27 @@
 A mesh is refined where necessary, and stays as coarse as possible elsewhere.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from math import ceil, inf, sqrt
 from time import perf_counter
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
-from ocp.checking.verify import TOLERANCE, left_between, near_runs
+from ocp.checking.verify import TOLERANCE, left_between, restarted
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solver, solve_on
-from ocp.solving.prepared import Prepared
-from ocp.solving.solution import Solution
-from ocp.solving.starts import Start
-from ocp.transcription.program import Report, in_stage
+from ocp.solving.one_solve import Solved, Solver
+from ocp.solving.prepared import Clock, Prepared
+from ocp.solving.solution import Solution, with_sentence
+from ocp.solving.starts import Start, start_of
+from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme, Shooting
-from ocp.transcription.transcribe import Discretisation, discretise
-from ocp.transcription.transcription import Skeleton
-from symfric.foundation.shown import brief
+from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
@@ -40,10 +38,8 @@ STEEPEST = 2.0
 SAME_NUMBER = 0.4
 """A mesh that needs no more intervals keeps its number down to this share, which avoids rebuilding
 everything that depends on the number."""
-Limit = Callable[[Prepared], Prepared]
 LATER = 1e-2
 """Initial barrier parameter of Ipopt for all passes but the first, which start near a solution."""
-STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 CAP = 150
 """Largest number of iterations on a mesh that only shows where to refine."""
 FULL = 0.9
@@ -52,22 +48,18 @@ LEAST_TRUST = 0.2
 """Least trust in loss estimates, which active path conditions make too large."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class MeshErrors:
+class MeshErrors(NamedTuple):
     """Errors of the intervals of one phase.
 
     Attributes:
         local: relative local error of each interval, shape (N,).
         losses: cost lost in each of them by holding the inputs (see `zoh_losses`).
-        outside: mask of intervals that violate a bound between the nodes.
+        outside: mask of intervals that violate a bound between the nodes; None for none.
     """
 
     local: Array
     losses: Array
-    outside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    __repr__ = brief
+    outside: NDArray[np.bool_] | None = None
 
 
 def refined(
@@ -111,7 +103,7 @@ def refined(
         excess = 2.0 * np.where(np.isfinite(own.local), own.local, 1e30 * local) / local
         n = np.where(excess > 1.0, excess ** (2.0 / (order + 1)), excess ** (1.0 / (order + 1)))
         n = np.maximum(np.minimum(n, GROWTH), lost * share * root)
-        if own.outside.size:
+        if own.outside is not None:
             n = np.where(own.outside, np.maximum(n, 2.0), n)
         parts.append(_graded(np.clip(n, LEAST_PARTS, MOST_PARTS), np.diff(mesh)))
     shrink = min(1.0, most / sum(float(n.sum()) for n in parts))
@@ -135,9 +127,7 @@ def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
     """Return nodes at equal amounts of `parts`, with integer counts between kept fractions."""
     done = np.concatenate([[0.0], np.cumsum(parts)])
     at = np.interp(keep, mesh, done)
-    wanted = np.diff(at)
-    scale = 1.0
-    old = mesh.size - 1
+    wanted, old, scale = np.diff(at), mesh.size - 1, 1.0
     if SAME_NUMBER * old <= sum(map(ceil, wanted)) <= old:
         scale = old / max(float(wanted.sum()), 1e-9)
     counts = [max(1, ceil(scale * n - 1e-9)) for n in wanted]
@@ -148,8 +138,7 @@ def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
         for low, high, n in zip(at[:-1], at[1:], counts, strict=True)
     ]
     new = np.concatenate([*pieces, [1.0]])
-    first = np.cumsum([0, *counts[:-1]])
-    new[first] = keep[:-1]
+    new[np.cumsum([0, *counts[:-1]])] = keep[:-1]
     return new
 
 
@@ -196,7 +185,7 @@ def refined_solve(
     progress: Report | None = None,
     *,
     goals: Goals | None = None,
-    limit: Limit = lambda prepared: prepared,
+    clock: Clock | None = None,
 ) -> Solution:
     """Solve repeatedly, each time on meshes derived from the remaining errors.
 
@@ -212,7 +201,7 @@ def refined_solve(
         guess: see `ocp.solving.starts`.
         progress: called with a `Progress` after each iteration.
         goals: default: for a verification within 1e-3.
-        limit: function applied to the solver before each solve, such as a time limit.
+        clock: time limit.
 
     Returns:
         The last solution that the solver reports as solved, with the statistics of all passes; the
@@ -220,29 +209,27 @@ def refined_solve(
         one. A mesh that did not become fine enough is not a failure: the verification evaluates
         the result.
     """
-    goals = Goals.of(TOLERANCE) if goals is None else goals
-    solver = Ipopt() if solver is None else solver
     begin = perf_counter()
-    made = discretise(problem, Radau() if scheme is None else scheme)
-
+    goals, clock = goals or Goals.of(TOLERANCE), clock or Clock()
+    solver, made = solver or Ipopt(), discretise(problem, scheme or Radau())
     ready: dict[tuple[Skeleton, bool, bool], Prepared] = {}
 
-    def on(meshes: Sequence[Array], guess: Start, number: int, capped: bool) -> Solution:
+    def solved(meshes: Sequence[Array], guess: Start, number: int, capped: bool) -> Solution:
         began = begin if number == 1 else perf_counter()
         transcription = made.on(meshes)
         key = (transcription.skeleton, number == 1, capped)
         if key not in ready:  # on as many intervals the program is the same
             later = _later(problem, solver, number, capped)
             ready[key] = later.prepared(transcription.program)
-        built = perf_counter() - began
-        stage = in_stage(progress, f"mesh {number}")
-        new = solve_on(transcription, limit(ready[key]), guess, stage)
-        own = replace(new.statistics, build_time=new.statistics.build_time + built)
-        return replace(new, statistics=own)
+        start, warm = start_of(transcription, guess)
+        stage = f"mesh {number}"
+        outcome = clock.run(
+            transcription, ready[key], start, progress, stage, warm=warm, begin=began
+        )
+        return Solved(transcription, outcome).solution
 
-    new = found = on(meshes, guess, 1, capped=False)
-    statistics, state = found.statistics, Excess()
-    capped = False
+    new = best = solved(meshes, guess, 1, capped=False)
+    statistics, state, capped = best.statistics, Excess(), False
     for number in range(2, goals.passes + 1):
         spent = capped and goals.patient and new.status is Status.MAX_ITERATIONS
         if not new.ok and not spent:
@@ -251,25 +238,19 @@ def refined_solve(
         full = sum(mesh.size - 1 for mesh in new.meshes) >= FULL * goals.most
         fine = not finer or (state.stuck and full)
         if fine and new.ok:
-            found = _told(found, state)
+            if state.loss > state.allowed:
+                share = f"{100 * state.loss / abs(best.cost):.1g} %"
+                text = f"Inputs that vary in the intervals would lower the cost by about {share}."
+                best = with_sentence(best, text)
             break
         capped = not fine and number < goals.passes
-        new = on(new.meshes if fine else finer, new, number, capped)
+        new = solved(new.meshes if fine else finer, new, number, capped)
         statistics = statistics.then(new.statistics)
-        if new.status in STOPPED:
-            said = f"{new.message} The result is the solution on the previous mesh."
-            found = replace(found, status=new.status, message=said, cause=new.cause)
-        found = new if new.ok else found
-    return replace(found, statistics=statistics)
-
-
-def _told(solution: Solution, state: "Excess") -> Solution:
-    """Return `solution` with a message on the cost of holding the inputs, if it is too large."""
-    if state.loss <= state.allowed:
-        return solution
-    share = state.loss / abs(solution.cost)
-    said = f"Inputs that vary in the intervals would lower the cost by about {100 * share:.1g} %."
-    return replace(solution, message=f"{solution.message} {said}")
+        if new.status.stopped:
+            message = f"{new.message} The result is the solution on the previous mesh."
+            best = replace(best, status=new.status, message=message, cause=new.cause)
+        best = new if new.ok else best
+    return replace(best, statistics=statistics)
 
 
 def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solver:
@@ -279,7 +260,7 @@ def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solve
     later: dict[str, float] = {"max_iter": CAP} if capped else {}
     if problem.kind != "worst":  # its multipliers must converge
         later["mu_init"] = LATER
-    return solver.with_options(**{k: v for k, v in later.items() if k not in solver.options})
+    return solver.with_options(**(later | dict(solver.options)))
 
 
 @final
@@ -323,26 +304,22 @@ class Excess:
 
 
 def finer_meshes(
-    made: Discretisation, solution: Solution, goals: Goals, before: Excess | None = None
+    made: Discretisation, solution: Solution, goals: Goals, before: Excess
 ) -> tuple[tuple[Array, ...], Excess]:
     """Return refined meshes, empty if the goals are reached, and the excess over the goals."""
     problem, phases = made.problem, len(made.problem.chain)
     arcs = arcs_of(problem, solution.meshes, solution.points)
     local = local_errors(arcs, min(1e-6, 0.1 * goals.local))
-    losses = tuple(np.zeros(arc.intervals) for arc in arcs)
-    if not isinstance(made.scheme, Shooting):
-        iterate = solution.iterate
-        losses = zoh_losses(made.on(solution.meshes), iterate.w, iterate.lam_g)
+    losses = zoh_losses(made.on(solution.meshes), solution.iterate)
     allowed = goals.loss * abs(solution.cost)
     worst = max(float(e.max(initial=0.0)) for e in local) / goals.local
     lost = sum(float(loss.sum()) for loss in losses)
-    now = (before or Excess()).then(worst, lost, solution.cost, allowed)
-    intervals = sum(mesh.size - 1 for mesh in solution.meshes[:phases])
+    now = before.then(worst, lost, solution.cost, allowed)
     statistics = solution.statistics
-    room = goals.nonzeros / (statistics.jacobian_nonzeros + statistics.hessian_nonzeros)
-    fine = worst <= 1.0 and (now.loss <= allowed or not allowed or room < 1 / FULL)
+    spare = goals.nonzeros / (statistics.jacobian_nonzeros + statistics.hessian_nonzeros)
+    fine = worst <= 1.0 and (now.loss <= allowed or not allowed or spare < 1 / FULL)
     outside = _outside(arcs, goals) if fine else None
-    if fine and not any(bool(o.any()) for o in outside or ()):
+    if outside is not None and not any(bool(mask.any()) for mask in outside):
         return (), now
     errors: list[MeshErrors] = []
     for phase in range(phases):  # all scenarios have the same mesh
@@ -351,7 +328,7 @@ def finer_meshes(
             MeshErrors(
                 np.max([local[k] for k in of], axis=0),
                 now.trust * np.sum([losses[k] for k in of], axis=0),
-                np.any([outside[k] for k in of], axis=0) if outside else np.zeros(0, dtype=bool),
+                np.any([outside[k] for k in of], axis=0) if outside else None,
             )
         )
     new = refined(
@@ -362,14 +339,17 @@ def finer_meshes(
         loss=0.8 * allowed,
         order=4 if isinstance(made.scheme, Shooting) else made.scheme.order,
         most=goals.most,
-        for_loss=room * intervals,
+        for_loss=spare * sum(mesh.size - 1 for mesh in solution.meshes[:phases]),
     )
     return new * (len(arcs) // phases), now
 
 
-def _outside(arcs: Sequence[Arc], goals: Goals) -> tuple[NDArray[np.bool_], ...]:
-    """Return masks of the intervals that violate a bound between their nodes."""
-    found = [np.zeros(arc.intervals, dtype=bool) for arc in arcs]
-    for run in near_runs(arcs, 10 * goals.local):
-        found[run.arc.number] |= left_between(run, goals.outside)
-    return tuple(found)
+def _outside(arcs: Sequence[Arc], goals: Goals) -> list[NDArray[np.bool_]]:
+    """Return masks of the intervals that violate a bound between their nodes.
+
+    The runs start at optimised nodes and stay near the optimised motion.
+    """
+    masks = [np.zeros(arc.intervals, dtype=bool) for arc in arcs]
+    for run in restarted(arcs, 10 * goals.local)[0]:
+        masks[run.arc.number] |= left_between(run, goals.outside)
+    return masks

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Span, clipped
 from ocp.formulation.problem import Problem
 from ocp.transcription.unknowns import Points
 from symfric.foundation.variable import stacked
@@ -54,11 +54,6 @@ class Arc:
     p: Array
 
     @property
-    def end(self) -> float:
-        """Last time [s]."""
-        return self.begin + self.T
-
-    @property
     def intervals(self) -> int:
         """Number N of intervals."""
         return self.mesh.size - 1
@@ -67,7 +62,7 @@ class Arc:
     def times(self) -> Array:
         """Times of the nodes [s], shape (N + 1,)."""
         times = self.begin + self.T * self.mesh
-        times[-1] = self.end
+        times[-1] = self.begin + self.T
         return times
 
     @cached_property
@@ -83,41 +78,21 @@ class Arc:
 
     def parameters(self) -> dict[str, float]:
         """Return parameters by name, clipped to their bounds against rounding errors."""
-        return {
-            v.name: min(max(float(x), v.lower), v.upper)
-            for v, x in zip(self.span.model.p, self.p, strict=True)
-        }
+        pairs = zip(self.span.model.p, self.p, strict=True)
+        return {v.name: clipped(float(x), (v.lower, v.upper)) for v, x in pairs}
 
 
 def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[Arc, ...]:
     """Return the arcs of a solver's result, in the order of `problem.spans`."""
-    found: list[Arc] = []
-    for number, (span, mesh, own) in enumerate(
-        zip(problem.spans, meshes, points.spans, strict=True)
-    ):
-        begin = found[-1].end if span.phase else 0.0
-        p = _chosen(span, points.chosen)
-        found.append(
-            Arc(
-                number=number,
-                span=span,
-                begin=begin,
-                T=own.T,
-                mesh=np.asarray(mesh),
-                nodes=own.nodes,
-                u=own.u,
-                p=p,
-            )
-        )
-    return tuple(found)
-
-
-def _chosen(span: Span, chosen: Mapping[str, float]) -> Array:
-    """Return parameters of the model, with the chosen ones."""
-    taken = {name: chosen[name] for name in span.chosen if name in chosen}
-    return np.array(
-        [taken.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)], dtype=float
-    )
+    arcs: list[Arc] = []
+    every = enumerate(zip(problem.spans, meshes, points.spans, strict=True))
+    for number, (span, mesh, own) in every:
+        begin = float(arcs[-1].times[-1]) if span.phase else 0.0
+        chosen = {name: points.chosen[name] for name in span.chosen if name in points.chosen}
+        p = [chosen.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
+        mesh, p = np.asarray(mesh), np.array(p, dtype=float)
+        arcs.append(Arc(number, span, begin, own.T, mesh, own.nodes, own.u, p))
+    return tuple(arcs)
 
 
 @final
@@ -165,11 +140,16 @@ class Run:
 
     def of(self, column: ca.SX, times: Array | float) -> Array:
         """Return values of a column of expressions in the symbols of the model, shape (rows, n)."""
-        at = np.atleast_1d(times)
-        rows = column.numel()
+        at, rows = np.atleast_1d(times), column.numel()
         if not rows:
             return np.zeros((0, at.size))
         return np.reshape(self.trajectory.of(ca.densify(column), at), (rows, at.size))
+
+    def signals(self, time: float) -> list[Array]:
+        """Return [t, x, z, u, p] at one time."""
+        model = self.arc.span.model
+        values = [self.of(model.vector(letter), time)[:, 0] for letter in "xzu"]
+        return [np.array([time]), *values, self.arc.p]
 
     def integral(self, expression: ca.SX) -> float:
         """Integrate an expression over the run, by Gauss quadrature over every accepted step."""
@@ -198,44 +178,30 @@ def resimulated(
     """
     runs: list[Run] = []
     for arc in arcs:
-        before = runs[-1] if arc.span.phase and runs else None
-        if arc.span.phase and (before is None or not before.ok or _behind(before, arc)):
-            continue
-        start = start_after(arc, before)
-        made = run_from(arc, 0, start, rtol) if follow is None else follow(arc, start)
+        start, links = arc.state(0), arc.span.links
+        if arc.span.phase:
+            before = runs[-1] if runs else None
+            if before is None or not before.ok or before.arc.number != arc.number - 1:
+                continue
+            ends = before.of(stacked(link.expression for link in links), before.end)[:, 0]
+            start |= {link.state: float(x) for link, x in zip(links, ends, strict=True)}
+        made = follow(arc, start) if follow else run_from(arc, 0, start, rtol)
         runs += [] if made is None else [made]
     return tuple(runs)
 
 
 def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> Run:
     """Simulate from a node to the end of the arc."""
-    times = arc.times[node:]
-    u = {
-        v.name: Hold(times[:-1], row[node:]) for v, row in zip(arc.span.model.u, arc.u, strict=True)
-    }
+    times, model = arc.times[node:], arc.span.model
     trajectory = simulate(
-        arc.span.model,
+        model,
         float(times[-1]),
         t_start=float(times[0]),
         x0=dict(start),
-        u=u,
+        u={v.name: Hold(times[:-1], row[node:]) for v, row in zip(model.u, arc.u, strict=True)},
         p=arc.parameters(),
         rtol=rtol,
         times=times[1:-1],
         throw=False,
     )
     return Run(arc, trajectory, float(times[-1]))
-
-
-def _behind(run: Run, arc: Arc) -> bool:
-    """Return True if `run` does not belong to the phase before `arc`, which was left out."""
-    return (run.arc.span.scenario, run.arc.span.phase) != (arc.span.scenario, arc.span.phase - 1)
-
-
-def start_after(arc: Arc, before: Run | None) -> dict[str, float]:
-    """Return the start of the model."""
-    start = arc.state(0)
-    if before is not None and arc.span.links:
-        ends = before.of(stacked(link.expression for link in arc.span.links), before.end)
-        start |= {link.state: float(x) for link, x in zip(arc.span.links, ends[:, 0], strict=True)}
-    return start

@@ -4,10 +4,10 @@ Conditions are evaluated on simulated runs: at nodes, and everywhere between.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby, pairwise
 from math import isfinite
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
-from ocp.checking.verification import Miss, Verification
-from ocp.formulation.phase import FREE, Box, Row, fixed
+from ocp.formulation.phase import FREE, Box, fixed, size_of
 from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
+from ocp.solving.verification import Miss, Verification
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 from symfric.foundation.variable import stacked
@@ -26,7 +26,6 @@ from symfric.foundation.variable import stacked
 Array = NDArray[np.float64]
 CLOSER, PARTS = 2, 16
 """Refinements of the worst time, and parts of its neighbourhood in each."""
-PLACES = {0.0: "start", 1.0: "end"}
 TOLERANCE = 1e-3
 """Default of the largest permitted relative miss."""
 SMALL = 0.1
@@ -34,119 +33,49 @@ SMALL = 0.1
 MOST_RESTARTS = 60
 
 
-def at_nodes(run: Run) -> Iterator[Miss]:
-    """Yield the misses of states and rows at the start, the via points and the end of a phase."""
+def _miss(
+    what: str, name: str, time: float, value: float, box: Box, size: float, unit: str = ""
+) -> Miss:
+    """Return a condition with the nearest value in its range."""
+    wanted = min(max(value, box[0]), box[1]) if value == value else box[0]
+    return Miss(what, name, float(time), float(value), float(wanted), float(size), unit)
+
+
+def _at_nodes(run: Run) -> Iterator[Miss]:
+    """Yield the misses of states and rows at the start, the via points and the end of a phase.
+
+    Inputs and algebraic variables in rows are those of the interval before.
+    """
     arc, span = run.arc, run.arc.span
     for fraction, boxes in span.nodes.items():
-        time = _time(arc, fraction)
+        time = float(arc.times[int(np.argmin(np.abs(arc.mesh - fraction)))])
         if not run.begin <= time <= run.end:
             continue
-        what = PLACES.get(fraction, "via")
+        what = {0.0: "start", 1.0: "end"}.get(fraction, "via")
         values = run.of(span.model.vector("x"), time)[:, 0]
-        for v, value, size in zip(span.model.x, values.tolist(), arc.sizes.tolist(), strict=True):
-            if boxes[v.name] != span.box(v.name):
+        for v, value, size in zip(span.model.x, values, arc.sizes, strict=True):
+            if boxes[v.name] != span.boxes[v.name]:
                 yield _miss(what, v.name, time, value, boxes[v.name], size, v.unit)
-        yield from _rows_at(run, what, fraction, time)
+        rows = span.rows_at.get(fraction, ())
+        before = time if fraction == 0.0 else max(np.nextafter(time, -np.inf), run.begin)
+        values = run.of(stacked(row.expression for row in rows), before)[:, 0]
+        for row, value in zip(rows, values, strict=True):
+            size = max(row.nominal, abs(value)) if isfinite(value) else row.nominal
+            yield _miss(what, row.name, time, value, (row.lower, row.upper), size)
 
 
-def _rows_at(run: Run, what: str, fraction: float, time: float) -> Iterator[Miss]:
-    """Yield the misses of rows; inputs and algebraic variables are from the interval before."""
-    rows = run.arc.span.rows_at.get(fraction, ())
-    before = time if fraction == 0.0 else max(np.nextafter(time, -np.inf), run.begin)
-    values = run.of(stacked(row.expression for row in rows), before)[:, 0]
-    for row, value in zip(rows, values.tolist(), strict=True):
-        yield _miss(what, row.name, time, value, (row.lower, row.upper), _row_size(row, value))
-
-
-def against_optimised(run: Run) -> Iterator[Miss]:
+def _against_optimised(run: Run) -> Iterator[Miss]:
     """Yield the misses of states at the end against their optimised values, if not prescribed."""
-    arc = run.arc
+    arc, model = run.arc, run.arc.span.model
     node = int(np.argmin(np.abs(arc.times - run.end)))
-    model = arc.span.model
     prescribed = arc.span.nodes[1.0] if run.at_end else {}
     values = run.of(model.vector("x"), run.end)[:, 0]
-    for v, value, wanted, size in zip(
-        model.x, values.tolist(), arc.nodes[:, node].tolist(), arc.sizes.tolist(), strict=True
-    ):
+    for v, value, wanted, size in zip(model.x, values, arc.nodes[:, node], arc.sizes, strict=True):
         if not fixed(prescribed.get(v.name, FREE)):
-            yield Miss(
-                what="motion",
-                name=v.name,
-                time=run.end,
-                value=value,
-                wanted=wanted,
-                size=size,
-                unit=v.unit,
-            )
+            yield _miss("motion", v.name, run.end, value, (wanted, wanted), size, v.unit)
 
 
-def between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
-    """Yield the worst violations of bounds and path conditions by the runs of one arc."""
-    for kept in _kept(runs[0].arc):
-        size, worst = _magnitude(kept.box, np.zeros(0)), (-np.inf, 0.0, 0.0)
-        for run in runs:
-            looks = run.looks
-            values = run.of(kept.expression, looks)[0]
-            size = max(size, _magnitude(kept.box, values))
-            time, value = _worst(run, kept, looks, values)
-            outside = float(_outside(np.array([value]), kept.box)[0])
-            worst = max(worst, (outside, time, value), key=lambda at: at[0])
-        yield _miss(kept.kind, kept.name, *worst[1:], kept.box, size, kept.unit)
-
-
-def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
-    """Return a mask of intervals with a bound or path violation above `tolerance`, (N,)."""
-    found = np.zeros(run.arc.intervals, dtype=bool)
-    looks = run.looks
-    interval = np.searchsorted(run.arc.times, looks, side="right") - 1
-    for kept in _kept(run.arc):
-        values = run.of(kept.expression, looks)[0]
-        outside = _outside(values, kept.box) > tolerance * _magnitude(kept.box, values)
-        found[np.minimum(interval[outside], found.size - 1)] = True
-    return found
-
-
-def joined(before: Run, after: Run) -> Iterator[Miss]:
-    """Yield the misses of conditions between the end of a phase and the start of the next one."""
-    if not after.arc.span.joins:
-        return
-    arguments = [*_signals(before, before.end), *_signals(after, after.begin)]
-    for join in after.arc.span.joins:
-        value = float(ca.DM(join.function(*arguments)))
-        box = (join.lower, join.upper)
-        bounds = [abs(b) for b in box if b and isfinite(b)]
-        yield _miss("joint", join.name, before.end, value, box, max([*bounds, abs(value)]) or 1.0)
-
-
-def _signals(run: Run, time: float) -> list[Array]:
-    """Return [t, x, z, u, p] at one time."""
-    model = run.arc.span.model
-    values = [run.of(model.vector(letter), time)[:, 0] for letter in "xzu"]
-    return [np.array([time]), *values, run.arc.p]
-
-
-def periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
-    """Yield the misses of periodic states."""
-    for name in problem.periodic:
-        model = first.arc.span.model
-        v = next(v for v in model.x if v.name == name)
-        start = first.of(v.symbol, first.begin)[0, 0]
-        end = last.of(last.arc.span.model.expression(name), last.end)[0, 0]
-        size = first.arc.sizes[[x.name for x in model.x].index(name)]
-        yield Miss(
-            what="period",
-            name=name,
-            time=last.end,
-            value=float(end),
-            wanted=float(start),
-            size=float(size),
-            unit=v.unit,
-        )
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Kept:
+class _Kept(NamedTuple):
     """A condition over a whole phase."""
 
     kind: str
@@ -155,57 +84,85 @@ class _Kept:
     box: Box
     unit: str = ""
 
+    def outside(self, values: Array) -> Array:
+        """Return the distance of values from the range; negative inside; inf for NaN."""
+        outside = np.maximum(values - self.box[1], self.box[0] - values)
+        return np.where(np.isnan(outside), np.inf, outside)
+
+    def magnitude(self, values: Array) -> float:
+        """Return the magnitude of the condition, from its bounds and values."""
+        bounds = [abs(b) for b in self.box if isfinite(b)]
+        return max([*bounds, float(np.abs(values).max(initial=0.0))])
+
 
 def _kept(arc: Arc) -> list[_Kept]:
     """Return bounds of states and algebraic variables, and path conditions."""
     span = arc.span
-    known = [v for v in (*span.model.x, *span.model.z) if span.box(v.name) != FREE]
-    bounds = [_Kept("bound", v.name, v.symbol, span.box(v.name), v.unit) for v in known]
+    known = [v for v in (*span.model.x, *span.model.z) if span.boxes[v.name] != FREE]
+    bounds = [_Kept("bound", v.name, v.symbol, span.boxes[v.name], v.unit) for v in known]
     rows = [_Kept("path", row.name, row.expression, (row.lower, row.upper)) for row in span.path]
     return bounds + rows
 
 
-def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, float]:
-    """Return time and value of the worst violation of a range, refined between the `looks`."""
-    j = int(np.argmax(_outside(values, kept.box)))
-    best = (float(_outside(values[j : j + 1], kept.box)[0]), float(looks[j]), float(values[j]))
+def _between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
+    """Yield the worst violations of bounds and path conditions by the runs of one arc."""
+    for kept in _kept(runs[0].arc):
+        size, worst = kept.magnitude(np.zeros(0)), (-np.inf, 0.0, 0.0)
+        for run in runs:
+            looks = run.looks
+            values = run.of(kept.expression, looks)[0]
+            size = max(size, kept.magnitude(values))
+            worst = max(worst, _worst(run, kept, looks, values), key=lambda at: at[0])
+        yield _miss(kept.kind, kept.name, *worst[1:], kept.box, size, kept.unit)
+
+
+def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, float, float]:
+    """Return the worst violation of a range, its time and value, refined between the `looks`."""
+    outside = kept.outside(values)
+    j = int(np.argmax(outside))
+    best = (float(outside[j]), float(looks[j]), float(values[j]))
     low, high = looks[max(j - 1, 0)], looks[min(j + 1, looks.size - 1)]
     for _ in range(CLOSER):
         at = np.linspace(low, high, PARTS + 1)
         near = run.of(kept.expression, at)[0]
-        outside = _outside(near, kept.box)
+        outside = kept.outside(near)
         k = int(np.argmax(outside))
         low, high = at[max(k - 1, 0)], at[min(k + 1, PARTS)]
         best = max(best, (float(outside[k]), float(at[k]), float(near[k])), key=lambda x: x[0])
-    return best[1:]
+    return best
 
 
-def _magnitude(box: Box, values: Array) -> float:
-    """Return the magnitude of a condition, from its bounds and values."""
-    bounds = [abs(b) for b in box if isfinite(b)]
-    return max([*bounds, float(np.abs(values).max(initial=0.0))])
+def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
+    """Return a mask of intervals with a bound or path violation above `tolerance`, (N,)."""
+    mask = np.zeros(run.arc.intervals, dtype=bool)
+    looks = run.looks
+    interval = np.searchsorted(run.arc.times, looks, side="right") - 1
+    for kept in _kept(run.arc):
+        values = run.of(kept.expression, looks)[0]
+        outside = kept.outside(values) > tolerance * kept.magnitude(values)
+        mask[np.minimum(interval[outside], mask.size - 1)] = True
+    return mask
 
 
-def _outside(values: Array, box: Box) -> Array:
-    """Return the distance of values from a range; negative inside; inf for NaN."""
-    outside = np.maximum(values - box[1], box[0] - values)
-    return np.where(np.isnan(outside), np.inf, outside)
+def _joined(before: Run, after: Run) -> Iterator[Miss]:
+    """Yield the misses of conditions between the end of a phase and the start of the next one."""
+    for join in after.arc.span.joins:
+        value = float(
+            ca.DM(join.function(*before.signals(before.end), *after.signals(after.begin)))
+        )
+        box = (join.lower, join.upper)
+        size = max(size_of(box, 0.0), abs(value)) or 1.0
+        yield _miss("joint", join.name, before.end, value, box, size)
 
 
-def _miss(
-    what: str, name: str, time: float, value: float, box: Box, size: float, unit: str = ""
-) -> Miss:
-    wanted = min(max(value, box[0]), box[1]) if value == value else box[0]
-    return Miss(what=what, name=name, time=time, value=value, wanted=wanted, size=size, unit=unit)
-
-
-def _row_size(row: Row, value: float) -> float:
-    return max(row.nominal, abs(value)) if isfinite(value) else row.nominal
-
-
-def _time(arc: Arc, fraction: float) -> float:
-    """Return the time of the node at a fraction [s]."""
-    return float(arc.times[int(np.argmin(np.abs(arc.mesh - fraction)))])
+def _periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
+    """Yield the misses of periodic states."""
+    model = first.arc.span.model
+    for v, size in zip(model.x, first.arc.sizes, strict=True):
+        if v.name in problem.periodic:
+            start = first.of(v.symbol, first.begin)[0, 0]
+            end = last.of(last.arc.span.model.expression(v.name), last.end)[0, 0]
+            yield _miss("period", v.name, last.end, end, (start, start), size, v.unit)
 
 
 def verify(solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL) -> Verification:
@@ -244,11 +201,8 @@ def verified(solution: Solution, tolerance: float = TOLERANCE) -> Solution:
     checked = replace(solution, verification=verification)
     if verification.ok or not solution.status.ok:
         return checked
-    return replace(
-        checked,
-        status=verification.status,
-        message=f"ocp '{solution.problem.name}': {verification.sentence}",
-    )
+    message = f"ocp '{solution.problem.name}': {verification.sentence}"
+    return replace(checked, status=verification.status, message=message)
 
 
 def verified_arcs(
@@ -264,7 +218,7 @@ def verified_arcs(
     local = max((float(e.max()) for e in errors), default=0.0)
     if found.ok or not local <= SMALL * tolerance:
         return found
-    runs, restarts = _restarted(arcs, tolerance, rtol)
+    runs, restarts = restarted(arcs, tolerance, rtol)
     if not restarts:
         return found
     again = _judged(problem, arcs, runs, errors, cost, tolerance, rtol)
@@ -282,47 +236,38 @@ def _judged(
     rtol: float,
 ) -> Verification:
     """Return the verification from runs of the arcs, in the order of time."""
-    bad = next((run for run in runs if not run.ok), None)
-    value = float("nan") if bad else cost_of(problem, runs)
-    checked = [*looked(problem, runs), *map(_local, arcs, errors)]
+    bad = next((run.trajectory for run in runs if not run.ok), None)
+    checked, value = [*misses_of(problem, runs)], float("nan")
+    for arc, error in zip(arcs, errors, strict=True):
+        k = int(np.argmax(error))
+        at = float(arc.times[k]), float(error[k])
+        checked.append(Miss("local error", arc.span.name, *at, 0.0, 1.0))
     if bad is None:
-        checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, _size(runs, value)))
-    return Verification(
-        tolerance=tolerance,
-        rtol=rtol,
-        checked=tuple(sorted(checked, key=lambda miss: -miss.relative)),
-        local_errors=tuple(errors),
-        trajectories=tuple(run.trajectory for run in runs),
-        cost=value,
-        failed="" if bad is None else bad.trajectory.message,
-        failure=Status.SUCCESS if bad is None else bad.trajectory.status,
-    )
+        value = cost_of(problem, runs)
+        size = max([abs(value), *(abs(run.integral(run.arc.span.running)) for run in runs)]) or 1.0
+        checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, size))
+    failed = ("", Status.SUCCESS) if bad is None else (bad.message, bad.status)
+    trajectories = tuple(run.trajectory for run in runs)
+    worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
+    return Verification(tolerance, rtol, worst_first, tuple(errors), trajectories, value, *failed)
 
 
-def looked(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
+def misses_of(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
     """Yield the misses of all conditions; with `optimised` also of the optimised ends."""
     for _, of_arc in groupby(runs, lambda run: run.arc.number):
-        yield from between_nodes(list(of_arc))
+        yield from _between_nodes(list(of_arc))
     for run in runs:
-        if run.trajectory.span[1] < run.end:
-            continue
-        yield from at_nodes(run)
-        yield from against_optimised(run) if optimised else ()
+        if run.trajectory.span[1] >= run.end:
+            yield from _at_nodes(run)
+            yield from _against_optimised(run) if optimised else ()
     for before, after in pairwise(runs):
         if before.ok and after.ok and after.arc.number == before.arc.number + 1:
-            yield from joined(before, after) if after.arc.span.phase else ()
-    if problem.periodic:
-        phases = len(problem.chain)
-        for first in (run for run in runs if run.arc.span.phase == 0 and run.at_start):
-            last = [r for r in runs if r.arc.number == first.arc.number + phases - 1 and r.at_end]
-            yield from periodic(problem, first, last[-1]) if last and last[-1].ok else ()
-
-
-def _local(arc: Arc, errors: Array) -> Miss:
-    """Return the interval with the largest local error as a miss."""
-    k = int(np.argmax(errors))
-    name = arc.span.name
-    return Miss("local error", name, float(arc.times[k]), float(errors[k]), 0.0, 1.0)
+            yield from _joined(before, after) if after.arc.span.phase else ()
+    phases = len(problem.chain)
+    for first in (run for run in runs if run.arc.span.phase == 0 and run.at_start):
+        last = [r for r in runs if r.arc.number == first.arc.number + phases - 1 and r.at_end]
+        if problem.periodic and last and last[-1].ok:
+            yield from _periodic(problem, first, last[-1])
 
 
 def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
@@ -340,22 +285,8 @@ def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
     return sum(values) / (len(values) if problem.kind == "mean" else 1)
 
 
-def _size(runs: Sequence[Run], cost: float) -> float:
-    """Return the reference magnitude of the cost: J, or its largest part."""
-    parts = [abs(cost)]
-    for run in runs:
-        running = run.arc.span.running
-        parts.append(abs(run.integral(running)))
-    return max(parts) or 1.0
-
-
-def near_runs(arcs: Sequence[Arc], tolerance: float) -> tuple[Run, ...]:
-    """Return runs from optimised nodes that stay near the optimised motion; empty on failure."""
-    return _restarted(arcs, tolerance, RTOL)[0]
-
-
-def _restarted(
-    arcs: Sequence[Arc], tolerance: float, rtol: float
+def restarted(
+    arcs: Sequence[Arc], tolerance: float, rtol: float = RTOL
 ) -> tuple[tuple[Run, ...], tuple[float, ...]]:
     """Simulate with restarts at the optimised nodes wherever the motion has departed.
 
@@ -381,8 +312,7 @@ def _restarted(
 def _departs(run: Run, node: int, tolerance: float) -> int:
     """Return the last node up to which the run is near all optimised ones."""
     arc = run.arc
-    reached = arc.times[node:] <= run.trajectory.span[1]
-    times = arc.times[node:][reached]
+    times = arc.times[node:][arc.times[node:] <= run.trajectory.span[1]]
     x = run.of(arc.span.model.vector("x"), times)
     off = np.abs(x - arc.nodes[:, node : node + times.size]) / arc.sizes[:, None]
     near = (off <= tolerance).all(axis=0)

@@ -1,15 +1,14 @@
-"""Evaluate the callbacks of a problem at symbols: costs, conditions, links, joins."""
+"""Evaluation of the callbacks of a problem at symbols: costs, conditions, links, joins."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import itemgetter
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import casadi as ca
 
 from ocp.formulation.expressions import (
-    Comparison,
     MissingError,
     Signals,
     arguments,
@@ -23,12 +22,10 @@ from symfric.foundation.variable import strays
 from symfric.model import Model
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Written:
-    """Everything of one phase that was written as a function; see `Span`.
+class Evaluated(NamedTuple):
+    """Results of the functions of one phase; see `Span`.
 
-    `details` are names of those results of a mechanism that costs and path conditions ask for.
+    `details` are the names of results of a mechanism in costs and path conditions.
     """
 
     running: ca.SX
@@ -40,101 +37,102 @@ class Written:
     details: tuple[str, ...]
 
 
-def written(
-    problem: Statement, settings: Sequence[Setting], tell: list[str]
-) -> tuple[Written, ...]:
-    """Results of the functions of each phase; what is wrong with them goes to `tell`."""
-    found: list[Written] = []
+def evaluated(
+    problem: Statement, settings: Sequence[Setting], problems: list[str]
+) -> tuple[Evaluated, ...]:
+    """Return the results of the functions of each phase; messages are appended to `problems`."""
+    results: list[Evaluated] = []
     before: Model | None = None
     for setting in settings:
         links, joins = (), ()
         if before is not None:
-            links = tuple(_links(setting, before, tell))
-            joins = tuple(_joins(setting, before, tell))
+            links = tuple(_links(setting, before, problems))
+            joins = tuple(_joins(setting, before, problems))
         signals = Signals(setting.model)
-        path = tuple(_path(problem, setting, signals, tell))
-        costs = _costs(setting, signals, last=setting is settings[-1], tell=tell)
-        found.append(Written(*costs, path, links, joins, signals()))
+        path = tuple(_path(problem, setting, signals, problems))
+        costs = _costs(setting, signals, last=setting is settings[-1], problems=problems)
+        results.append(Evaluated(*costs, path, links, joins, signals()))
         before = setting.model
     for number, condition in enumerate(problem.path):
         if text := _missing(condition, settings):
-            tell.append(f"{_called_so('path condition', number, condition)}: {text}")
-    return tuple(found)
+            problems.append(f"{_label('path condition', number, condition)}: {text}")
+    return tuple(results)
 
 
 @contextmanager
-def gathered(tell: list[str], where: str) -> Generator[None]:
-    """Collect an error of the block in `tell` and continue after it."""
+def collected(problems: list[str], where: str) -> Generator[None]:
+    """Append an error of the block to `problems` and continue after the block."""
     try:
         yield
     except ValueError as error:
-        tell.append(f"{where}{error}")
+        problems.append(f"{where}{error}")
 
 
 def _costs(
-    setting: Setting, signals: Signals, *, last: bool, tell: list[str]
+    setting: Setting, signals: Signals, *, last: bool, problems: list[str]
 ) -> tuple[ca.SX, ca.SX, tuple[tuple[float, ca.SX], ...]]:
-    """Integrand, end value and squares of what the problem and the phase ask for."""
+    """Return integrand, end value and squares of the costs of the problem and the phase."""
     running, end = ca.SX(0), ca.SX(0)
     squares: list[tuple[float, ca.SX]] = []
     for cost in setting.costs:
         own = cost is setting.phase.cost
-        kept = cost if own or last else replace(cost, end=())
-        with gathered(tell, setting.where + "cost: "):
+        cost = cost if own or last else replace(cost, end=())
+        with collected(problems, setting.where + "cost: "):
             try:
-                L, E = kept.expressions(setting.model, signals)
+                L, E = cost.expressions(signals)
             except MissingError as error:
                 alone = own or not setting.where
                 hint = "" if alone else "; phases that differ have costs of their own: cost=..."
                 raise ValueError(f"{error}{hint}") from None
-            _known_only(ca.vertcat(L, E), setting.model)
+            _check_known(ca.vertcat(L, E), setting.model)
             running, end = running + L, end + E
-            squares += kept.residuals(setting.model, signals)
+            squares += cost.residuals(signals)
     return running, end, tuple(squares)
 
 
-def _known_only(expression: ca.SX, model: Model) -> None:
+def _check_known(expression: ca.SX, model: Model) -> None:
     if stray := strays(expression, ca.vertcat(*arguments(model))):
         raise ValueError(f"expected only signals of the model, got {', '.join(stray)}")
 
 
-def _path(problem: Statement, setting: Setting, signals: Signals, tell: list[str]) -> Iterator[Row]:
-    """Path conditions of the problem, where the names exist, and of the phase."""
-    model, own = setting.model, tuple(setting.phase.path)
+def _path(
+    problem: Statement, setting: Setting, signals: Signals, problems: list[str]
+) -> Iterator[Row]:
+    """Yield path conditions of the problem, if the names exist, and of the phase."""
+    model = setting.model
     changing = ca.vertcat(*arguments(model))
-    for group, everywhere in ((tuple(problem.path), True), (own, False)):
+    for group, everywhere in ((problem.path, True), (setting.phase.path, False)):
         for number, condition in enumerate(group):
-            label = _called_so("path condition", number, condition)
-            with gathered(tell, f"{setting.where}{label}: "):
+            label = _label("path condition", number, condition)
+            with collected(problems, f"{setting.where}{label}: "):
                 try:
                     rows = comparisons(condition, signals)
                 except MissingError:
                     if everywhere:
-                        continue  # `_missing` finds out whether any phase has the names
+                        continue  # `_missing` checks whether any phase has the names
                     raise
                 for expression, low, high in rows:
-                    _known_only(expression, model)
-                    _check_open((expression, low, high), changing)
+                    _check_known(expression, model)
+                    _check_possible(expression, low, high, changing)
                     yield Row(label, expression, low, high)
 
 
-def _check_open(row: Comparison, changing: ca.SX) -> None:
-    """A comparison can be met, and not by parameters alone."""
-    expression, low, high = row
+def _check_possible(expression: ca.SX, low: float, high: float, changing: ca.SX) -> None:
+    """Raise ValueError for a condition that is impossible, or constant."""
     if low > high:
         raise ValueError(f"expected a condition that can be met, got {low:g} to {high:g}")
     if not ca.depends_on(expression, changing):
         raise ValueError("expected a condition on the motion, got a constant")
 
 
-def _called_so(what: str, number: int, condition: Callable[..., object]) -> str:
-    """Its number, or its name where it has one."""
+def _label(what: str, number: int, condition: Callable[..., object]) -> str:
+    """Return the name of a condition, or its number if it is a lambda."""
     name = getattr(condition, "__name__", "<lambda>")
     return f"{what} {number + 1}" if name == "<lambda>" else f"{what} {name}"
 
 
 def _missing(condition: Callable[..., object], settings: Sequence[Setting]) -> str:
-    """Message about names of a condition of the problem that no phase has."""
+    """Return a message about names of a condition of the problem that no phase has."""
     errors: list[MissingError] = []
     for setting in settings:
         try:
@@ -146,33 +144,32 @@ def _missing(condition: Callable[..., object], settings: Sequence[Setting]) -> s
     return str(errors[0]) if len(errors) == len(settings) else ""
 
 
-def _links(setting: Setting, before: Model, tell: list[str]) -> Iterator[Link]:
-    """Start values of the states that continue the phase before."""
-    there = {v.name for v in before.x}
+def _links(setting: Setting, before: Model, problems: list[str]) -> Iterator[Link]:
+    """Yield start values of the states that continue the previous phase."""
+    continued = {v.name for v in before.x}
     signals = Signals(before)
     for v in setting.model.x:
-        given: Any = setting.phase.link.get(v.name, v.name if v.name in there else None)
-        if given is None:
+        start: Any = setting.phase.link.get(v.name, v.name if v.name in continued else None)
+        if start is None:
             continue
-        with gathered(tell, f"{setting.where}link of {v.name}: "):
-            function: Callable[..., Any] = given if callable(given) else itemgetter(given)
-            expression = value_of(function, signals)
-            _known_only(expression, before)
+        with collected(problems, f"{setting.where}link of {v.name}: "):
+            expression = value_of(start if callable(start) else itemgetter(start), signals)
+            _check_known(expression, before)
             yield Link(v.name, expression)
 
 
-def _joins(setting: Setting, before: Model, tell: list[str]) -> Iterator[Join]:
-    """Conditions between the end of the phase before and the start of this one."""
+def _joins(setting: Setting, before: Model, problems: list[str]) -> Iterator[Join]:
+    """Yield conditions between the end of the previous phase and the start of this one."""
     if not setting.phase.joins:
         return
     left, ending = fresh_symbols(before, "before")
     right, starting = fresh_symbols(setting.model, "after")
+    symbols = [*left, *right]
     for number, condition in enumerate(setting.phase.joins):
-        name = _called_so("join", number, condition)
-        with gathered(tell, f"{setting.where}{name}: "):
-            for row in comparisons(condition, ending, starting):
-                expression, low, high = row
-                if stray := strays(expression, ca.vertcat(*left, *right)):
+        name = _label("join", number, condition)
+        with collected(problems, f"{setting.where}{name}: "):
+            for expression, low, high in comparisons(condition, ending, starting):
+                if stray := strays(expression, ca.vertcat(*symbols)):
                     raise ValueError(f"expected only signals, got {', '.join(stray)}")
-                _check_open(row, ca.vertcat(*left, *right))
-                yield Join(name, ca.Function("join", [*left, *right], [expression]), low, high)
+                _check_possible(expression, low, high, ca.vertcat(*symbols))
+                yield Join(name, ca.Function("join", symbols, [expression]), low, high)

@@ -38,19 +38,19 @@ class Signals:
         self,
         model: Model,
         symbols: Mapping[str, ca.SX] | None = None,
-        put: Callable[[ca.SX], ca.SX] | None = None,
+        convert: Callable[[ca.SX], ca.SX] | None = None,
     ) -> None:
-        """`symbols` are others than those of the model; `put` brings expressions into them."""
+        """Use `symbols` instead of those of the model; `convert` writes expressions in them."""
         self._model = model
         self._symbols = known_symbols(model) if symbols is None else symbols
-        self._put = put
+        self._convert = convert
         self._details: dict[str, ca.SX] = {}
 
     def __getitem__(self, name: str) -> ca.SX:
         known = self._symbols
         if name not in known and name in self._model.further:
             expression = ca.SX(self._model.further[name].expression)
-            self._details[name] = expression if self._put is None else self._put(expression)
+            self._details[name] = self._convert(expression) if self._convert else expression
             return self._details[name]
         try:
             checks.check_names(f"signals of '{self._model.name}'", [name], known)
@@ -64,112 +64,97 @@ class Signals:
         return self[name]
 
     def __call__(self) -> tuple[str, ...]:
-        """Names of the details that were used."""
+        """Return the names of the details in use."""
         return tuple(self._details)
 
 
 def arguments(model: Model) -> list[ca.SX]:
-    """[t, x, z, u, p] of a model."""
+    """Return [t, x, z, u, p] of a model."""
     return [model.t, *(model.vector(letter) for letter in "xzup")]
 
 
 def known_symbols(model: Model) -> dict[str, ca.SX]:
-    """Name -> expression of everything but the details."""
+    """Return name -> expression of all signals and parameters except the details."""
     groups = (model.x, model.z, model.u, model.p)
     known = {"t": model.t} | {v.name: v.symbol for group in groups for v in group}
     return known | {name: ca.SX(o.expression) for name, o in model.outputs.items()}
 
 
 def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
-    """Signals in symbols of their own, [t, x, z, u, p], so that two spans of one model differ."""
-    own = arguments(model)
-    new = [ca.SX.sym(f"{mark}_{letter}", s.numel()) for letter, s in zip("txzup", own, strict=True)]
+    """Return new symbols [t, x, z, u, p] and the signals in them; two phases may share a model."""
+    old = arguments(model)
+    new = [ca.SX.sym(f"{mark}_{letter}", s.numel()) for letter, s in zip("txzup", old, strict=True)]
     known = known_symbols(model)
-    values = ca.Function("signals", own, [stacked(known.values())])(*new)
-    rows = ca.vertsplit(ca.SX(values))
+    rows = ca.vertsplit(ca.SX(ca.Function("signals", old, [stacked(known.values())])(*new)))
 
-    def put(expression: ca.SX) -> ca.SX:
-        return ca.substitute(expression, ca.vertcat(*own), ca.vertcat(*new))
+    def convert(expression: ca.SX) -> ca.SX:
+        return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new))
 
-    return new, Signals(model, dict(zip(known, rows, strict=True)), put)
+    return new, Signals(model, dict(zip(known, rows, strict=True)), convert)
 
 
 def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
-    """Call `function`; errors of CasADi and Python become a `ValueError`.
-
-    Raises:
-        ValueError: the function asks for what does not exist or cannot be done.
-    """
+    """Call `function`; errors of CasADi and Python become a `ValueError`."""
     try:
         return function(*signals)
     except (TypeError, ArithmeticError, AttributeError, RuntimeError) as error:
-        text = str(error)
-        plain = "argument" in text or isinstance(error, AttributeError)
-        hint = BRANCH if "truth value" in text else "" if plain else MATH
+        last = str(error).strip().splitlines()[-1].rstrip(".")
+        short = last.split(": ", 1)[-1] if ".cpp:" in last else last
+        plain = "argument" in str(error) or isinstance(error, AttributeError)
+        hint = BRANCH if "truth value" in str(error) else "" if plain else MATH
         raise ValueError(
-            f"expected {what}, got {type(error).__name__}: {_short(text)}"
-            + f"; {hint}" * bool(hint)
+            f"expected {what}, got {type(error).__name__}: {short}" + f"; {hint}" * bool(hint)
         ) from error
 
 
 def value_of(function: Callable[..., Any], *signals: Any) -> ca.SX:
-    """The one expression that `function` makes of the signals, SX (1, 1).
+    """Return the one expression that `function` makes of the signals, SX (1, 1).
 
     Raises:
-        ValueError: no expression, several, or one that is not a number from the start (NaN).
+        ValueError: no expression, several, or one with a constant that is not finite.
     """
-    found = called(function, *signals, what=EXPRESSION)
-    if isinstance(found, float) and isnan(found):
-        raise _refused(found, MATH)
-    if isinstance(found, ca.MX) or (
-        checks.as_number(found) is None and not isinstance(found, ca.SX | ca.DM)
-    ):
-        raise _refused(found, "write it with casadi.SX" if isinstance(found, ca.MX) else "")
-    value = ca.SX(found)
-    if value.numel() != 1:
-        raise _refused(found)
-    odd = [number for number in constants(value) if not isfinite(number)]
-    if odd:
-        raise _refused(found, f"it holds {odd[0]}" + f"; {MATH}" * isnan(odd[0]))
-    return value
+    result = called(function, *signals, what=EXPRESSION)
+    hint = ""
+    if isinstance(result, ca.MX):
+        hint = "write it with casadi.SX"
+    elif isinstance(result, float) and isnan(result):
+        hint = MATH
+    elif isinstance(result, ca.SX | ca.DM) or checks.as_number(result) is not None:
+        value = ca.SX(result)
+        odd = [number for number in constants(value) if not isfinite(number)]
+        if value.numel() == 1 and not odd:
+            return value
+        if value.numel() == 1:
+            hint = f"it holds {odd[0]}" + f"; {MATH}" * isnan(odd[0])
+    text = f"expected {EXPRESSION}, got {checks.shown(result)}"
+    raise ValueError(text + f"; {hint}" * bool(hint))
 
 
 def constants(expression: ca.SX) -> Iterator[float]:
-    """Numbers that stand in `expression`."""
+    """Yield the numbers in `expression`."""
     f = ca.Function("f", ca.symvar(expression), [expression])
     for k in range(f.n_instructions()):
         if f.instruction_id(k) == ca.OP_CONST:
             yield float(f.instruction_constant(k))
 
 
-def _refused(found: object, hint: str = "") -> ValueError:
-    text = f"expected {EXPRESSION}, got {checks.shown(found)}"
-    return ValueError(text + f"; {hint}" * bool(hint))
-
-
-def _short(text: str) -> str:
-    """The last line of a message of CasADi or Python, without the place in its source."""
-    last = text.strip().splitlines()[-1].rstrip(".")
-    return last.split(": ", 1)[-1] if ".cpp:" in last else last
-
-
 def comparisons(function: Callable[..., Any], *signals: Any) -> list[Comparison]:
-    """Rows of what `function` returns: `a <= b`, `a >= b` or `a == b` of SX.
+    """Return the rows of the comparison `a <= b`, `a >= b` or `a == b` of SX that `function` makes.
 
-    Columns are compared row by row, `ca.logic_and(a, b)` of comparisons is both of them, and
+    Columns are compared row by row, `ca.logic_and(a, b)` of comparisons requires both, and
     `abs(a) <= number` is a range without a kink.
 
     Raises:
         ValueError: no comparison, or one that is always true or false.
     """
-    found = called(function, *signals, what=COMPARISON)
-    if isinstance(found, bool):
+    result = called(function, *signals, what=COMPARISON)
+    if isinstance(result, bool):
         raise ValueError(
-            f"expected {COMPARISON}, got {found}: Python compared numbers; {MATH}; {BRANCH}"
+            f"expected {COMPARISON}, got {result}: Python compared numbers; {MATH}; {BRANCH}"
         )
-    if not isinstance(found, ca.SX) or found.is_empty():
-        raise ValueError(f"expected {COMPARISON}, got {checks.shown(found)}")
-    return [row for each in ca.vertsplit(ca.vec(found)) for row in _rows(each)]
+    if not isinstance(result, ca.SX) or result.is_empty():
+        raise ValueError(f"expected {COMPARISON}, got {checks.shown(result)}")
+    return [row for each in ca.vertsplit(ca.vec(result)) for row in _rows(each)]
 
 
 def _rows(condition: ca.SX) -> Iterator[Comparison]:
@@ -180,8 +165,8 @@ def _rows(condition: ca.SX) -> Iterator[Comparison]:
         )
     kind = condition.op()
     if kind == ca.OP_AND:
-        for part in (condition.dep(0), condition.dep(1)):
-            yield from _rows(part)
+        yield from _rows(condition.dep(0))
+        yield from _rows(condition.dep(1))
     elif kind in (ca.OP_LE, ca.OP_LT, ca.OP_EQ):
         yield _sorted(condition.dep(0), condition.dep(1), equal=kind == ca.OP_EQ)
     else:
@@ -192,7 +177,7 @@ def _rows(condition: ca.SX) -> Iterator[Comparison]:
 
 
 def _sorted(left: ca.SX, right: ca.SX, *, equal: bool) -> Comparison:
-    """Left <= right, or ==, with numbers moved to the bounds."""
+    """Return left <= right, or ==, with numbers moved to the bounds."""
     for number in constants(ca.vertcat(left, right)):
         if not isfinite(number):
             raise ValueError(f"expected finite numbers, got {number}; {MATH}")
@@ -218,16 +203,16 @@ Terms = tuple[tuple[float, Expression], ...]
 class Cost:
     """Bolza cost J = integral of (L + sum_i w_i r_i^2) dt + E at the end.
 
-    Costs add up and take weights: `integral(lambda s: s.force**2) + 0.1 * TIME`; what is to be
-    large gets a negative one: `-at_end(lambda s: s.height)`. They know signals
-    by name only, so one cost serves every model that has them.
+    Costs are added and multiplied by weights: `integral(lambda s: s.force**2) + 0.1 * TIME`; a
+    negative weight maximises: `-at_end(lambda s: s.height)`. Signals are bound by name, so one
+    cost serves every model that has them.
 
     Attributes:
         running: the terms of L as (weight, expression).
         end: the terms of E as (weight, expression).
         squares: (w_i, r_i) of `track` and `effort`, kept apart for Gauss-Newton methods.
         references: names that `track` follows.
-        largest: whether the largest of all scenarios counts, and not their mean; see `worst`.
+        largest: whether the largest cost of all scenarios counts instead of the mean; see `worst`.
     """
 
     running: Terms = ()
@@ -241,7 +226,7 @@ class Cost:
             return NotImplemented
         if self.largest or other.largest:
             raise ValueError(
-                "cost: expected worst(...) round the whole cost, got it added to another; write "
+                "cost: expected worst(...) around the whole cost, got it added to another; write "
                 "worst(a + b)"
             )
         return Cost(
@@ -255,21 +240,16 @@ class Cost:
         weight = checks.number("cost: weight", weight)
         if self.largest and weight < 0:
             raise ValueError(f"cost: expected a weight >= 0 of worst(...), got {weight:g}")
-
-        def scaled(terms: Terms) -> Terms:
-            return tuple((weight * w, term) for w, term in terms)
-
-        return replace(
-            self,
-            running=scaled(self.running),
-            end=scaled(self.end),
-            squares=scaled(self.squares),
+        running, end, squares = (
+            tuple((weight * w, term) for w, term in terms)
+            for terms in (self.running, self.end, self.squares)
         )
+        return replace(self, running=running, end=end, squares=squares)
 
     __rmul__ = __mul__
 
     def __radd__(self, other: object) -> "Cost":
-        return self if other == 0 else NotImplemented  # where `sum` begins
+        return self if other == 0 else NotImplemented  # the first step of `sum`
 
     def __neg__(self) -> "Cost":
         return -1.0 * self
@@ -283,25 +263,22 @@ class Cost:
             raise ValueError("cost: expected a divisor that is not zero, got 0")
         return self * (1.0 / weight)
 
-    def expressions(self, model: Model, signals: Signals | None = None) -> tuple[ca.SX, ca.SX]:
-        """Integrand, squares included, and end value in the symbols of `model`, (1, 1) each.
-
-        `signals` are those of the model; they record which details are used.
+    def expressions(self, signals: Signals) -> tuple[ca.SX, ca.SX]:
+        """Return integrand, squares included, and end value, (1, 1) each.
 
         Raises:
             ValueError: a name the model does not have, or an expression that is not scalar.
         """
-        signals = Signals(model) if signals is None else signals
-        running = _total(self.running, signals)
-        for weight, residual in self.residuals(model, signals):
+        running, end = (
+            sum((weight * value_of(term, signals) for weight, term in terms), ca.SX(0))
+            for terms in (self.running, self.end)
+        )
+        for weight, residual in self.residuals(signals):
             running += weight * residual**2
-        return running, _total(self.end, signals)
+        return running, end
 
-    def residuals(
-        self, model: Model, signals: Signals | None = None
-    ) -> tuple[tuple[float, ca.SX], ...]:
-        """(weight, residual) of the squares in the symbols of `model`."""
-        signals = Signals(model) if signals is None else signals
+    def residuals(self, signals: Signals) -> tuple[tuple[float, ca.SX], ...]:
+        """Return (weight, residual) of the squares."""
         return tuple((weight, value_of(term, signals)) for weight, term in self.squares)
 
 
@@ -327,10 +304,10 @@ def track(name: str, reference: float | str | Expression, weight: float) -> Cost
     """Cost: the integral of weight (signal - reference)^2.
 
     Args:
-        name: the signal that follows.
+        name: the signal that follows the reference.
         reference: a number; a function of the signals, such as `lambda s: 0.1 * ca.sin(s.t)`; or
             the name of a parameter or signal. A name that no model has becomes a parameter of the
-            problem, whose value stands in `p`: the goal of a controller.
+            problem, whose value is given in `p`: the goal of a controller.
         weight: above zero.
     """
     name = checks.text("track", name, "the name of a signal")
@@ -351,13 +328,6 @@ def effort(name: str, weight: float = 1.0) -> Cost:
 
 
 def worst(cost: Cost) -> Cost:
-    """The largest `cost` of all scenarios, in place of their mean."""
+    """Cost: the largest `cost` of all scenarios, instead of their mean."""
     such = "a cost made of integral(...), at_end(...) and TIME"
     return replace(checks.kind("worst", cost, Cost, such), largest=True)
-
-
-def _total(terms: Terms, signals: Signals) -> ca.SX:
-    total = ca.SX(0)
-    for weight, term in terms:
-        total += weight * value_of(term, signals)
-    return total

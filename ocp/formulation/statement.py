@@ -1,20 +1,19 @@
-"""Statements of a problem, and the model, bounds and costs of each phase that follow.
+"""Fields of a problem, and the model, bounds and costs of each phase derived from them.
 
-Changes of models are pure: Model -> Model, with the same symbols and names, so that a cost, a bound
-or an output written for the one holds for the other.
+Changes of models are pure, Model -> Model, with the same symbols and names: a cost, a bound or an
+output written for one model holds for the other.
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
 from math import inf, isfinite, sqrt
-from typing import Any, TypeVar, final
+from typing import Any, NamedTuple, TypeVar, final
 
 import casadi as ca
 
 from ocp.formulation.expressions import Cost
 from ocp.formulation.phase import (
-    Box,
     Chain,
     Free,
     PathCondition,
@@ -22,7 +21,10 @@ from ocp.formulation.phase import (
     Range,
     Ranges,
     as_box,
+    clipped,
     is_range,
+    meet,
+    size_of,
 )
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import symbols_of
@@ -31,28 +33,25 @@ from symfric.model import Model
 T = TypeVar("T")
 
 Duration = tuple[Sequence[int], float | Free]
-"""Numbers of phases, and what their durations add up to [s]."""
+"""Indices of phases, and the sum of their durations [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Statement:
-    """Fields of a `Problem` as they were given, not checked yet."""
+    """Fields of a `Problem` before they are checked."""
 
     phases: Phase | Chain
     cost: Cost | None = None
-    bounds: Mapping[str, Range] = field(default_factory=dict[str, Range], kw_only=True)
-    rates: Mapping[str, Range] = field(default_factory=dict[str, Range], kw_only=True)
-    path: Sequence[PathCondition] = field(default=(), kw_only=True)
-    choose: Mapping[str, tuple[float | None, ...]] = field(
-        default_factory=dict[str, tuple[float | None, ...]], kw_only=True
-    )
-    periodic: Sequence[str] = field(default=(), kw_only=True)
-    scenarios: Mapping[str, Mapping[str, float]] = field(
-        default_factory=dict[str, Mapping[str, float]], kw_only=True
-    )
-    shared: Sequence[str] | None = field(default=None, kw_only=True)
-    p: Mapping[str, float] = field(default_factory=dict[str, float], kw_only=True)
-    durations: Sequence[Duration] = field(default=(), kw_only=True)
+    _: KW_ONLY
+    bounds: Ranges = field(default_factory=dict[str, Range])
+    rates: Ranges = field(default_factory=dict[str, Range])
+    path: Sequence[PathCondition] = ()
+    choose: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict[str, Any])
+    periodic: Sequence[str] = ()
+    scenarios: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Any])
+    shared: Sequence[str] | None = None
+    p: Mapping[str, float] = field(default_factory=dict[str, float])
+    durations: Sequence[Duration] = ()
 
     @property
     def name(self) -> str:
@@ -68,7 +67,7 @@ class Statement:
 
 
 def labelled_phases(problem: Statement) -> Iterator[tuple[str, Phase]]:
-    """Phases with the beginning of a message about them: "phase 2 'back': ", "" for a lone one."""
+    """Yield phases with their prefix in messages: "phase 2 'back': ", "" for a single one."""
     phases = problem.chain
     for number, phase in enumerate(phases):
         name = f" '{phase.name}'" if isinstance(phase.name, str) and phase.name else ""  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -76,18 +75,16 @@ def labelled_phases(problem: Statement) -> Iterator[tuple[str, Phase]]:
 
 
 def costs_of(problem: Statement, phase: Phase) -> tuple[Cost, ...]:
-    """Costs of the problem and of the phase."""
+    """Return the costs of the problem and of the phase."""
     return tuple(cost for cost in (problem.cost, phase.cost) if cost is not None)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Setting:
-    """One phase with what it takes over from the problem.
+class Setting(NamedTuple):
+    """One phase with the fields that it inherits from the problem.
 
     Attributes:
-        number: of the phase, from 0.
-        where: "phase 2 'back': " for messages; empty where there is one phase without a name.
+        number: index of the phase.
+        where: prefix of messages, "phase 2 'back': ".
         model: after `rates`, and with the references of costs as parameters.
         bounds, p: by name, for names that the model has.
         costs: of the problem and of the phase.
@@ -103,51 +100,41 @@ class Setting:
 
 
 def settings_of(problem: Statement) -> tuple[Setting, ...]:
-    """The phases of `problem`; impossible rates are left out, `validate` reports them."""
-    labelled = enumerate(labelled_phases(problem))
-    return tuple(_setting(problem, number, phase, where) for number, (where, phase) in labelled)
+    """Return the phases of `problem`; invalid rates, which `validate` reports, are omitted."""
+    settings: list[Setting] = []
+    for number, (where, phase) in enumerate(labelled_phases(problem)):
+        inputs = {v.name: v for v in phase.model.u}
+        taken = {*phase.model.signals, *(v.name for v in phase.model.p)}
+        rates = only(problem.rates, inputs) | only(phase.rates, inputs)
+        rates = {n: r for n, r in rates.items() if is_range(r) and rate_name(n) not in taken}
+        sizes = {n: size_of(as_box(r), inputs[n].nominal) for n, r in rates.items()}
+        costs = costs_of(problem, phase)
+        model = with_rates(phase.model, sizes)
+        model = with_parameters(model, dict.fromkeys(references_of(phase.model, costs), ""))
+        bounds = only(problem.bounds, names_of(model, problem.bounds)) | dict(phase.bounds)
+        bounds |= {rate_name(name): value for name, value in rates.items()}
+        p = only(problem.p, [v.name for v in model.p]) | dict(phase.p)
+        settings.append(Setting(number, where, phase, model, bounds, p, costs))
+    return tuple(settings)
 
 
-def _setting(problem: Statement, number: int, phase: Phase, where: str) -> Setting:
-    inputs = {v.name: v for v in phase.model.u}
-    rates = _only(problem.rates, inputs) | _only(phase.rates, inputs)
-    taken = {*phase.model.signals, *(v.name for v in phase.model.p)}
-    rates = {n: r for n, r in rates.items() if is_range(r) and rate_name(n) not in taken}
-    costs = costs_of(problem, phase)
-    model = with_rates(phase.model, {n: _size(r, inputs[n].nominal) for n, r in rates.items()})
-    model = with_parameters(model, dict.fromkeys(references_of(phase.model, costs), ""))
-    ranges = {rate_name(name): value for name, value in rates.items()}
-    known = names_of(model, problem.bounds)
-    return Setting(
-        number=number,
-        where=where,
-        phase=phase,
-        model=model,
-        bounds=_only(problem.bounds, known) | dict(phase.bounds) | ranges,
-        p=_only(problem.p, [v.name for v in model.p]) | dict(phase.p),
-        costs=costs,
-    )
-
-
-def _size(value: Range, nominal: float) -> float:
-    """Typical magnitude of a rate: that of its bounds, else of its input."""
-    return max((abs(b) for b in as_box(value) if b and isfinite(b)), default=nominal)
-
-
-def _only(given: Mapping[str, T], names: Iterable[str]) -> dict[str, T]:
-    """Entries of `given` with these names."""
-    return {name: value for name, value in given.items() if name in names}
+def only(values: Mapping[str, T], names: Iterable[str]) -> dict[str, T]:
+    """Return the entries of `values` with these names."""
+    return {name: value for name, value in values.items() if name in names}
 
 
 def references_of(model: Model, costs: Iterable[Cost]) -> tuple[str, ...]:
-    """References of `costs` that `model` does not have: they become parameters."""
+    """Return references of `costs` that `model` does not have: they become parameters."""
     wanted = dict.fromkeys(name for cost in costs for name in cost.references)
     known = {*model.signals, *(v.name for v in model.p), "t"}
     return tuple(name for name in wanted if name not in known and name not in model.further)
 
 
 def names_of(model: Model, wanted: Iterable[str] = ()) -> list[str]:
-    """Signals of `model`; with its details only if one of the `wanted` is none of them."""
+    """Return the signals of `model`; with details only if some of the `wanted` are not among them.
+
+    Writing out the details takes time.
+    """
     known = list(model.signals)
     return [*known, *model.further] if set(wanted) - set(known) else known
 
@@ -158,8 +145,8 @@ class Choice:
     """A parameter that the optimiser chooses.
 
     Attributes:
-        lower, upper: its bounds, those of the parameter itself included.
-        guess: where the solver starts.
+        lower, upper: its bounds, within those of the parameter itself.
+        guess: initial value for the solver.
     """
 
     name: str
@@ -171,30 +158,27 @@ class Choice:
     @property
     def nominal(self) -> float:
         """Typical magnitude: of the guess, else of the larger bound, else 1."""
-        sizes = [abs(b) for b in (self.lower, self.upper) if isfinite(b)]
-        return abs(self.guess) or max(sizes, default=0.0) or 1.0
+        return abs(self.guess) or size_of((self.lower, self.upper))
 
 
 def chosen_of(problem: Statement, settings: Sequence[Setting]) -> tuple[Choice, ...]:
-    """The chosen parameters, in the order of `choose`."""
-    return tuple(_choice(name, given, settings) for name, given in problem.choose.items())
+    """Return the chosen parameters, in the order of `choose`."""
+    choices: list[Choice] = []
+    for name, (low, high, *guess) in problem.choose.items():
+        found = [(s, v) for s in settings for v in s.model.p if v.name == name]
+        box = wanted = as_box((low, high))
+        for _, v in found:
+            box = meet(box, (v.lower, v.upper))
+        (setting, v), *_ = found
+        first = guess[0] if guess and guess[0] is not None else None
+        if first is None:
+            first = _nearby(wanted, float(setting.p.get(name, v.start)))
+        choices.append(Choice(name, v.unit, *box, clipped(float(first), box)))
+    return tuple(choices)
 
 
-def _choice(name: str, given: tuple[float | None, ...], settings: Sequence[Setting]) -> Choice:
-    found = [(s, v) for s in settings for v in s.model.p if v.name == name]
-    wanted = as_box((given[0], given[1]))
-    low, high = wanted
-    for _, v in found:
-        low, high = max(low, v.lower), min(high, v.upper)
-    setting, variable = found[0]
-    guess = given[2] if len(given) == 3 else None
-    if guess is None:
-        guess = _guess(wanted, float(setting.p.get(name, variable.start)))
-    return Choice(name, variable.unit, low, high, min(max(float(guess), low), high))
-
-
-def _guess(box: Box, value: float) -> float:
-    """The value of the parameter where it lies in the range, else the middle of the range."""
+def _nearby(box: tuple[float, float], value: float) -> float:
+    """Return `value` if it is in the range, else the middle of the range."""
     low, high = box
     if low <= value <= high:
         return value
@@ -206,16 +190,16 @@ def _guess(box: Box, value: float) -> float:
 
 
 def rate_name(name: str) -> str:
-    """Name of the rate of an input."""
+    """Return the name of the rate of an input."""
     return f"{name}_rate"
 
 
-def rebuilt(model: Model, again: Callable[[Model], Model], **changes: Any) -> Model:
-    """`model` with other fields; `again` makes the same changes in the model that it opens to."""
-    if model.contacts:
+def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **changes: Any) -> Model:
+    """Return `model` with other fields; `again` makes the same changes in its open form."""
+    if model.contacts and again is not None:
         changes["opening"] = partial(_opened, model, again)
     if model.holonomic is not None:
-        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # made of `holonomic` once more
+        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # derived again from `holonomic`
     return replace(model, **changes)
 
 
@@ -224,7 +208,7 @@ def _opened(model: Model, again: Callable[[Model], Model]) -> Model:
 
 
 def _remembered(model: Model, what: str, key: Hashable, make: Callable[[], Model]) -> Model:
-    """The same object for the same change of the same model."""
+    """Return the same object for the same change of the same model."""
     kept = model.memory.setdefault(f"ocp {what}", {})
     if key not in kept:
         kept[key] = make()
@@ -232,43 +216,42 @@ def _remembered(model: Model, what: str, key: Hashable, make: Callable[[], Model
 
 
 def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
-    """`model` with inputs as states, whose rates are inputs instead.
+    """Return `model` with inputs as states, whose rates are inputs instead.
 
         u' = u_rate
 
     A rate that is constant on an interval makes the input continuous and linear there. Its state
-    stands behind those of the model; of a mechanism its rate joins `holonomic.rates`.
+    follows those of the model; in a mechanism its rate is appended to `holonomic.rates`.
 
     Args:
+        model: the model.
         nominal: input -> typical magnitude of its rate.
     """
     if not nominal:
         return model
-    make = partial(_with_rates, model, nominal)
+
+    def make() -> Model:
+        states = tuple(v for v in model.u if v.name in nominal)
+        rates = {
+            v.name: Variable(
+                rate_name(v.name),
+                f"{v.unit}/s",
+                nominal=nominal[v.name],
+                doc=f"rate of {v.doc or v.name}",
+            )
+            for v in states
+        }
+        inputs = tuple(rates.get(v.name, v) for v in model.u)
+        changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
+        return rebuilt(model, partial(with_rates, nominal=nominal), u=inputs, **changes)
+
     return _remembered(model, "rates", tuple(nominal.items()), make)
 
 
-def _with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
-    states = tuple(v for v in model.u if v.name in nominal)
-    rates = {
-        v.name: Variable(
-            rate_name(v.name),
-            f"{v.unit}/s",
-            nominal=nominal[v.name],
-            doc=f"rate of {v.doc or v.name}",
-        )
-        for v in states
-    }
-    added = symbols_of(rates[v.name] for v in states)
-    inputs = tuple(rates.get(v.name, v) for v in model.u)
-    changes = further_states(model, states, added)
-    return rebuilt(model, partial(with_rates, nominal=nominal), u=inputs, **changes)
-
-
 def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:
-    """Changed fields of `model` with further `states`, behind its own, that change at `rates`.
+    """Return changed fields of `model` for further `states`, after its own, that change at `rates`.
 
-    In a mechanism they join `holonomic.rates`; no other equation makes them.
+    In a mechanism they belong to `holonomic.rates`; no other equation depends on them.
     """
     x, mechanics = (*model.x, *states), model.holonomic
     if mechanics is None:
@@ -278,12 +261,11 @@ def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> di
     if inner is not None and states:
         inner = replace(inner, groups=(*inner.groups, symbols_of(states)))
     together = replace(mechanics, rates=ca.vertcat(mechanics.rates, rates), inner=inner)
-    # ode and alg are made of `holonomic` once more
-    return {"x": x, "holonomic": together, "ode": None, "alg": ca.SX(0, 1)}
+    return {"x": x, "holonomic": together}
 
 
 def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
-    """`model` with further parameters (name -> unit) that none of its equations needs."""
+    """Return `model` with further parameters (name -> unit) that its equations do not contain."""
     if not units:
         return model
 
@@ -295,7 +277,7 @@ def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
 
 
 def with_outputs(model: Model, names: Iterable[str]) -> Model:
-    """`model` with some of its details as outputs, which solutions and simulations then show."""
+    """Return `model` with some of its details as outputs, for solutions and simulations."""
     details = tuple(name for name in dict.fromkeys(names) if name not in model.signals)
     if not details:
         return model
@@ -303,8 +285,9 @@ def with_outputs(model: Model, names: Iterable[str]) -> Model:
     def make() -> Model:
         outputs = {**model.outputs, **{name: model.further[name] for name in details}}
         again = partial(with_outputs, names=details)
-        rest = partial(_details_without, model, details)
-        return rebuilt(model, again, outputs=outputs, details=rest)
+        return rebuilt(
+            model, again, outputs=outputs, details=partial(_details_without, model, details)
+        )
 
     return _remembered(model, "outputs", details, make)
 

@@ -1,15 +1,15 @@
-"""Checks of a problem: types, then names, ranges and durations; doubtful units.
+"""Checks of a problem: types, then names, ranges and durations; likely mistakes of units.
 
-`kind_problems` comes first: without what it reports, the other checks have something to read.
+`type_problems` comes first: the other checks require the right types.
 """
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import inf, isfinite
-from typing import Any
+from typing import Any, cast
 
 from ocp.formulation.expressions import Cost
-from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range
+from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range, limits
 from ocp.formulation.statement import (
     Statement,
     costs_of,
@@ -26,13 +26,14 @@ from symfric.model import Model
 
 DURATION = "a duration T > 0 [s] or Free(lower, upper)"
 FAR = 300.0
-"""Factor between a number and the usual size of its variable from which on it is doubted."""
+"""Factor between a number and the nominal value of its variable that indicates another unit."""
 COST = "a cost made of integral(...), at_end(...) and TIME"
 CONDITION = "functions of the signals such as lambda s: s.tip_z <= 0.9"
+SUMS = "sums of durations, such as ((0, 1), 2.0): the first two phases take 2 s"
 
 
 def message(check: Callable[..., Any], *arguments: Any, **named: Any) -> str:
-    """The message of a check that fails, else nothing."""
+    """Return the message of a check that fails, else ""."""
     try:
         check(*arguments, **named)
     except ValueError as error:
@@ -44,45 +45,31 @@ def _unknown(where: str, names: Iterable[str], known: Iterable[str], hint: str =
     return message(checks.check_names, where, names, known, hint)
 
 
-def kind_problems(problem: Statement) -> Iterator[str]:
-    """Values of the wrong type; the other checks need the right ones."""
-    if not isinstance(problem.phases, Phase | Chain):  # pyright: ignore[reportUnnecessaryIsInstance]
-        yield _no_phases(problem.phases)
+def type_problems(problem: Statement) -> Iterator[str]:
+    """Yield messages about values of the wrong type."""
+    phases = cast(object, problem.phases)
+    if not isinstance(phases, Phase | Chain):
+        hint = "join phases with >>: out >> back" if isinstance(phases, list | tuple) else ""
+        if isinstance(phases, Model):
+            hint = "give the model a duration: Phase(model, T=1.0)"
+        yield str(checks.refused("phases", "a phase, such as Phase(model, T=1.0)", phases, hint))
         return
-    yield message(_cost, "cost", problem.cost)
-    for name in ("bounds", "rates", "choose", "p"):
-        yield message(_named, name, getattr(problem, name))
-    yield message(_conditions, "path", problem.path)
-    text = message(_named, "scenarios", problem.scenarios)
-    yield text
-    for name, values in ({} if text else problem.scenarios).items():
-        yield message(_named, f"scenario {checks.shown(name)}", values)
+    yield from _fields(problem, ("bounds", "rates", "choose", "p", "scenarios"), ("path",))
+    if isinstance(problem.scenarios, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        for name, values in problem.scenarios.items():
+            yield message(_named, f"scenario {checks.shown(name)}", values)
     yield message(checks.names, "periodic", problem.periodic)
     if problem.shared is not None:
         yield message(checks.names, "shared", problem.shared)
     yield message(_sums, problem.durations)
     for where, phase in labelled_phases(problem):
-        for text in _kinds_of_phase(phase):
+        for text in _phase_fields(phase):
             yield f"{where}{text}" if text else ""
 
 
-def _no_phases(given: object) -> str:
-    hint = ""
-    if isinstance(given, Model):
-        hint = "give the model a duration: Phase(model, T=1.0)"
-    elif isinstance(given, list | tuple):
-        hint = "join phases with >>: out >> back"
-    return str(checks.refused("phases", "a phase, such as Phase(model, T=1.0)", given, hint))
-
-
-def _kinds_of_phase(phase: Phase) -> Iterator[str]:
-    for name in ("start", "end", "bounds", "rates", "link", "p"):
-        yield message(_named, name, getattr(phase, name))
-    if not isinstance(phase.name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-        yield str(checks.refused("name", "a text", phase.name))
-    yield message(_cost, "cost", phase.cost)
-    for name in ("path", "joins"):
-        yield message(_conditions, name, getattr(phase, name))
+def _phase_fields(phase: Phase) -> Iterator[str]:
+    yield from _fields(phase, ("start", "end", "bounds", "rates", "link", "p"), ("path", "joins"))
+    yield message(checks.kind, "name", phase.name, str, "a text")
     if not isinstance(phase.via, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
         what = "states by fractions of T, such as {0.5: {'x': 1.0}}"
         yield str(checks.refused("via", what, phase.via))
@@ -93,16 +80,24 @@ def _kinds_of_phase(phase: Phase) -> Iterator[str]:
         yield message(_named, f"via {checks.shown(fraction)}", values)
 
 
-def _named(where: str, given: object) -> None:
-    if given is None:
-        raise checks.refused(where, "values by name, such as {'v': 0.1}", None, "leave it out")
-    checks.named(where, given)
-
-
-def _cost(where: str, cost: object) -> None:
+def _fields(
+    of: Statement | Phase, mappings: Iterable[str], conditions: Iterable[str]
+) -> Iterator[str]:
+    """Yield messages about the fields that problems and phases share."""
+    cost = cast(object, of.cost)
     if cost is not None and not isinstance(cost, Cost):
         hint = "wrap it in integral(...) or at_end(...)" if callable(cost) else ""
-        raise checks.refused(where, COST, cost, hint)
+        yield str(checks.refused("cost", COST, cost, hint))
+    for name in mappings:
+        yield message(_named, name, getattr(of, name))
+    for name in conditions:
+        yield message(_conditions, name, getattr(of, name))
+
+
+def _named(where: str, values: object) -> None:
+    if values is None:
+        raise checks.refused(where, "values by name, such as {'v': 0.1}", None, "leave it out")
+    checks.named(where, values)
 
 
 def _conditions(where: str, conditions: object) -> None:
@@ -113,64 +108,68 @@ def _conditions(where: str, conditions: object) -> None:
 
 
 def _sums(durations: object) -> None:
-    what = "sums of durations, such as ((0, 1), 2.0): the first two phases take 2 s"
-    for pair in checks.many("durations", durations, what):
+    for pair in checks.many("durations", durations, SUMS):
         if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], list | tuple)):
-            raise checks.refused("durations", what, pair)
+            raise checks.refused("durations", SUMS, pair)
 
 
 def input_problems(problem: Statement) -> Iterator[str]:
-    """Unknown names, invalid ranges, impossible durations."""
+    """Yield messages about unknown names, invalid ranges and impossible durations."""
     for number, (where, phase) in enumerate(labelled_phases(problem)):
         for text in _phase(problem, number, phase):
             yield f"{where}{text}" if text else ""
-    names = Counter(phase.name for phase in problem.chain if phase.name)
-    for name, count in names.items():
+    for name, count in Counter(phase.name for phase in problem.chain if phase.name).items():
         if count > 1:
             yield f"phases: expected every name once, got '{name}' {count} times"
     yield from _for_all_phases(problem)
     yield from _choices(problem)
-    yield from _scenarios(problem)
+    known = _parameters(problem)
+    for name, values in problem.scenarios.items():
+        yield from _parameter_problems(f"scenario '{name}'", values, known)
     yield from _durations(problem)
     yield from _cost_problems(problem)
 
 
 def _phase(problem: Statement, number: int, phase: Phase) -> Iterator[str]:
-    model, first = phase.model, number == 0
+    model, inputs = phase.model, [v.name for v in phase.model.u]
     if model.ode is None:
         yield "expected an explicit model (ode), got an implicit one (residual)"
     yield _event_problem(model)
     yield duration_problem(phase.T)
-    inputs = [v.name for v in model.u]
     rated = [n for n in inputs if n in phase.rates or n in problem.rates]
     yield _unknown("rates", phase.rates, inputs, _not_rated(model, phase.rates))
     taken = {*model.signals, *(v.name for v in model.p)} & set(map(rate_name, rated))
     if taken:
         yield f"rates: expected new names for the rates, got {', '.join(sorted(taken))}"
-    places: list[tuple[str, Mapping[str, Any], list[str]]] = [
+    groups: list[tuple[str, Mapping[str, Any], list[str]]] = [
         ("start", phase.start, []),
         *((f"via {fraction:g}", values, inputs) for fraction, values in phase.via.items()),
         ("end", phase.end, []),
         ("bounds", phase.bounds, []),
     ]
-    for where, given, fleeting in places:
-        known = [n for n in names_of(model, given) if n not in fleeting or n in rated]
-        yield _unknown(where, given, known, _no_signal(model, given, fleeting))
-        yield from range_problems(where, given)
+    for where, values, excluded in groups:
+        known = [n for n in names_of(model, values) if n not in excluded or n in rated]
+        yield _unknown(where, values, known, _no_signal(model, values, excluded))
+        yield from range_problems(where, values)
     yield from _rate_problems(phase.rates)
     for fraction in phase.via:
         if not 0 < fraction < 1:
             yield f"via: expected fractions of T between 0 and 1, got {fraction:g}"
     known = [*(v.name for v in model.p), *references_of(model, costs_of(problem, phase))]
     yield from _parameter_problems("p", phase.p, known)
-    if first and (phase.link or phase.joins):
+    if number == 0 and (phase.link or phase.joins):
         what = "link" if phase.link else "joins"
-        yield f"{what}: expected none in the first phase, which has none before it"
-    yield from _links(phase, [*(v.name for v in model.x), *rated])
+        yield f"{what}: expected none in the first phase, which has no previous one"
+    states = [*(v.name for v in model.x), *rated]
+    yield _unknown("link", phase.link, states, "only states are continued")
+    for name, start in phase.link.items():
+        if start is not None and not isinstance(start, str) and not callable(start):
+            what = f"{name} as a function such as lambda before: -0.5 * before.v, a name, or None"
+            yield str(checks.refused("link", what, start, "numbers belong in start"))
 
 
 def _event_problem(model: Model) -> str:
-    """Events that no optimiser sees, but for those of laws that know slip and stick apart."""
+    """Return a message about events, except those of laws with known modes of slip and stick."""
     if not model.events:
         return ""
     for contact in model.contacts:
@@ -178,25 +177,17 @@ def _event_problem(model: Model) -> str:
             return f"expected contacts with known modes, got events of '{contact.name}': {text}"
     try:
         own = model.open.events if model.contacts else model.events
-    except ValueError:  # changed since it was closed: their origin is unknown
+    except ValueError:  # variables changed after it was closed: the origin of events is unknown
         own = model.events
-    names = [event.name for event in own]
-    if not names:
+    if not own:
         return ""
-    hint = "derivatives do not see them; write phases that join at the event"
-    return f"expected a model without events, got {checks.listed(names)}; {hint}"
-
-
-def _links(phase: Phase, states: Collection[str]) -> Iterator[str]:
-    yield _unknown("link", phase.link, states, "only states are continued")
-    for name, given in phase.link.items():
-        if given is not None and not isinstance(given, str) and not callable(given):
-            what = f"{name} as a function such as lambda before: -0.5 * before.v, a name, or None"
-            yield str(checks.refused("link", what, given, "numbers stand in start"))
+    names = checks.listed([event.name for event in own])
+    hint = "derivatives do not include them; write phases that join at the event"
+    return f"expected a model without events, got {names}; {hint}"
 
 
 def duration_problem(T: object) -> str:
-    """Message about a wrong duration, else nothing."""
+    """Return a message about an invalid duration, else ""."""
     number = checks.as_number(T)
     if isinstance(T, Free) or (number is not None and 0 < number < inf):
         return ""
@@ -204,9 +195,9 @@ def duration_problem(T: object) -> str:
     return f"expected {DURATION}, got {checks.shown(T)}" + f"; {hint}" * bool(hint)
 
 
-def range_problems(where: str, given: Mapping[str, Any]) -> Iterator[str]:
-    """Values that are neither numbers nor ranges."""
-    for name, value in given.items():
+def range_problems(where: str, values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield messages about values that are neither numbers nor ranges."""
+    for name, value in values.items():
         if not is_range(value):
             listed = isinstance(value, list) or getattr(value, "shape", None) == (2,)
             hint = "write a tuple: (lower, upper)" if listed else ""
@@ -214,7 +205,7 @@ def range_problems(where: str, given: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _rate_problems(rates: Mapping[str, Any]) -> Iterator[str]:
-    """Rates are ranges: a number would be a rate to keep."""
+    """Yield messages about rates that are not ranges."""
     for name, value in rates.items():
         if not is_range(value) or not isinstance(value, tuple):
             size = checks.as_number(value)
@@ -222,43 +213,42 @@ def _rate_problems(rates: Mapping[str, Any]) -> Iterator[str]:
             yield str(checks.refused("rates", f"{name} as (lower, upper)", value, hint))
 
 
-def freed(names: Iterable[str]) -> str:
-    """Hint how a number of a law or a scene becomes a parameter."""
+def _freed(names: Iterable[str]) -> str:
+    """Return the hint how to make parameters of numbers of a law or a scene."""
     return f"free it where the model is made: drive(law, free={list(names)!r})"
 
 
-def _no_signal(model: Model, given: Iterable[str], fleeting: Collection[str]) -> str:
-    """Hint about names that are no signals."""
-    if {"t", "T"} & set(given):
+def _no_signal(model: Model, names: Iterable[str], inputs: Collection[str]) -> str:
+    """Return the hint for names that are not signals."""
+    if {"t", "T"} & set(names):
         return "durations are T of the phases, and durations=... of the problem"
-    if set(fleeting) & set(given):
+    if set(inputs) & set(names):
         return "an input holds on intervals; with rates=... it has a value at a time"
-    parameters = {v.name for v in model.p} & set(given)
-    return "parameters stand in p or choose" if parameters else ""
+    parameters = {v.name for v in model.p} & set(names)
+    return "parameters belong in p or choose" if parameters else ""
 
 
-def _not_rated(model: Model, given: Iterable[str]) -> str:
-    signals = {*model.signals} & set(given)
-    return "only inputs have rates that are chosen" if signals else ""
+def _not_rated(model: Model, names: Iterable[str]) -> str:
+    return "only inputs have rates that are chosen" if {*model.signals} & set(names) else ""
 
 
-def _parameter_problems(where: str, given: Mapping[str, Any], known: list[str]) -> Iterator[str]:
-    yield _unknown(where, given, known, freed(given))
-    for name, value in given.items():
+def _parameter_problems(where: str, values: Mapping[str, Any], known: list[str]) -> Iterator[str]:
+    yield _unknown(where, values, known, _freed(values))
+    for name, value in values.items():
         yield message(checks.number, f"{where}: {name}", value)
 
 
 def _parameters(problem: Statement) -> list[str]:
-    """Parameters of all models, and references of costs."""
-    found: list[str] = []
+    """Return the parameters of all models, and the references of costs."""
+    names = dict[str, None]()
     for phase in problem.chain:
-        found += [v.name for v in phase.model.p]
-        found += references_of(phase.model, costs_of(problem, phase))
-    return list(dict.fromkeys(found))
+        names |= dict.fromkeys(v.name for v in phase.model.p)
+        names |= dict.fromkeys(references_of(phase.model, costs_of(problem, phase)))
+    return list(names)
 
 
 def _for_all_phases(problem: Statement) -> Iterator[str]:
-    """Fields of the problem about all phases: some phase must have the names."""
+    """Yield messages about fields for all phases, whose names must exist in some phase."""
     models = [phase.model for phase in problem.chain]
     inputs = list(dict.fromkeys(v.name for model in models for v in model.u))
     signals = list(dict.fromkeys(n for m in models for n in names_of(m, problem.bounds)))
@@ -270,20 +260,18 @@ def _for_all_phases(problem: Statement) -> Iterator[str]:
     yield from _rate_problems(problem.rates)
     yield from _parameter_problems("p", problem.p, _parameters(problem))
     yield _unknown("shared", problem.shared or (), inputs, "only inputs are shared")
-    first, last = (problem.chain[k] for k in (0, -1))
-    ends = [
-        {*(v.name for v in phase.model.x), *phase.rates, *(set(problem.rates) & set(inputs))}
-        for phase in (first, last)
-    ]
-    both = [
-        name for name in (*(v.name for v in first.model.x), *inputs) if name in ends[0] & ends[1]
-    ]
+    first, last = (
+        {*(v.name for v in p.model.x), *p.rates, *(set(problem.rates) & set(inputs))}
+        for p in (problem.chain[0], problem.chain[-1])
+    )
+    states = [v.name for v in models[0].x]
+    both = [name for name in (*states, *inputs) if name in first & last]
     yield _unknown("periodic", problem.periodic, both, "only states are periodic")
 
 
 def _choices(problem: Statement) -> Iterator[str]:
     parameters = {v.name: v for phase in problem.chain for v in phase.model.p}
-    yield _unknown("choose", problem.choose, parameters, freed(problem.choose))
+    yield _unknown("choose", problem.choose, parameters, _freed(problem.choose))
     for name, given in problem.choose.items():
         where = f"choose: expected {name} as (lower, upper) or (lower, upper, guess)"
         pair: Any = given
@@ -292,24 +280,17 @@ def _choices(problem: Statement) -> Iterator[str]:
             continue
         low, high = as_box(pair[:2])
         if low == high:
-            yield f"{where}, got the one number {low:g}; a value that is given stands in p"
+            yield f"{where}, got the one number {low:g}; a fixed value belongs in p"
         if len(pair) == 3 and not (is_number(pair[2]) and low <= pair[2] <= high):
             yield f"{where} with a guess between, got {checks.shown(given)}"
         v = parameters.get(name)
         if v is not None and max(low, v.lower) >= min(high, v.upper):
             yield f"{where} within [{v.lower:g}, {v.upper:g}] {v.unit}, got {checks.shown(given)}"
-        fixed = [s for s, values in problem.scenarios.items() if name in values]
-        if fixed:
+        if fixed := [s for s, values in problem.scenarios.items() if name in values]:
             yield (
-                f"choose: expected {name} to be chosen once for all, got a value of its own in "
+                f"choose: expected {name} to be chosen once for all, got a separate value in "
                 f"scenario {', '.join(fixed)}"
             )
-
-
-def _scenarios(problem: Statement) -> Iterator[str]:
-    known = _parameters(problem)
-    for name, values in problem.scenarios.items():
-        yield from _parameter_problems(f"scenario '{name}'", values, known)
 
 
 def _durations(problem: Statement) -> Iterator[str]:
@@ -329,38 +310,34 @@ def _durations(problem: Statement) -> Iterator[str]:
         parts = [phases[n].T for n in which]
         if text or any(map(duration_problem, parts)):
             continue
-        low, high = (sum(_side(T, side) for T in parts) for side in ("lower", "upper"))
-        if max(low, _side(total, "lower")) > min(high, _side(total, "upper")) * (1 + 1e-12):
+        low, high = (sum(limits(T)[side] for T in parts) for side in (0, 1))
+        wanted = limits(total)
+        if max(low, wanted[0]) > min(high, wanted[1]) * (1 + 1e-12):
             yield (
                 f"{where}: expected a sum that the phases can have, {low:g} to {high:g} s, got "
-                f"{_side(total, 'lower'):g} to {_side(total, 'upper'):g} s"
+                f"{wanted[0]:g} to {wanted[1]:g} s"
             )
-
-
-def _side(T: float | Free, side: str) -> float:
-    return getattr(T, side) if isinstance(T, Free) else float(T)
 
 
 def _cost_problems(problem: Statement) -> Iterator[str]:
     if problem.cost is None and all(phase.cost is None for phase in problem.chain):
         yield f"expected {COST}, got None"
+    values = {*problem.p, *(name for values in problem.scenarios.values() for name in values)}
     for where, phase in labelled_phases(problem):
         if phase.cost is not None and phase.cost.largest:
             yield f"{where}cost: expected worst(...) in the cost of the problem, got it in a phase"
-    given = {*problem.p, *(name for values in problem.scenarios.values() for name in values)}
-    for where, phase in labelled_phases(problem):
         for name in references_of(phase.model, costs_of(problem, phase)):
-            if name not in given and name not in phase.p:
+            if name not in values and name not in phase.p:
                 known = [*phase.model.signals, *(v.name for v in phase.model.p)]
                 text = _unknown(f"{where}track", [name], known)
                 yield f"{text}; or give its value: p={{{name!r}: ...}}"
 
 
 def doubts(problem: Statement) -> str:
-    """Sentences about values far from the nominal ones, which are likely mistakes of units.
+    """Return sentences about values far from the nominal ones, which indicate mistakes of units.
 
-    A value to meet that is `FAR` times the `nominal` of its variable, and an input that may have no
-    more than a `FAR`th of it.
+    A prescribed value of `FAR` times the `nominal` of its variable, and an input limited to a
+    `FAR`th of its nominal value or less.
     """
     return " ".join(dict.fromkeys(_doubtful(problem)))
 
@@ -373,14 +350,14 @@ def _doubtful(problem: Statement) -> Iterator[str]:
             for name, wanted in ranges.items():
                 least = min(map(abs, as_box(wanted)))
                 if name in known and isfinite(least) and least >= FAR * known[name].nominal:
-                    yield _sentence(f"{one.where}{place}", known[name], least)
+                    yield _doubt(f"{one.where}{place}", known[name], least)
         for name, wanted in one.bounds.items():
             most = max(map(abs, as_box(wanted)))
             if name in inputs and 0 < most <= inputs[name].nominal / FAR:
-                yield _sentence(f"{one.where}bounds", inputs[name], most)
+                yield _doubt(f"{one.where}bounds", inputs[name], most)
 
 
-def _sentence(where: str, of: Variable, size: float) -> str:
+def _doubt(where: str, of: Variable, size: float) -> str:
     times = size / of.nominal
     factor = f"{times:.0f} times" if times > 1 else f"{1 / times:.0f} times less than"
     return (

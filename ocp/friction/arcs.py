@@ -1,7 +1,7 @@
 """Multi-phase problem of a mode sequence: one phase of mode models for each arc.
 
-The user's conditions hold by name in all arcs of his phases. In addition, the following conditions
-make the arcs a motion with exact Coulomb friction and stiction, for each contact:
+The user's conditions hold by name in all arcs of their phases. In addition, the following
+conditions make the arcs a motion with exact Coulomb friction and stiction, for each contact:
 
 * it slips in the direction of its mode: slip >= 0 or <= 0;
 * in stick the reaction is within the static level in both directions: |F| <= F_s;
@@ -25,316 +25,96 @@ Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical M
 Control, 2nd ed., 2010, 2.8 and 3.7 (phases, linkage conditions).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
-from typing import TypeVar, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 
-from ocp.formulation.phase import Chain, Free, Phase, Range, Start, meet
+from ocp.formulation.phase import Chain, Free, Phase, Range, Span, Start, limits, meet
 from ocp.formulation.problem import Problem
-from ocp.formulation.statement import Duration
-from ocp.friction.mode_models import SIDES, excess, rubbing
-from ocp.friction.sequence import Arc, Leg
-from ocp.friction.transfer import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
+from ocp.formulation.statement import Duration, further_states, only, rebuilt
+from ocp.friction.mode_models import SIDES, excess, holding, mode_model
+from ocp.friction.sequence import Arc, Leg, Legs
+from ocp.friction.smooth_models import sticking
+from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
-from symfric.model import Contact, Model
+from symfric.model import Contact, Model, Output
 
 MARGIN = 1e-2
 """Initial friction margin: share of the static level that stiction keeps from it, and by which a
 jumping control exceeds it at break-away. Near its peak a smooth law creeps below it and stays for
 long above it, and where the force follows its limit, held controls make a sawtooth of it. If the
 contact breaks away by a force that cannot jump, the margin is reduced to zero at the end."""
-
 FADE = 1e-3
 """Duration of that reduction, as a share of the whole duration."""
-
 LEVEL = -1e-6
 """Friction margin in that direction: at its end stiction is at its level, which the break-away
 condition already states, and two conditions would be dependent."""
-
 SIGN = 1e-7
 """Sliding velocity by which one that is not a state may have the wrong sign: at the ends of
 slipping, where it is zero, two conditions would be dependent."""
+CATCH = 5.0
+"""Margins of the sliding force that catch a contact which has slipped back for an instant, or that
+stop one: with none the stop is only grazed, and the smallest deviation lets the contact slip on."""
+
+FIRST = "_first_"
+PULLED = "_pull"
+CAUGHT = "_catch"
+STOPPED = "_stop"
+LEFT = "rest_left"
+"""State of an arc at whose end a contact breaks away: its remaining time [s]."""
 
 Ranges = dict[str, Range]
-Value = TypeVar("Value")
+Sides = Mapping[str, int]
+"""Contact -> direction of slip."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Place:
-    """An arc among its neighbours.
+class Rules(NamedTuple):
+    """Settings common to all sequences of one problem.
 
     Attributes:
-        number: index of the arc.
-        model: the user's, with contacts.
-        leg: its mode interval.
-        opens, closes: whether it is the first or last one of the user's phase.
-        ends: whether it is the last one of its mode interval.
-        before, after: modes of the neighbours if states are continuous; else empty.
-        leaves: sticking contact -> direction of its next slip, 0 if it keeps sticking.
-    """
-
-    number: int
-    model: Model
-    arc: Arc
-    leg: Leg
-    opens: bool
-    closes: bool
-    ends: bool
-    before: Mapping[str, int]
-    after: Mapping[str, int]
-    leaves: Mapping[str, int]
-
-
-def places_of(problem: Problem, legs: Sequence[Leg]) -> tuple[Place, ...]:
-    """Return all arcs among their neighbours."""
-    pairs = [(leg, k) for leg in legs for k in range(len(leg.arcs))]
-    arcs = [leg.arcs[k] for leg, k in pairs]
-    phases = [leg.phase for leg, _ in pairs]
-    broken = [
-        k > 0 and phases[k] != phases[k - 1] and bool(problem.chain[phases[k]].link)
-        for k in range(len(arcs))
-    ]
-    found: list[Place] = []
-    for i, (leg, k) in enumerate(pairs):
-        first, last = i == 0, i == len(arcs) - 1
-        leaves = {c: 0 for c, mode in arcs[i].modes.items() if not mode}
-        for c in leaves:
-            for later in arcs[i + 1 :]:
-                if later.modes.get(c) != 0:
-                    leaves[c] = later.modes.get(c, 0)
-                    break
-        found.append(
-            Place(
-                number=i,
-                model=problem.chain[leg.phase].model,
-                arc=arcs[i],
-                leg=leg,
-                opens=first or phases[i - 1] != leg.phase,
-                closes=last or phases[i + 1] != leg.phase,
-                ends=k == len(leg.arcs) - 1,
-                before={} if first or broken[i] else arcs[i - 1].modes,
-                after={} if last or broken[i + 1] else arcs[i + 1].modes,
-                leaves=leaves,
-            )
-        )
-    return tuple(found)
-
-
-def in_arcs(
-    problem: Problem,
-    legs: Sequence[Leg],
-    sizes: Mapping[str, float],
-    at_rest: Sequence[str],
-    shortest: float,
-    margin: float = MARGIN,
-) -> Problem:
-    """Return the problem of mode models for the sequence `legs`, one phase for each arc.
-
-    Args:
         problem: the user's problem.
-        legs: its arcs; their durations are initial values.
         sizes: contact -> typical static level [N], which scales conditions on forces.
         at_rest: contacts that stick at the start.
         shortest: least duration of an arc [s].
-        margin: friction margin, as a share of the static level.
+        margin: friction margin: share of the static level that stiction keeps from it.
     """
-    places = places_of(problem, legs)
-    margins = margin, FADE * sum(leg.duration for leg in legs)
-    phases = [_phase(problem, place, sizes, at_rest, shortest, margins) for place in places]
+
+    problem: Problem
+    sizes: Mapping[str, float]
+    at_rest: Sequence[str]
+    shortest: float
+    margin: float = MARGIN
+
+
+def in_arcs(rules: Rules, legs: Legs) -> Problem:
+    """Return the problem of mode models for the sequence `legs`, one phase for each arc.
+
+    The durations of the arcs are initial values.
+    """
+    problem, fade = rules.problem, FADE * sum(leg.duration for leg in legs)
+    phases = [arc.in_modes(fade) for arc in arcs_among(rules, legs)]
     states = {v.name for v in phases[0].model.x}
     signals = {name for phase in phases for name in (*phase.model.signals, *phase.model.further)}
     parameters = {v.name for phase in phases for v in phase.model.p}
     return replace(
         problem,
         phases=Chain(tuple(phases)),
-        bounds=_only(problem.bounds, signals),
-        p=_only(problem.p, parameters),
-        choose=_only(problem.choose, parameters),
+        bounds=only(problem.bounds, signals),
+        p=only(problem.p, parameters),
+        choose=only(problem.choose, parameters),
         durations=_durations(problem, legs),
         periodic=tuple(name for name in problem.periodic if name in states),
     )
 
 
-def _phase(
-    problem: Problem,
-    place: Place,
-    sizes: Mapping[str, float],
-    at_rest: Sequence[str],
-    shortest: float,
-    margin: tuple[float, float],
-) -> Phase:
-    """Return the phase of one arc: the user's conditions, and those of its modes."""
-    base, modes = problem.chain[place.leg.phase], place.arc.modes
-    released = [name for name in modes if _breaks_away(place, name, at_rest)]
-    limited = {*problem.rates, *base.rates}
-    tight = _tight(place, limited)
-    leaving = {name: side for name, side in tight.items() if place.after.get(name) == side}
-    caught, stopped = _caught(place, limited)
-    model = arc_model(base.model, modes, released, leaving, caught, stopped, sizes, margin)
-    start: Ranges = dict(base.start) if place.opens else {}
-    link: dict[str, Start] = dict(base.link) if place.opens else {}
-    end = _end(base, place)
-    if leaving:
-        start, end = start | {LEFT: (0.0, None)}, end | {LEFT: 0.0}
-        link |= {LEFT: None} if place.number else {}
-    bounds: Ranges = dict(base.bounds)
-    for contact in rubbing(base.model):
-        zero = _starts_at_rest(place, contact, at_rest)
-        start |= zero
-        if place.number:
-            link |= dict.fromkeys(zero)
-        end = _end_of(place, contact, end)
-        inside = _inside(problem, place, contact, tight, margin[0])
-        bounds |= inside
-        if not modes[contact.name]:  # also between the start and the first point
-            for side in SIDES.values():
-                row = inside[f"{contact.name}_{side}"]
-                start[f"{contact.name}{FIRST}{side}"] = row
-            if contact.name in caught:
-                start[f"{contact.name}{CAUGHT}"] = (0.0, None)
-            if contact.name in stopped:
-                start[f"{contact.name}{STOPPED}"] = (0.0, None)
-        if contact.name in released:
-            start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited, margin[0])
-    signals = {*model.signals, *model.further}
-    return replace(
-        base,
-        model=model,
-        T=_duration(problem, place, shortest),
-        start=_only(start, signals),
-        end=_only(end, signals),
-        via={},
-        bounds=_only(bounds, signals),
-        link=_only(link, signals),
-        joins=base.joins if place.opens else (),
-        cost=base.cost if place.closes or base.cost is None else replace(base.cost, end=()),
-        p=_only(base.p, {v.name for v in model.p}),
-        name="",
-    )
-
-
-def _breaks_away(place: Place, name: str, at_rest: Sequence[str]) -> bool:
-    """Return True if the contact starts to slip at the start of this arc, or reverses there."""
-    mode = place.arc.modes[name]
-    if not mode:
-        return False
-    return place.before[name] != mode if name in place.before else (
-        not place.number and name in at_rest
-    )  # fmt: skip
-
-
-def _pull(place: Place, name: str, limited: Collection[str], margin: float) -> Range:
-    """Return the range of the excess of the holding force over the static level at break-away.
-
-    A force that cannot jump was below it until then: it reaches the level exactly.
-    """
-    modes = place.arc.modes
-    if _jumps(place.model, modes, name, limited):
-        return (margin, None)
-    alone = all(modes[other] == mode for other, mode in place.before.items() if other != name)
-    return 0.0 if alone and place.before.get(name) == 0 else (0.0, None)
-
-
-def _starts_at_rest(place: Place, contact: Contact, at_rest: Sequence[str]) -> Ranges:
-    """Return slip = 0 for its state, at the start of stick and at a change of mode."""
-    name, state = contact.name, _state(place, contact)
-    mode = place.arc.modes[name]
-    was = place.before.get(name)
-    begins = mode == 0 and (was is not None or (not place.number and name in at_rest))
-    changes = was is not None and was != mode
-    return {state: 0.0} if state and (begins or changes) else {}
-
-
-def _end(base: Phase, place: Place) -> Ranges:
-    """Return the user's conditions at the end of this arc, if it ends a phase or at a via point."""
-    if place.closes:
-        return dict(base.end)
-    return dict(base.via[sorted(base.via)[place.leg.part]]) if place.ends else {}
-
-
-def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
-    """Return `end` with slip = 0 at the end of slipping, and without it if stick implies it."""
-    name, state = contact.name, _state(place, contact)
-    mode, then = place.arc.modes[name], place.after.get(contact.name)
-    if mode and then is not None and then != mode:
-        return end | {state or f"{name}_slip": 0.0}
-    return end if mode else {n: r for n, r in end.items() if n != state}
-
-
-def _caught(place: Place, limited: Collection[str]) -> tuple[dict[str, int], dict[str, int]]:
-    """Return contacts that stop under a control that may jump, and all contacts that stop.
-
-    Both with the direction of the previous slip.
-    """
-    modes = place.arc.modes
-    stopped = {n: side for n, side in place.before.items() if side and modes.get(n) == 0}
-    caught = {
-        name: side
-        for name, side in stopped.items()
-        if _jumps(place.model, {**modes, name: 1}, name, limited)
-    }
-    return caught, stopped
-
-
-def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:
-    """Return sticking contacts that break away by a force that cannot jump -> direction."""
-    modes = place.arc.modes
-    return {
-        name: side
-        for name, side in place.leaves.items()
-        if side and not _jumps(place.model, {**modes, name: side}, name, limited)
-    }
-
-
-def _inside(
-    problem: Problem, place: Place, contact: Contact, tight: Mapping[str, int], margin: float
-) -> Ranges:
-    """Return the direction of slip, or the friction margins in stick, over the whole arc."""
-    name, mode = contact.name, place.arc.modes[contact.name]
-    if not mode:
-        open_side = tight.get(name)
-        return {
-            f"{name}_{row}": (LEVEL if side == open_side else margin, None)
-            for side, row in SIDES.items()
-        }
-    found = carrier(problem.chain[place.leg.phase].model, contact)
-    if found is None:
-        return {f"{name}_slip": (-SIGN, None) if mode > 0 else (None, SIGN)}
-    state, factor = found
-    half = (0.0, inf) if mode * factor > 0 else (-inf, 0.0)
-    return {state: meet(problem.spans[place.leg.phase].box(state), half)}
-
-
-def _state(place: Place, contact: Contact) -> str | None:
-    """Return the state that is proportional to the slip of a contact, if there is one."""
-    found = carrier(place.model, contact)
-    return None if found is None else found[0]
-
-
-def _jumps(model: Model, modes: Mapping[str, int], name: str, limited: Collection[str]) -> bool:
-    """Return True if the force that holds a contact depends on an input that may jump."""
-    inputs = stacked(v.symbol for v in model.u if v.name not in limited)
-    return ca.depends_on(excess(model, modes, name, modes[name]), inputs)
-
-
-def _duration(problem: Problem, place: Place, shortest: float) -> float | Free:
-    """Return a free duration of the arc, or that of the phase if the arc is the whole phase."""
-    T = problem.chain[place.leg.phase].T
-    if place.opens and place.closes:
-        return T
-    most = T.upper if isinstance(T, Free) else T
-    guess = min(max(place.arc.duration, 2 * shortest), most)
-    return Free(shortest, most, guess)
-
-
-def _durations(problem: Problem, legs: Sequence[Leg]) -> tuple[Duration, ...]:
+def _durations(problem: Problem, legs: Legs) -> tuple[Duration, ...]:
     """Return the sums of durations: of mode intervals, and as given by the user."""
     first = 0
-    found: list[Duration] = []
+    sums: list[Duration] = []
     of_phase: dict[int, list[int]] = {}
     for leg in legs:
         numbers = list(range(first, first + len(leg.arcs)))
@@ -343,16 +123,273 @@ def _durations(problem: Problem, legs: Sequence[Leg]) -> tuple[Duration, ...]:
         phase = problem.chain[leg.phase]
         if isinstance(phase.T, Free):
             if len(numbers) > 1:
-                found.append((numbers, Free(phase.T.lower, phase.T.upper)))
+                sums.append((numbers, Free(phase.T.lower, phase.T.upper)))
         elif len(numbers) > 1 or phase.via:
             fractions = [0.0, *sorted(phase.via), 1.0]
             share = fractions[leg.part + 1] - fractions[leg.part]
-            found.append((numbers, share * phase.T))
+            sums.append((numbers, share * phase.T))
     for phases, total in problem.durations:
-        found.append(([n for phase in phases for n in of_phase[phase]], total))
+        sums.append(([n for phase in phases for n in of_phase[phase]], total))
+    return tuple(sums)
+
+
+def arcs_among(rules: Rules, legs: Legs) -> tuple["ArcPhase", ...]:
+    """Return all arcs among their neighbours."""
+    pairs = [(leg, arc) for leg in legs for arc in leg.arcs]
+    none: Sides = {}
+
+    def continued(i: int) -> bool:  # states are continuous from arc i - 1 to arc i
+        same = pairs[i - 1][0].phase == pairs[i][0].phase
+        return same or not rules.problem.chain[pairs[i][0].phase].link
+
+    found: list[ArcPhase] = []
+    for i, (leg, arc) in enumerate(pairs):
+        last = i == len(pairs) - 1
+        leaves = {c: 0 for c, mode in arc.modes.items() if not mode}
+        for c in leaves:
+            later = (other.modes.get(c, None) for _, other in pairs[i + 1 :])
+            leaves[c] = next((mode or 0 for mode in later if mode != 0), 0)
+        found.append(
+            ArcPhase(
+                rules=rules,
+                number=i,
+                arc=arc,
+                leg=leg,
+                opens=not i or pairs[i - 1][0].phase != leg.phase,
+                closes=last or pairs[i + 1][0].phase != leg.phase,
+                before=pairs[i - 1][1].modes if i and continued(i) else none,
+                after=none if last or not continued(i + 1) else pairs[i + 1][1].modes,
+                leaves=leaves,
+            )
+        )
     return tuple(found)
 
 
-def _only(given: Mapping[str, Value], names: Collection[str]) -> dict[str, Value]:
-    """Return the entries of `given` for these names."""
-    return {name: value for name, value in given.items() if name in names}
+@final
+@dataclass(frozen=True, eq=False)
+class ArcPhase:
+    """An arc among its neighbours.
+
+    Attributes:
+        rules: of the problem.
+        number: index of the arc.
+        leg: its mode interval.
+        opens, closes: whether it is the first or last one of the user's phase.
+        before, after: modes of the neighbours if states are continuous; else empty.
+        leaves: sticking contact -> direction of its next slip, 0 if it keeps sticking.
+    """
+
+    rules: Rules
+    number: int
+    arc: Arc
+    leg: Leg
+    opens: bool
+    closes: bool
+    before: Sides
+    after: Sides
+    leaves: Sides
+
+    @property
+    def base(self) -> Phase:
+        """The user's phase."""
+        return self.rules.problem.chain[self.leg.phase]
+
+    @cached_property
+    def inputs(self) -> ca.SX:
+        """Inputs that may jump: those without a bounded rate."""
+        limited = {*self.rules.problem.rates, *self.base.rates}
+        return stacked(v.symbol for v in self.base.model.u if v.name not in limited)
+
+    def jumps(self, name: str, side: int) -> bool:
+        """Return True if the force that holds a contact depends on an input that may jump."""
+        modes = {**self.arc.modes, name: side}
+        return ca.depends_on(excess(self.base.model, modes, name, side), self.inputs)
+
+    @cached_property
+    def released(self) -> list[str]:
+        """Contacts that start to slip at the start of this arc, or reverse there."""
+        first = dict.fromkeys(self.rules.at_rest, 0) if not self.number else {}
+        was = {**first, **self.before}
+        return [n for n, mode in self.arc.modes.items() if mode and was.get(n, mode) != mode]
+
+    @cached_property
+    def tight(self) -> Sides:
+        """Sticking contacts that break away by a force that cannot jump -> direction."""
+        return {n: side for n, side in self.leaves.items() if side and not self.jumps(n, side)}
+
+    def in_modes(self, fade: float) -> Phase:
+        """Return the phase of this arc: the user's conditions, and those of its modes.
+
+        The margin of a contact that breaks away decreases to zero within the time `fade` [s].
+        """
+        base, modes, margin = self.base, self.arc.modes, self.rules.margin
+        leaving = {n: side for n, side in self.tight.items() if self.after.get(n) == side}
+        stopped = {n: side for n, side in self.before.items() if side and modes.get(n) == 0}
+        caught = {n: side for n, side in stopped.items() if self.jumps(n, 1)}
+        margins = margin, fade
+        model = arc_model(
+            base.model, modes, self.released, leaving, caught, stopped, self.rules.sizes, margins
+        )
+        start: Ranges = dict(base.start) if self.opens else {}
+        link: dict[str, Start] = dict(base.link) if self.opens else {}
+        end: Ranges = dict(base.end) if self.closes else {}
+        if self.arc is self.leg.arcs[-1] and not self.closes:
+            end = dict(base.via[sorted(base.via)[self.leg.part]])
+        if leaving:
+            start, end = start | {LEFT: (0.0, None)}, end | {LEFT: 0.0}
+            link |= {LEFT: None} if self.number else {}
+        bounds: Ranges = dict(base.bounds)
+        for contact in sticking(base.model):
+            name, found = contact.name, carrier(base.model, contact)
+            state = found[0] if found else ""
+            mode, was, then = modes[name], self.before.get(name), self.after.get(name)
+            begins = was is not None or (not self.number and name in self.rules.at_rest)
+            if state and ((mode == 0 and begins) or (was is not None and was != mode)):
+                start[state] = 0.0
+                link |= {state: None} if self.number else {}
+            if not mode:
+                end.pop(state, None)  # implied by stick
+            elif then is not None and then != mode:
+                end[state or f"{name}_slip"] = 0.0
+            if mode:
+                bounds |= self._direction(name, mode, found)
+            else:
+                for side, row in SIDES.items():
+                    least = LEVEL if side == self.tight.get(name) else margin
+                    bounds[f"{name}_{row}"] = (least, None)
+                    # also between the start and the first point
+                    start[f"{name}{FIRST}{row}"] = (least, None)
+                start |= {f"{name}{CAUGHT}": (0.0, None)} if name in caught else {}
+                start |= {f"{name}{STOPPED}": (0.0, None)} if name in stopped else {}
+            if name in self.released:
+                start[f"{name}{PULLED}"] = self._pull(name)
+        signals = {*model.signals, *model.further}
+        return replace(
+            base,
+            model=model,
+            T=self._duration(),
+            start=only(start, signals),
+            end=only(end, signals),
+            via={},
+            bounds=only(bounds, signals),
+            link=only(link, signals),
+            joins=base.joins if self.opens else (),
+            cost=base.cost if self.closes or base.cost is None else replace(base.cost, end=()),
+            p=only(base.p, {v.name for v in model.p}),
+            name="",
+        )
+
+    def _direction(self, name: str, mode: int, found: tuple[str, int] | None) -> Ranges:
+        """Return the direction of slip as a bound over the whole arc."""
+        if found is None:
+            return {f"{name}_slip": (-SIGN, None) if mode > 0 else (None, SIGN)}
+        state, factor = found
+        half = (0.0, inf) if mode * factor > 0 else (-inf, 0.0)
+        return {state: meet(self.rules.problem.spans[self.leg.phase].boxes[state], half)}
+
+    def _pull(self, name: str) -> Range:
+        """Return the range of the excess of the holding force over the static level at break-away.
+
+        A force that cannot jump was below it until then: it reaches the level exactly.
+        """
+        modes = self.arc.modes
+        if self.jumps(name, modes[name]):
+            return (self.rules.margin, None)
+        alone = all(modes[other] == mode for other, mode in self.before.items() if other != name)
+        return 0.0 if alone and self.before.get(name) == 0 else (0.0, None)
+
+    def _duration(self) -> float | Free:
+        """Return a free duration of the arc, or that of the phase if the arc is the whole phase."""
+        T, shortest = self.base.T, self.rules.shortest
+        if self.opens and self.closes:
+            return T
+        most = limits(T)[1]
+        return Free(shortest, most, min(max(self.arc.duration, 2 * shortest), most))
+
+
+def breaks_away(span: Span) -> bool:
+    """Return True if some contact breaks away or is caught at the start of an arc."""
+    return any(name.endswith((PULLED, CAUGHT)) for name in span.model.outputs)
+
+
+def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
+    """Return the state proportional to the slip of `contact`, and the sign of the factor.
+
+    None if the slip is not a multiple of one state.
+    """
+    x = model.vector("x")
+    slope = ca.SX(ca.jacobian(contact.slip, x))
+    if slope.nnz() != 1 or not slope.is_constant():
+        return None
+    factor, index = float(ca.sum1(ca.sum2(ca.DM(slope)))), slope.sparsity().get_crs()[1][0]
+    if not ca.is_equal(ca.simplify(contact.slip - factor * x[index]), ca.SX(0), 2):
+        return None
+    return model.x[index].name, 1 if factor > 0 else -1
+
+
+def arc_model(
+    model: Model,
+    modes: Sides,
+    released: Sequence[str],
+    leaving: Sides,
+    caught: Sides,
+    stopped: Sides,
+    sizes: Mapping[str, float],
+    margin: tuple[float, float],
+) -> Model:
+    """Return the mode model of `modes` with the quantities of an arc's conditions as outputs.
+
+    Args:
+        model: the user's model.
+        modes: of all contacts that can stick.
+        released: contacts that break away at the start of the arc.
+        leaving: contacts that break away at its end by a force that cannot jump -> direction.
+        caught: contacts that stop at its start under a control that may jump -> direction of the
+            previous slip.
+        stopped: the same for all contacts that stop.
+        sizes: contact -> typical static level [N].
+        margin: friction margin in stick as a share of the level, and the time before the end of
+            the arc in which it decreases to zero if the contact breaks away [s].
+
+    Returns:
+        A model with "<contact>_slip"; as shares of the level "<contact>_up" and "<contact>_down",
+        the friction margins in both directions, minus margin times tanh (remaining time / that
+        time)^2 before break-away; "<contact>_first_up" and "<contact>_first_down", the same for
+        states and inputs at the start of an interval; "<contact>_pull", the excess of released
+        contacts; "<contact>_catch", the margin to the force of sliding back of caught contacts,
+        and "<contact>_stop" to that of sliding on of stopped contacts.
+    """
+    kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
+    groups = (modes, leaving, caught, stopped, sizes)
+    key = (*(tuple(group.items()) for group in groups), *released, *margin)
+    if key in kept:
+        return kept[key]
+    made = mode_model(model, modes)
+    outputs: dict[str, ca.SX] = {}
+    fading, catch = ca.SX(0), 1.0 - CATCH * margin[0]
+    if leaving:
+        left = Variable(LEFT, "s", nominal=0.1)
+        made = rebuilt(made, **further_states(made, (left,), ca.SX(-1.0)))
+        fading = margin[0] * ca.tanh((left.symbol / margin[1]) ** 2)
+    for c in sticking(model):
+        outputs[f"{c.name}_slip"] = c.slip
+        size, mode = sizes[c.name], modes[c.name]
+        if mode and c.name not in released:
+            continue
+        force, margins = holding(model, modes, c.name)
+        if mode:
+            outputs[f"{c.name}{PULLED}"] = -margins[mode] / size
+            continue
+        for side, name in SIDES.items():
+            less = fading if leaving.get(c.name) == side else 0.0
+            outputs[f"{c.name}_{name}"] = made.expression(f"{c.name}_grip_{name}") / size - less
+            outputs[f"{c.name}{FIRST}{name}"] = margins[side] / size
+        if side := stopped.get(c.name, 0):
+            ahead = side * c.sliding(side)
+            outputs[f"{c.name}{STOPPED}"] = (catch * ahead - side * force) / size
+        if side := caught.get(c.name, 0):
+            back = -side * c.sliding(-side)
+            outputs[f"{c.name}{CAUGHT}"] = (side * force + catch * back) / size
+    new = {name: Output(expression, "1") for name, expression in outputs.items()}
+    kept[key] = rebuilt(made, outputs={**made.outputs, **new})
+    return kept[key]

@@ -13,22 +13,22 @@ repeat, all modes of the contacts without velocity are tried; a single consisten
 accepted. If there is none, or more than one, the modes are undetermined (`SolveError`).
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from itertools import product
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.statement import further_states
-from ocp.friction.mode_models import loops_of, mode_model, nominal_load, slip_change
-from ocp.friction.smooth_models import jumps
+from ocp.formulation.expressions import arguments
+from ocp.formulation.statement import further_states, rebuilt
+from ocp.friction.mode_models import SIDES, loops_of, mode_model, nominal_load, slip_change
+from ocp.friction.smooth_models import sticking
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
-from symfric.foundation.variable import at_start
-from symfric.model import Contact, Event, Model
+from symfric.foundation.variable import at_start, stacked
+from symfric.model import Event, Model
 
 Array = NDArray[np.float64]
 Modes = dict[str, int]
@@ -45,49 +45,50 @@ MANY = 8
 NEWTON_STEPS, NEWTON_TOLERANCE = 60, 1e-11
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Instant:
+class Instant(NamedTuple):
     """State of a model for which its modes are decided.
 
     Attributes:
         t: time [s].
-        x, u, p: numbers in the order of the mode models.
+        x, u: numbers in the order of the mode models.
         guess: algebraic unknowns and friction forces "<contact>_F" by name.
     """
 
     t: float
     x: Array
     u: Array
-    p: Array
     guess: Mapping[str, float]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class InModes:
+class InModes(NamedTuple):
     """A model with one mode for each contact, and its functions.
 
     Attributes:
         model: with events at which a slipping contact stops or a sticking one is overloaded.
-        modes: of the contacts.
         unknowns: (t, x, z, u, p) -> residual of the algebraic equations, and its slopes by z.
         look: (t, x, z, u, p) -> for each contact: margin above, margin below, d slip/dt, F, N.
     """
 
     model: Model
-    modes: Modes
     unknowns: ca.Function
     look: ca.Function
 
 
 @final
 class Machine:
-    """A model with contact modes; one `InModes` for each combination of modes, cached."""
+    """A model with contact modes; one `InModes` for each combination of modes, cached.
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        self.contacts: tuple[Contact, ...] = tuple(c for c in model.contacts if jumps(model, c))
+    Attributes:
+        model: the user's model.
+        p: values of its parameters.
+        contacts: those that can stick.
+        sizes: typical holding forces of the contacts [N].
+        together: contacts that stick together with each one.
+        still: sliding velocity of each contact [m/s] treated as zero.
+    """
+
+    def __init__(self, model: Model, p: Array) -> None:
+        self.model, self.p, self.contacts = model, p, sticking(model)
         bare = model.open
         if bare.events:
             raise ValueError(
@@ -96,22 +97,19 @@ class Machine:
             )
         self._made: dict[tuple[int, ...], InModes] = {}
         self.sizes = {c.name: nominal_load(model, c) for c in self.contacts}
-        """Typical holding forces of the contacts [N]."""
         self.together = {c.name: (c.name,) for c in self.contacts}
-        """Contacts that stick together with each one."""
-        for loop in loops_of(model, self.contacts):
+        for loop in loops_of(model):
             names = tuple(c.name for c in loop.members)
             self.together |= dict.fromkeys(names, names)
         for c in self.contacts:
             slip_change(model, c)  # raises for slips that depend on an input
-        symbols = [bare.t, bare.vector("x"), model.vector("p")]
-        slips = ca.vertcat(ca.SX(0, 1), *(c.slip for c in self.contacts))
+        slips = stacked(c.slip for c in self.contacts)
         slopes = ca.densify(ca.jacobian(slips, bare.vector("x")))
+        symbols = [bare.t, bare.vector("x"), model.vector("p")]
         self._slips = ca.Function("slips", symbols, [slips, slopes])
         nominal = bare.nominal("x")
         touched = ca.DM(slopes.sparsity(), 1).full() != 0
         self.still = np.array([STILL * max(nominal[row], default=1.0) for row in touched])
-        """Sliding velocity of each contact [m/s] treated as zero."""
 
     def within(self, modes: Modes) -> InModes:
         """Return the model with these modes."""
@@ -121,46 +119,54 @@ class Machine:
         return self._made[key]
 
     def _make(self, modes: Modes) -> InModes:
+        """Return the model in modes, with the integrals of the friction margins as states.
+
+        Nothing depends on them. They make error control resolve a short overload of sticking
+        contacts, during which nothing moves.
+        """
         model = mode_model(self.model, modes)
-        symbols = [model.t, *(model.vector(letter) for letter in "xzup")]
-        x, z, rate = symbols[1], symbols[2], _rates(model)
+        symbols = arguments(model)
+        x, z, rate = symbols[1], symbols[2], ca.SX(0, 1) if model.ode is None else model.ode
         rows, events, margins = list[list[Any]](), list[Event](), dict[str, ca.SX]()
+
+        def event(name: str, expression: ca.SX) -> None:
+            events.append(Event(name, expression, -1, terminal=True))
+
         for c, still in zip(self.contacts, self.still, strict=True):
             change = ca.jtimes(c.slip, x, rate) + ca.jacobian(c.slip, model.t)
             mode = modes[c.name]
             if model.holonomic is None and not ca.SX(c.N).is_constant():
-                events.append(Event(f"{c.name}_lifts", c.N + OVERLOAD, -1, terminal=True))
+                event(f"{c.name}_lifts", c.N + OVERLOAD)
             if mode:
                 rows.append([np.inf, np.inf, change, c.sliding(mode), c.N])
-                events.append(Event(f"{c.name}_stops", mode * c.slip + still, -1, terminal=True))
+                event(f"{c.name}_stops", mode * c.slip + still)
                 continue
-            F, size = model.expression(f"{c.name}_reaction"), self.sizes[c.name]
-            up, down = (model.expression(f"{c.name}_grip_{side}") for side in ("up", "down"))
-            rows.append([up, down, change, F, c.N])
-            for side, margin in (("up", up), ("down", down)):
-                share = margin / size
-                events.append(Event(f"{c.name}_slips_{side}", share + OVERLOAD, -1, terminal=True))
-                margins[f"{c.name}_margin_{side}"] = share
+            grips = [model.expression(f"{c.name}_grip_{side}") for side in SIDES.values()]
+            rows.append([*grips, change, model.expression(f"{c.name}_reaction"), c.N])
+            for side, grip in zip(SIDES.values(), grips, strict=True):
+                share = margins[f"{c.name}_margin_{side}"] = grip / self.sizes[c.name]
+                event(f"{c.name}_slips_{side}", share + OVERLOAD)
+        states = tuple(Variable(name, "s") for name in margins)
+        changes = further_states(model, states, stacked(margins.values()))
         seen = ca.vertcat(ca.SX(0, 5), *(ca.horzcat(*map(ca.SX, row)) for row in rows))
+        unknowns = [ca.densify(model.alg), ca.densify(ca.jacobian(model.alg, z))]
         return InModes(
-            _ending(model, tuple(events), margins),
-            dict(modes),
-            ca.Function("unknowns", symbols,
-                        [ca.densify(model.alg), ca.densify(ca.jacobian(model.alg, z))]),
+            rebuilt(model, events=tuple(events), **changes),
+            ca.Function("unknowns", symbols, unknowns),
             ca.Function("look", symbols, [ca.densify(seen)]),
-        )  # fmt: skip
+        )
 
-    def slips(self, t: float, x: Array, p: Array) -> tuple[Array, Array]:
+    def slips(self, t: float, x: Array) -> tuple[Array, Array]:
         """Return sliding velocities, shape (n,), and their derivatives by the states, (n, nx)."""
-        values, slopes = self._slips(t, x, p)
+        values, slopes = self._slips(t, x, self.p)
         return values.full()[:, 0], slopes.full()
 
-    def at_rest(self, t: float, x: Array, p: Array, modes: Modes) -> Array:
+    def at_rest(self, t: float, x: Array, modes: Modes) -> Array:
         """Return the nearest states in which sticking contacts have zero slip.
 
         The correction removes rounding and event location errors, about 1e-11 of a velocity.
         """
-        values, slopes = self.slips(t, x, p)
+        values, slopes = self.slips(t, x)
         held = [i for i, c in enumerate(self.contacts) if not modes[c.name]]
         if not held:
             return x
@@ -173,36 +179,44 @@ class Machine:
             SolveError: Newton's method fails.
         """
         made = self.within(modes)
-        names = [v.name for v in made.model.z]
-        z = np.array([_guessed(v.name, at.guess, v.start, made.model, at.p) for v in made.model.z])
-        residual, slope = (m.full() for m in made.unknowns(at.t, at.x, z, at.u, at.p))
+        variables = made.model.z
+        z = np.array([self._guess(v, at.guess, made.model) for v in variables])
+        residual, slope = (m.full() for m in made.unknowns(at.t, at.x, z, at.u, self.p))
         size = np.maximum(np.abs(slope).max(axis=1, initial=1e-300), 1e-300)
-        scale = np.array(
-            [max(v.nominal, abs(value)) for v, value in zip(made.model.z, z, strict=True)]
-        )
+        scale = np.maximum([v.nominal for v in variables], np.abs(z))
         for _ in range(NEWTON_STEPS):
             worst = np.abs(residual[:, 0] / size).max(initial=0.0)
             if worst <= NEWTON_TOLERANCE * max(1.0, float(np.max(scale, initial=0.0))):
-                return dict(zip(names, z, strict=True)), made.look(at.t, at.x, z, at.u, at.p).full()
+                names = (v.name for v in variables)
+                look = made.look(at.t, at.x, z, at.u, self.p).full()
+                return dict(zip(names, z, strict=True)), look
             step = np.linalg.lstsq(slope, residual[:, 0], rcond=None)[0]
             for damping in (1.0, 0.5, 0.25, 0.1, 0.02):
                 tried = z - damping * step
-                residual, slope = (m.full() for m in made.unknowns(at.t, at.x, tried, at.u, at.p))
+                parts = made.unknowns(at.t, at.x, tried, at.u, self.p)
+                residual, slope = (m.full() for m in parts)
                 if np.abs(residual[:, 0] / size).max() < worst:
                     break
             z = tried
             scale = np.maximum(scale, np.abs(z))
         raise self.undecided(at.t, f"Newton's method found no reactions with {shown(modes)}")
 
+    def _guess(self, v: Variable, guess: Mapping[str, float], model: Model) -> float:
+        contact = v.name.removesuffix("_reaction")
+        for name in (v.name, *([f"{contact}_F"] if contact != v.name else [])):
+            if name in guess:
+                return guess[name]
+        return float(at_start(ca.substitute(ca.SX(v.start), model.vector("p"), ca.DM(self.p)), ()))
+
     def margin(self, modes: Modes, at: Instant) -> float:
         """Return the least friction margin of sticking contacts, over nominal loads; < 0: slip."""
         _, look = self.solved(modes, at)
-        found = [
+        margins = [
             min(row[0], row[1]) / self.sizes[c.name]
             for c, row in zip(self.contacts, look, strict=True)
             if not modes[c.name]
         ]
-        return min(found, default=np.inf) + OVERLOAD
+        return min(margins, default=np.inf) + OVERLOAD
 
     def undecided(self, t: float, why: str) -> SolveError:
         """Return the SolveError for undetermined contact modes."""
@@ -211,116 +225,80 @@ class Machine:
             Status.SOLVER_FAILED,
         )
 
+    def decided(self, at: Instant, modes: Modes) -> tuple[Modes, dict[str, float]]:
+        """Return the modes after this instant, with the unknowns and forces "<contact>_F".
 
-def _ending(model: Model, events: tuple[Event, ...], margins: Mapping[str, ca.SX]) -> Model:
-    """Return `model` with events, and the integrals of the `margins` as states.
+        Args:
+            at: the instant; its states determine the contacts without velocity.
+            modes: modes before it; 0 for contacts that stopped.
 
-    Nothing depends on them. They make error control resolve a short overload of sticking contacts,
-    during which nothing moves.
-    """
-    states = tuple(Variable(name, "s") for name in margins)
-    rates = ca.vertcat(ca.SX(0, 1), *margins.values())
-    return replace(model, events=events, **further_states(model, states, rates))
+        Raises:
+            SolveError: no unique consistent modes.
+        """
+        slips = zip(self.contacts, self.slips(at.t, at.x)[0], self.still, strict=True)
+        free = [c.name for c, v, still in slips if abs(v) <= still]
+        trial, seen = dict(modes), list[Modes]()
+        while trial not in seen:
+            seen.append(dict(trial))
+            found, look = self.solved(trial, at)
+            objection = self._objection(trial, free, look)
+            if objection is None:
+                if lifted := self._lifted(look):
+                    raise self.undecided(at.t, f"with {shown(trial)} {lifted} lifts off")
+                return trial, found | self._forces(look)
+            trial |= objection
+        return self._tried(at, trial, free)
 
+    def _forces(self, look: Array) -> dict[str, float]:
+        pairs = zip(self.contacts, look, strict=True)
+        return {f"{c.name}_F": float(row[3]) for c, row in pairs}
 
-def _rates(model: Model) -> ca.SX:
-    return ca.SX(0, 1) if model.ode is None else model.ode
+    def _lifted(self, look: Array) -> str:
+        """Return the first contact with a negative normal force, or ""."""
+        pairs = zip(self.contacts, look, strict=True)
+        return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
 
+    def _objection(self, modes: Modes, free: list[str], look: Array) -> Modes | None:
+        """Return corrected modes of the worst inconsistent contact and those that stick with it."""
+        largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
+        forces = self._forces(look)
+        found: list[tuple[float, str, Modes]] = []
+        for c, (up, down, change, *_) in zip(self.contacts, look, strict=True):
+            mode, members = modes[c.name], self.together[c.name]
+            slack = OVERLOAD * self.sizes[c.name] / 2
+            if not mode and max(-up, -down) > slack:
+                away = {c.name: 1 if -up > -down else -1}
+                if len(members) > 1:
+                    away = {name: 1 if forces[f"{name}_F"] > 0 else -1 for name in members}
+                share = max(-up, -down) / max((up + down) / 2, slack)
+                found.append((2.0 + share, c.name, away))
+            elif mode and c.name in free and mode * change < -TURNING * largest:
+                still = {*members} <= {*free}
+                rest = dict.fromkeys(members, 0) if still else {c.name: -mode}
+                found.append((-mode * change / largest, c.name, rest))
+        return max(found, key=lambda one: one[:2])[2] if found else None
 
-def _guessed(name: str, guess: Mapping[str, float], start: Any, model: Model, p: Array) -> float:
-    if name in guess:
-        return guess[name]
-    if name.endswith("_reaction") and (F := f"{name.removesuffix('_reaction')}_F") in guess:
-        return guess[F]
-    return float(at_start(ca.substitute(ca.SX(start), model.vector("p"), ca.DM(p)), ()))
+    def _tried(self, at: Instant, modes: Modes, free: list[str]) -> tuple[Modes, dict[str, float]]:
+        """Try all combinations of modes of the contacts without velocity."""
+        if len(free) > MANY or any(len(self.together[name]) > 1 for name in free):
+            raise self.undecided(at.t, f"{len(free)} contacts without velocity have cyclic modes")
+        fits: list[tuple[Modes, dict[str, float]]] = []
+        for choice in product((0, 1, -1), repeat=len(free)):
+            trial = modes | dict(zip(free, choice, strict=True))
+            try:
+                found, look = self.solved(trial, at)
+            except SolveError:
+                continue
+            if self._objection(trial, free, look) is None and not self._lifted(look):
+                fits.append((trial, found | self._forces(look)))
+        if len(fits) != 1:
+            what = "; ".join(shown(m) for m, _ in fits)
+            text = f"{what} are consistent" if fits else "no choice of modes is consistent"
+            raise self.undecided(at.t, text)
+        return fits[0]
 
 
 def shown(modes: Modes) -> str:
     """Return modes as text."""
     words = {1: "slip+", 0: "stick", -1: "slip-"}
     return ", ".join(f"{name} {words[mode]}" for name, mode in modes.items())
-
-
-def decided(machine: Machine, at: Instant, modes: Modes) -> tuple[Modes, dict[str, float]]:
-    """Return the modes after this instant, with the unknowns and forces "<contact>_F".
-
-    Args:
-        machine: the model.
-        at: the instant; its states determine the contacts without velocity.
-        modes: modes before it; 0 for contacts that stopped.
-
-    Raises:
-        SolveError: no unique consistent modes.
-    """
-    slips = machine.slips(at.t, at.x, at.p)[0]
-    free = [c.name for c, v, still in zip(machine.contacts, slips, machine.still, strict=True)
-            if abs(v) <= still]  # fmt: skip
-    trial, seen = dict(modes), list[Modes]()
-    while trial not in seen:
-        seen.append(dict(trial))
-        found, look = machine.solved(trial, at)
-        objection = _objection(machine, trial, free, look)
-        if objection is None:
-            if lifted := _lifted(machine, look):
-                raise machine.undecided(at.t, f"with {shown(trial)} {lifted} lifts off")
-            return trial, found | _forces(machine, look)
-        trial |= objection
-    return _tried(machine, at, trial, free)
-
-
-def _forces(machine: Machine, look: Array) -> dict[str, float]:
-    return {f"{c.name}_F": float(row[3]) for c, row in zip(machine.contacts, look, strict=True)}
-
-
-def _lifted(machine: Machine, look: Array) -> str:
-    """Return the first contact with a negative normal force, or ""."""
-    pairs = zip(machine.contacts, look, strict=True)
-    return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
-
-
-def _objection(machine: Machine, modes: Modes, free: list[str], look: Array) -> Modes | None:
-    """Return corrected modes of the worst inconsistent contact and those that stick with it."""
-    largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
-    forces = _forces(machine, look)
-    found: list[tuple[float, str, Modes]] = []
-    for c, (up, down, change, *_) in zip(machine.contacts, look, strict=True):
-        mode, members = modes[c.name], machine.together[c.name]
-        if not mode:
-            slack = OVERLOAD * machine.sizes[c.name] / 2
-            excess = max(-up, -down)
-            if excess > slack:
-                away = {c.name: 1 if -up > -down else -1}
-                if len(members) > 1:
-                    away = {name: 1 if forces[f"{name}_F"] > 0 else -1 for name in members}
-                found.append((2.0 + excess / max((up + down) / 2, slack), c.name, away))
-        elif c.name in free and mode * change < -TURNING * largest:
-            still = {*members} <= {*free}
-            rest = dict.fromkeys(members, 0) if still else {c.name: -mode}
-            found.append((-mode * change / largest, c.name, rest))
-    return max(found, key=lambda one: one[:2])[2] if found else None
-
-
-def _tried(
-    machine: Machine, at: Instant, modes: Modes, free: list[str]
-) -> tuple[Modes, dict[str, float]]:
-    """Try all combinations of modes of the contacts without velocity."""
-    if len(free) > MANY or any(len(machine.together[name]) > 1 for name in free):
-        raise machine.undecided(at.t, f"{len(free)} contacts without velocity have cyclic modes")
-    fits = list(_consistent(machine, at, modes, free))
-    if len(fits) != 1:
-        what = "; ".join(shown(m) for m, _ in fits) if fits else "no choice of modes"
-        raise machine.undecided(at.t, f"{what} are consistent" if fits else f"{what} is consistent")
-    return fits[0]
-
-
-def _consistent(
-    machine: Machine, at: Instant, modes: Modes, free: list[str]
-) -> Iterator[tuple[Modes, dict[str, float]]]:
-    for choice in product((0, 1, -1), repeat=len(free)):
-        trial = modes | dict(zip(free, choice, strict=True))
-        try:
-            found, look = machine.solved(trial, at)
-        except SolveError:
-            continue
-        if _objection(machine, trial, free, look) is None and not _lifted(machine, look):
-            yield trial, found | _forces(machine, look)

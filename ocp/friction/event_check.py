@@ -23,18 +23,17 @@ their laws.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.checking.resimulate import Arc, Run, arcs_of, resimulated
-from ocp.checking.verification import Miss, Verification
-from ocp.checking.verify import cost_of, looked
-from ocp.friction.contact_modes import Instant, Machine, Modes, decided
+from ocp.checking.verify import cost_of, misses_of
+from ocp.friction.contact_modes import Instant, Machine, Modes
 from ocp.friction.exact_motion import Given, Inputs, Piece, SetValued
 from ocp.solving.solution import Solution
+from ocp.solving.verification import Miss, Verification
 from symfric import Hold, Trajectory, simulate
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
@@ -97,28 +96,23 @@ def set_valued(
         if t_eval is None
         else checks.times("set_valued: t_eval", t_eval, begin, end)
     )
-    machine = Machine(model)
+    machine = Machine(model, model.values("p", p or {}))
     run = _Run(machine, Inputs(model, dict(u or {}), end), dict(p or {}), rtol)
     state = run.start(begin, dict(x0 or {}), dict(modes or {}))
-    problem: SolveError | None = None
+    status, message, problem = Status.SUCCESS, Status.SUCCESS.value, False
     try:
         run.go(state, end)
     except SolveError as error:
-        problem = error
-    status, message = (
-        (problem.status, str(problem)) if problem else (Status.SUCCESS, Status.SUCCESS.value)
-    )
+        status, message, problem = error.status, str(error), True
     names = tuple(c.name for c in machine.contacts)
     reached = run.pieces[-1].end if run.pieces else begin
     made = SetValued(model, wanted[wanted <= reached], tuple(run.pieces), status, message, names)
     if problem and throw:
-        raise SolveError(str(problem), problem.status, made if run.pieces else None)
+        raise SolveError(message, status, made if run.pieces else None)
     return made
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _State:
+class _State(NamedTuple):
     t: float
     x: Array
     modes: Modes
@@ -131,7 +125,7 @@ class _Run:
 
     def __init__(self, machine: Machine, inputs: Inputs, p: dict[str, float], rtol: float) -> None:
         self.machine, self.inputs, self.p, self.rtol = machine, inputs, p, rtol
-        self.values = machine.model.values("p", p)
+        self.names = [v.name for v in machine.model.open.x]
         self.pieces: list[Piece] = []
 
     def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> _State:
@@ -139,18 +133,13 @@ class _Run:
         machine, model = self.machine, self.machine.model
         names = [c.name for c in machine.contacts]
         checks.check_names("set_valued: modes", modes, names)
-        of_laws = {v.name for c in model.contacts for v in c.states}
-        own = {
-            v.name: float(x)
-            for v, x in zip(model.x, model.initial_state(x0, self.p), strict=True)
-            if v.name not in of_laws
-        }
-        x = np.array([own[v.name] for v in model.open.x])  # fmt: skip
-        slips = machine.slips(t, x, self.values)[0]
+        start = model.initial_state(x0, self.p)
+        values = {v.name: float(value) for v, value in zip(model.x, start, strict=True)}
+        x = np.array([values[name] for name in self.names])
         found: Modes = {}
-        for name, v, still in zip(names, slips, machine.still, strict=True):
+        for name, v, still in zip(names, machine.slips(t, x)[0], machine.still, strict=True):
             found[name] = modes.get(name, 0) if abs(v) <= still else int(np.sign(v))
-        return _State(t, machine.at_rest(t, x, self.values, found), found, {})
+        return _State(t, machine.at_rest(t, x, found), found, {})
 
     def go(self, state: _State, end: float) -> None:
         """Simulate all pieces up to `end`."""
@@ -170,23 +159,24 @@ class _Run:
     def piece(self, state: _State, end: float) -> _State:
         """Decide the modes, simulate to the next change, and update modes of stopped contacts."""
         t, machine = state.t, self.machine
-        at = Instant(t, state.x, self.inputs.at(t), self.values, state.guess)
-        modes, guess = decided(machine, at, state.modes)
-        made = machine.within(modes)
-        names = [v.name for v in machine.model.open.x]
-        x0 = dict(zip(names, state.x.tolist(), strict=True))
-        run = self._run(made.model, t, self.inputs.next(t, end), x0)
-        self._same_unknowns(run, made.model, guess, t)
-        reached = run.span[1]
+        at = Instant(t, state.x, self.inputs.at(t), state.guess)
+        modes, guess = machine.decided(at, state.modes)
+        model = machine.within(modes).model
+        run = self._run(model, t, self.inputs.next(t, end), state.x)
+        begin, reached = self._unknowns(run, model, t), run.span[1]
+        for v in model.z:
+            value = begin[v.name]
+            if abs(value - guess[v.name]) > APART * max(v.nominal, abs(value)):
+                raise machine.undecided(
+                    t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
+                )
         if run.status is Status.TERMINATED:
             reached = self._overloaded(run, modes, guess, reached)
         self.pieces.append(Piece(run, modes, t, reached))
         x = self._states(run, reached)
-        if made.model.z:
-            z = run.express(symbols_of(made.model.z), np.array([reached]))[:, 0]
-            guess |= dict(zip((v.name for v in made.model.z), z.tolist(), strict=True))
-        modes = modes | self._stopped(modes, machine.slips(reached, x, self.values)[0])
-        return _State(reached, machine.at_rest(reached, x, self.values, modes), modes, guess)
+        guess |= self._unknowns(run, model, reached)
+        modes = modes | self._stopped(modes, machine.slips(reached, x)[0])
+        return _State(reached, machine.at_rest(reached, x, modes), modes, guess)
 
     def _stopped(self, modes: Modes, slips: Array) -> Modes:
         """Return modes of stopped contacts: stick, or reversal at a dead centre of their loop."""
@@ -200,11 +190,11 @@ class _Run:
                 found |= {c.name: -modes[c.name]} if turns else dict.fromkeys(members, 0)
         return found
 
-    def _run(self, model: Model, begin: float, end: float, x0: dict[str, float]) -> Trajectory:
+    def _run(self, model: Model, begin: float, end: float, x: Array) -> Trajectory:
         try:
             run = simulate(
-                model, end, t_start=begin, x0=x0, u=self.inputs.within(begin), p=self.p,
-                rtol=self.rtol, samples=2, throw=False,
+                model, end, t_start=begin, x0=dict(zip(self.names, x.tolist(), strict=True)),
+                u=self.inputs.within(begin), p=self.p, rtol=self.rtol, samples=2, throw=False,
             )  # fmt: skip
         except JammedError as error:
             raise SolveError(f"at t = {begin:.9g} s: {error}", Status.JAMMED) from None
@@ -217,8 +207,15 @@ class _Run:
         return run
 
     def _states(self, run: Trajectory, t: float) -> Array:
-        found = run.states(np.array([t]))
-        return np.array([float(found[v.name][-1]) for v in self.machine.model.open.x])
+        states = run.states(np.array([t]))
+        return np.array([float(states[name][-1]) for name in self.names])
+
+    def _unknowns(self, run: Trajectory, model: Model, t: float) -> dict[str, float]:
+        """Return the algebraic unknowns of a run by name."""
+        if not model.z:
+            return {}
+        values = run.express(symbols_of(model.z), np.array([t]))[:, 0].tolist()
+        return dict(zip((v.name for v in model.z), values, strict=True))
 
     def _overloaded(
         self, run: Trajectory, modes: Modes, guess: Mapping[str, float], t: float
@@ -228,47 +225,31 @@ class _Run:
         Between steps the integrator's reactions have the accuracy of its interpolation; here the
         algebraic equations are solved at each time.
         """
+        begin = run.span[0]
 
-        def room(time: float) -> float:
-            x = self._states(run, time)
-            return self.machine.margin(
-                modes,
-                Instant(time, x, self.inputs.within_piece(run.span[0], time), self.values, guess),
-            )
+        def margin(time: float) -> float:
+            x, u = self._states(run, time), self.inputs.at(time, begin)
+            return self.machine.margin(modes, Instant(time, x, u, guess))
 
-        high, above = t, room(t)
+        high, above = t, margin(t)
         if not above < 0.0:
             return t
-        step = 1e-9 * (t - run.span[0])
-        low, below = t, above
+        low, below, step = t, above, 1e-9 * (t - begin)
         while below < 0.0:
-            low = max(run.span[0], t - step)
-            below, step = room(low), 8.0 * step
-            if low == run.span[0] and below < 0.0:
+            low = max(begin, t - step)
+            below, step = margin(low), 8.0 * step
+            if low == begin and below < 0.0:
                 return t
         for _ in range(100):
             middle = low + (high - low) * below / (below - above)
             if not low < middle < high or high - low <= 1e-15 * max(1.0, abs(t)):
                 break
-            value = room(middle)
+            value = margin(middle)
             if value < 0.0:
                 high, above, below = middle, value, below / 2
             else:
                 low, below, above = middle, value, above / 2
         return float(high)
-
-    def _same_unknowns(
-        self, run: Trajectory, model: Model, guess: Mapping[str, float], t: float
-    ) -> None:
-        """Raise SolveError if the integrator found other algebraic unknowns than `guess`."""
-        if not model.z:
-            return
-        found = run.express(symbols_of(model.z), np.array([t]))[:, 0]
-        for v, value in zip(model.z, found, strict=True):
-            if abs(value - guess[v.name]) > APART * max(v.nominal, abs(value)):
-                raise self.machine.undecided(
-                    t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
-                )
 
 
 def verify_exactly(
@@ -293,21 +274,15 @@ def verify_exactly(
     problem = solution.problem
     arcs = arcs_of(problem, solution.meshes, solution.points)
     runs, _, failed = _followed(arcs, rtol)
-    value = float("nan") if failed else cost_of(problem, runs)
-    checked = list(looked(problem, runs, optimised=False))
+    checked, value = list(misses_of(problem, runs, optimised=False)), float("nan")
     if not failed:
+        value = cost_of(problem, runs)
         size = max(abs(value), abs(solution.cost)) or 1.0
         checked.append(Miss("cost", "the cost", runs[-1].end, value, solution.cost, size))
-    return Verification(
-        tolerance=tolerance,
-        rtol=rtol,
-        checked=tuple(sorted(checked, key=lambda miss: -miss.relative)),
-        local_errors=(),
-        trajectories=tuple(run.trajectory for run in runs),
-        cost=value,
-        failed=failed,
-        failure=Status.SOLVER_FAILED if failed else Status.SUCCESS,
-    )
+    worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
+    trajectories = tuple(run.trajectory for run in runs)
+    failure = Status.SOLVER_FAILED if failed else Status.SUCCESS
+    return Verification(tolerance, rtol, worst_first, (), trajectories, value, failed, failure)
 
 
 def motions(solution: Solution, rtol: float = RTOL) -> tuple[SetValued, ...]:
@@ -328,7 +303,7 @@ def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[S
         rows = zip(arc.span.model.u, arc.u, strict=True)
         try:
             motion = set_valued(
-                arc.span.model, arc.end, t_start=float(arc.times[0]),
+                arc.span.model, float(arc.times[-1]), t_start=float(arc.times[0]),
                 x0={name: x for name, x in start.items() if np.isfinite(x)},
                 u={v.name: Hold(arc.times[:-1], row) for v, row in rows}, p=arc.parameters(),
                 t_eval=arc.times, rtol=rtol,
@@ -337,7 +312,7 @@ def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[S
             failures.append(str(error))
             return None
         found.append(motion)
-        return Run(arc, motion.trajectory, arc.end)
+        return Run(arc, motion.trajectory, float(arc.times[-1]))
 
     runs = resimulated(arcs, follow=follow)
     return runs, found, next(iter(failures), "")

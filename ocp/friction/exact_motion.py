@@ -1,9 +1,9 @@
 """A piecewise motion with constant contact modes and continuous inputs in each piece."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -14,6 +14,7 @@ from ocp.solving.solution import Mode
 from symfric import Hold, Linear, Statistics, Trajectory
 from symfric.foundation import checks
 from symfric.foundation.status import Status
+from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -30,7 +31,6 @@ class Inputs:
     def __init__(self, model: Model, given: dict[str, Given], end: float) -> None:
         self.model = model
         self.given: dict[str, Given] = model.named("u", given)
-        self._functions: dict[str, ca.Function] = {}
         sampled = [v for v in self.given.values() if isinstance(v, Hold | Linear)]
         if any(s.rows is not None for s in sampled):
             raise checks.refused(
@@ -38,13 +38,12 @@ class Inputs:
             )
         knots = [np.asarray(s.t, dtype=float) for s in sampled]
         self.knots = np.unique(np.concatenate([*knots, [end]]))
-
-    def within_piece(self, begin: float, t: float) -> Array:
-        """Return values at `t` in the piece that begins at `begin`; held inputs stay held."""
-        found = {
-            n: self._at(n, v, begin if isinstance(v, Hold) else t) for n, v in self.given.items()
+        symbol = ca.SX.sym("t")
+        self._functions = {
+            name: ca.Function("u", [symbol], [ca.SX(value(symbol))])
+            for name, value in self.given.items()
+            if not isinstance(value, Hold | Linear) and callable(value)
         }
-        return self.model.values("u", found)
 
     def next(self, t: float, end: float) -> float:
         """Return the end of the piece that begins at `t`."""
@@ -53,33 +52,31 @@ class Inputs:
 
     def within(self, t: float) -> dict[str, Any]:
         """Return the inputs of the piece that begins at `t`."""
-        return {
-            n: float(self._at(n, v, t)) if isinstance(v, Hold) else v for n, v in self.given.items()
-        }
+        return {n: self._at(n, t) if isinstance(v, Hold) else v for n, v in self.given.items()}
 
-    def at(self, t: float) -> Array:
-        """Return values just after the instant `t`, in the order of the model."""
-        found = {n: self._at(n, v, t) for n, v in self.given.items()}
-        return self.model.values("u", found)
+    def at(self, t: float, begin: float | None = None) -> Array:
+        """Return values just after the instant `t`, in the order of the model.
 
-    def _at(self, name: str, value: Given, t: float) -> float:
+        With `begin` they are those at `t` of the piece that begins there: held inputs stay held.
+        """
+        held = t if begin is None else begin
+        values = {n: self._at(n, held if isinstance(v, Hold) else t) for n, v in self.given.items()}
+        return self.model.values("u", values)
+
+    def _at(self, name: str, t: float) -> float:
+        value = self.given[name]
         if isinstance(value, Hold):
             times = np.asarray(value.t)
             k = int(np.searchsorted(times, t + LATER * max(1.0, abs(t)), side="right")) - 1
             return float(np.asarray(value.values)[max(k, 0)])
         if isinstance(value, Linear):
             return float(np.interp(t, np.asarray(value.t), np.asarray(value.values)))
-        if callable(value):
-            if name not in self._functions:
-                symbol = ca.SX.sym("t")
-                self._functions[name] = ca.Function("u", [symbol], [ca.SX(value(symbol))])
+        if name in self._functions:
             return float(self._functions[name](t))
         return checks.number(f"set_valued: u: {name}", value)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Piece:
+class Piece(NamedTuple):
     """A run in which no contact changes its mode and no input jumps."""
 
     run: Trajectory
@@ -119,17 +116,16 @@ class SetValued:
     @cached_property
     def modes(self) -> dict[str, tuple[Mode, ...]]:
         """Contact -> its modes over time."""
-        found: dict[str, tuple[Mode, ...]] = {}
+        modes: dict[str, tuple[Mode, ...]] = {}
         for name in self.contacts:
             merged: list[Mode] = []
             for piece in self.pieces:
-                kind = KINDS[piece.modes[name]]
+                kind, begin = KINDS[piece.modes[name]], piece.begin
                 if merged and merged[-1].kind == kind:
-                    merged[-1] = Mode(kind, merged[-1].begin, piece.end)
-                else:
-                    merged.append(Mode(kind, piece.begin, piece.end))
-            found[name] = tuple(m for m in merged if m.end > m.begin)
-        return found
+                    begin = merged.pop().begin
+                merged.append(Mode(kind, begin, piece.end))
+            modes[name] = tuple(m for m in merged if m.end > m.begin)
+        return modes
 
     @cached_property
     def last(self) -> Modes:
@@ -142,10 +138,12 @@ class SetValued:
 
         Expressions with law states, or with algebraic unknowns of other laws, are NaN.
         """
-        units = {n: u for n, u in self.model.signals.items() if n in self._known}
+        of_laws = {v.name for c in self.model.contacts for v in c.states}
+        known = set.intersection(*(set(p.run.units) for p in self.pieces)) - of_laws
+        units = {n: u for n, u in self.model.signals.items() if n in known}
         contacts = {c.name: c for c in self.model.contacts}
         units |= {f"{name}_F": contacts[name].unit("N") for name in self.contacts}
-        changes = ((p.end, "change") for p in self.pieces[:-1])
+        inner = [p.run.step_times[(p.run.step_times < p.end)] for p in self.pieces]
         return Trajectory(
             scene=self.model.name,
             t=self.t,
@@ -154,19 +152,13 @@ class SetValued:
             message=self.message,
             count=self._statistics,
             span=self.span,
-            ends=self._ends,
+            ends=lambda: np.unique(np.concatenate([*inner, [self.span[1]]])),
             states=self._states,
             evaluate=self._evaluated,
             express=self._expressed,
             model=self.model,
-            happened=tuple(changes),
+            happened=tuple((p.end, "change") for p in self.pieces[:-1]),
         )
-
-    @cached_property
-    def _known(self) -> set[str]:
-        """Signals common to all pieces, without law states."""
-        of_laws = {v.name for c in self.model.contacts for v in c.states}
-        return set.intersection(*(set(p.run.units) for p in self.pieces)) - of_laws
 
     def _statistics(self) -> Statistics:
         every = [p.run.statistics for p in self.pieces]
@@ -175,10 +167,6 @@ class SetValued:
         total = {name: sum(getattr(s, name) for s in every) for name in names}
         least = min(s.smallest_step for s in every)
         return replace(every[0], **total, events=len(self.pieces) - 1, smallest_step=least)
-
-    def _ends(self) -> Array:
-        inner = [p.run.step_times[(p.run.step_times < p.end)] for p in self.pieces]
-        return np.unique(np.concatenate([*inner, [self.span[1]]]))
 
     def _pieces_at(self, at: Array) -> Iterator[tuple[Piece, NDArray[np.bool_], Array]]:
         """Yield each piece with its times; at a change of mode the later piece."""
@@ -189,34 +177,39 @@ class SetValued:
             yield piece, here, np.clip(at[here], piece.begin, piece.end)
 
     def _states(self, at: Array) -> dict[str, Array]:
-        found = {v.name: np.zeros(at.size) for v in self.model.open.x}
+        states = {v.name: np.zeros(at.size) for v in self.model.open.x}
         for piece, here, times in self._pieces_at(at):
             values = piece.run.states(times)
-            for name, row in found.items():
+            for name, row in states.items():
                 row[here] = values[name]
-        return found
+        return states
 
     def _evaluated(self, at: Array) -> dict[str, Array]:
-        found = {name: np.zeros(at.size) for name in self.trajectory.units}
+        signals = {name: np.zeros(at.size) for name in self.trajectory.units}
+        contacts = {c.name: c for c in self.model.contacts}
         for piece, here, times in self._pieces_at(at):
             values = piece.run.at(times)
             for name in self.contacts:
-                values[f"{name}_F"] = _force(piece, name, values, times, self.model)
-            for name, row in found.items():
+                mode = piece.modes[name]
+                values[f"{name}_F"] = (
+                    piece.run.express(contacts[name].sliding(mode), times)[0]
+                    if mode
+                    else values[f"{name}_reaction"]
+                )
+            for name, row in signals.items():
                 row[here] = values[name]
-        return found
+        return signals
 
     def _expressed(self, column: ca.SX, at: Array) -> Array:
-        found = np.full((column.numel(), at.size), np.nan)
+        values = np.full((column.numel(), at.size), np.nan)
         for piece, here, times in self._pieces_at(at):
-            known = {
-                v.symbol.__hash__() for group in "xzup" for v in getattr(piece.run.model, group)
-            }
+            model = piece.run.model
+            known = {v.symbol.__hash__() for group in "xzup" for v in getattr(model, group)}
             every = [v.symbol for group in "xz" for v in getattr(self.model, group)]
-            gone = ca.vertcat(ca.SX(0, 1), *(s for s in every if s.__hash__() not in known))
+            gone = stacked(s for s in every if s.__hash__() not in known)
             there = ca.substitute(column, gone, ca.SX(ca.DM(gone.numel(), 1) + np.nan))
-            found[:, here] = piece.run.express(ca.densify(there), times)
-        return found
+            values[:, here] = piece.run.express(ca.densify(there), times)
+        return values
 
     def __getitem__(self, name: str) -> Array:
         return self.t if name == "t" else self.trajectory[name]
@@ -227,14 +220,6 @@ class SetValued:
 
     def final(self) -> dict[str, float]:
         """Return the states at the end by name, without law states."""
-        piece = self.pieces[-1]
-        found = piece.run.states(np.array([piece.end]))
-        return {v.name: float(found[v.name][-1]) for v in self.model.open.x}
-
-
-def _force(piece: Piece, name: str, values: Mapping[str, Array], at: Array, model: Model) -> Array:
-    mode = piece.modes[name]
-    if not mode:
-        return values[f"{name}_reaction"]
-    contact = next(c for c in model.contacts if c.name == name)
-    return piece.run.express(contact.sliding(mode), at)[0]
+        return {
+            name: float(row[-1]) for name, row in self._states(np.array([self.span[1]])).items()
+        }

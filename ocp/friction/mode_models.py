@@ -27,25 +27,23 @@ found by Newton's method from the values of the slip mode: in one step if the eq
 in z, as without normal forces that follow from reactions.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ocp.friction.smooth_models import jumps
+from ocp.formulation.expressions import arguments
+from ocp.formulation.statement import rebuilt
+from ocp.friction.smooth_models import sticking
 from symfric.foundation import checks
 from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import at_start, stacked
-from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Output
-from symfric.multibody.applied import null_direction
+from symfric.multibody.applied import MINORS, forward, null_direction
 
-MINORS = 8
-"""Largest number of coordinates of a loop, whose tangent is computed from minors."""
 RANK = 1e-11
 """Singular values below this share of the scaled equations count as zero."""
 UNLOADED = 1e-9
@@ -56,9 +54,7 @@ NEWTON_STEPS = 2
 """Newton steps; a normal force is a smoothed absolute value of reactions, affine except near 0."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Loop:
+class Loop(NamedTuple):
     """Contacts that stick together.
 
     Attributes:
@@ -69,50 +65,41 @@ class Loop:
     members: tuple[Contact, ...]
     along: tuple[ca.SX, ...]
 
-    @property
-    def name(self) -> str:
-        """Name of the force that holds the loop."""
-        return f"{self.members[0].name}_loop"
-
     def shares(self, force: ca.SX) -> list[ca.SX]:
         """Return F_i [N] of each member for a holding force T."""
         levels = [(c.static_level(1) + c.static_level(-1)) / 2 for c in self.members]
-        weights = [
-            ca.SX(smooth.choose(g < 0, -1.0, 1.0)) * S
-            for g, S in zip(self.along, levels, strict=True)
-        ]
-        total = sum((g * w for g, w in zip(self.along, weights, strict=True)), start=ca.SX(0))
+        weights = [forward(g) * S for g, S in zip(self.along, levels, strict=True)]
+        total = self.projected(weights)
         return [w / total * force for w in weights]
 
-    def projected(self, changes: Sequence[ca.SX]) -> ca.SX:
-        """Return the combination of the members' slip rates that is zero in stick."""
-        pairs = zip(self.along, changes, strict=True)
-        return sum((g * change for g, change in pairs), start=ca.SX(0))
+    def projected(self, values: Sequence[ca.SX]) -> ca.SX:
+        """Return the sum of g_i times the members' `values`."""
+        pairs = zip(self.along, values, strict=True)
+        return sum((g * value for g, value in pairs), start=ca.SX(0))
 
 
-def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
-    """Return the loops of a mechanism in which several of `contacts` stick together."""
+def loops_of(model: Model) -> tuple[Loop, ...]:
+    """Return the loops of a mechanism in which several contacts stick together."""
     mechanics = model.holonomic
     if mechanics is None or not mechanics.phi.numel() or ca.depends_on(mechanics.phi, model.t):
         return ()
     q, qd = model.vector("x")[: mechanics.n], model.vector("x")[mechanics.n : 2 * mechanics.n]
-    found: list[Loop] = []
-    pattern = ca.DM(ca.jacobian(mechanics.phi, q).sparsity(), 1).full() != 0
-    for columns, rows in coupled(pattern):
+    slopes = [(c, ca.jacobian(c.slip, qd)) for c in sticking(model)]
+    J = ca.jacobian(mechanics.phi, q)
+    loops: list[Loop] = []
+    for columns, rows in coupled(ca.DM(J.sparsity(), 1).full() != 0):
         if len(columns) != len(rows) + 1 or len(columns) > MINORS:
             continue
         tangent = ca.SX(mechanics.n, 1)
-        tangent[columns] = null_direction(ca.jacobian(mechanics.phi, q)[rows, columns])
-        slopes = [(c, ca.jacobian(c.slip, qd)) for c in contacts]
-        touched = {c.name: {*G.sparsity().get_col()} for c, G in slopes}
+        tangent[columns] = null_direction(J[rows, columns])
         members = [
             (c, ca.SX(G @ tangent))
             for c, G in slopes
-            if touched[c.name] and touched[c.name] <= {*columns}
+            if G.nnz() and {*G.sparsity().get_col()} <= {*columns}
         ]
         if len(members) > 1:
-            found.append(Loop(tuple(c for c, _ in members), tuple(g for _, g in members)))
-    return tuple(found)
+            loops.append(Loop(*zip(*members, strict=True)))
+    return tuple(loops)
 
 
 def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
@@ -134,7 +121,7 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
     given = checks.named(where, modes, names)
     for name, mode in given.items():
         checks.count(f"{where}: {name}", mode, least=-1, most=1)
-    missing = [c.name for c in model.contacts if c.name not in given and jumps(model, c)]
+    missing = [c.name for c in sticking(model) if c.name not in given]
     if missing:
         raise ValueError(
             f"{where}: expected 1, 0 or -1 for each contact, got none for {', '.join(missing)}"
@@ -148,8 +135,7 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
 
 def restless(model: Model) -> str:
     """Return the reason why contacts of `model` cannot stick individually, or ""."""
-    contacts = [c for c in model.contacts if jumps(model, c)]
-    if loops := loops_of(model, contacts):
+    if loops := loops_of(model):
         names = ", ".join(c.name for c in loops[0].members)
         return (
             f"expected contacts that stick one by one, got {names}, which stick together in a loop"
@@ -163,40 +149,45 @@ def restless(model: Model) -> str:
 
 def _in_modes(model: Model, modes: Mapping[str, int]) -> Model:
     held = [c for c in model.contacts if not modes[c.name]]
-    together = _resting_loops(model, modes)
+    together = _sticking_loops(model, modes)
     shared = {c.name for loop in together for c in loop.members}
-    alone = [c for c in held if c.name not in shared]
     forces = {c.name: c.sliding(modes[c.name]) for c in model.contacts if modes[c.name]}
     z, rows = list[Variable](), list[ca.SX]()
-    for c in alone:
-        z.append(_reaction(c.name, c.unit("N"), nominal_load(model, c)))
-        rows.append(slip_change(model, c))
-        forces[c.name] = z[-1].symbol
+
+    def reaction(name: str, unit: str, nominal: float, change: ca.SX) -> ca.SX:
+        doc = "friction force in stick"
+        z.append(Variable(f"{name}_reaction", unit, nominal=nominal, doc=doc))
+        rows.append(change)
+        return z[-1].symbol
+
+    for c in held:
+        if c.name not in shared:
+            size, change = nominal_load(model, c), slip_change(model, c)
+            forces[c.name] = reaction(c.name, c.unit("N"), size, change)
     for loop in together:
-        loads = [nominal_load(model, c) for c in loop.members]
-        z.append(_reaction(loop.name, "", sum(loads)))
-        rows.append(loop.projected([slip_change(model, c) for c in loop.members]))
+        size = sum(nominal_load(model, c) for c in loop.members)
+        change = loop.projected([slip_change(model, c) for c in loop.members])
+        force = reaction(f"{loop.members[0].name}_loop", "", size, change)
         names = (c.name for c in loop.members)
-        forces |= dict(zip(names, loop.shares(z[-1].symbol), strict=True))
+        forces |= dict(zip(names, loop.shares(force), strict=True))
     made = model.with_forces(forces, z=tuple(z), alg=stacked(rows))
     if held:
         _refuse_shared(model, made, held)
-    known = {v.name for v in z}
-    outputs = dict(_grips(held, forces))
-    reactions = {f"{c.name}_reaction": Output(forces[c.name], c.unit("N")) for c in held}
-    outputs |= {name: output for name, output in reactions.items() if name not in known}
-    return with_outputs(made, outputs)
+    outputs: dict[str, Output] = {}
+    for c in held:
+        for side, to in ((1, "the level"), (-1, "minus that")):
+            margin = c.static_level(side) - side * forces[c.name]
+            outputs[f"{c.name}_grip_{SIDES[side]}"] = Output(margin, c.unit("N"), f"margin to {to}")
+    for c in held:
+        if c.name in shared:
+            outputs[f"{c.name}_reaction"] = Output(forces[c.name], c.unit("N"))
+    return rebuilt(made, outputs={**made.outputs, **outputs})
 
 
-def _reaction(name: str, unit: str, nominal: float) -> Variable:
-    doc = "friction force in stick"
-    return Variable(f"{name}_reaction", unit, nominal=nominal, doc=doc)
-
-
-def _resting_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
+def _sticking_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
     """Return the loops whose contacts stick, all of them."""
-    found: list[Loop] = []
-    for loop in loops_of(model, [c for c in model.contacts if jumps(model, c)]):
+    loops: list[Loop] = []
+    for loop in loops_of(model):
         resting = [c.name for c in loop.members if not modes[c.name]]
         if resting and len(resting) < len(loop.members):
             names = ", ".join(c.name for c in loop.members)
@@ -204,25 +195,8 @@ def _resting_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
                 f"model '{model.name}': modes: expected all or none of {names} at rest, which move "
                 f"together in a loop of one degree of freedom, got {', '.join(resting)} at rest"
             )
-        found += [loop] if resting else []
-    return found
-
-
-def _grips(held: Sequence[Contact], forces: Mapping[str, ca.SX]) -> Iterator[tuple[str, Output]]:
-    for c in held:
-        F, unit = forces[c.name], c.unit("N")
-        yield f"{c.name}_grip_up", Output(c.static_level(1) - F, unit, "margin to the level")
-        yield f"{c.name}_grip_down", Output(c.static_level(-1) + F, unit, "margin to minus that")
-
-
-def with_outputs(model: Model, outputs: Mapping[str, Output]) -> Model:
-    """Return `model` with additional outputs."""
-    if not outputs:
-        return model
-    changes: dict[str, Any] = {"outputs": {**model.outputs, **outputs}}
-    if model.holonomic is not None:
-        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # derived again from `holonomic`
-    return replace(model, **changes)
+        loops += [loop] if resting else []
+    return loops
 
 
 def slip_change(model: Model, contact: Contact) -> ca.SX:
@@ -234,18 +208,15 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
         ValueError: the sliding velocity depends on an input or an algebraic variable.
     """
     bare, slip = model.open, contact.slip
-    x = bare.vector("x")
+    x, mechanics = bare.vector("x"), bare.holonomic
     if ca.depends_on(slip, ca.vertcat(bare.vector("u"), bare.vector("z"))):
         raise checks.refused(
             f"contact '{contact.name}': slip", "one of states, time and parameters", slip,
             "an input may jump, so the contact cannot stick",
         )  # fmt: skip
-    mechanics = bare.holonomic
-    if mechanics is None:
-        rate = ca.SX(0, 1) if bare.ode is None else bare.ode
-    else:
-        n = mechanics.n
-        rate = ca.vertcat(x[n : 2 * n], mechanics.a, mechanics.rates)
+    rate = ca.SX(0, 1) if bare.ode is None else bare.ode
+    if mechanics is not None:
+        rate = ca.vertcat(x[mechanics.n : 2 * mechanics.n], mechanics.a, mechanics.rates)
     return ca.jtimes(slip, x, rate) + ca.jacobian(slip, bare.t)
 
 
@@ -265,10 +236,9 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
 
     Loops may have fewer degrees of freedom than contacts, and a drive may prescribe a slip.
     """
-    z = made.vector("z")
-    symbols = [made.t, *(made.vector(letter) for letter in "xzup")]
-    slopes = ca.Function("slopes", symbols, [ca.densify(ca.jacobian(made.alg, z))])
-    start, size = made.initial_state(), z.numel()
+    slope = ca.densify(ca.jacobian(made.alg, made.vector("z")))
+    slopes = ca.Function("slopes", arguments(made), [slope])
+    start = made.initial_state()
     starts = np.array([float(at_start(ca.SX(v.start), made.p)) for v in made.z])
     u, p = made.values("u"), made.values("p")
     for off in (0.0, 0.013):
@@ -277,7 +247,8 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
         for axis in (1, 0):
             largest = np.abs(matrix).max(axis=axis, keepdims=True)
             matrix = matrix / np.where(largest > 0, largest, 1.0)
-        if np.isfinite(matrix).all() and np.linalg.matrix_rank(matrix, tol=RANK) == size:
+        rank = np.linalg.matrix_rank(matrix, tol=RANK) if np.isfinite(matrix).all() else 0
+        if rank == len(made.z):
             return
     names = ", ".join(c.name for c in held)
     raise ValueError(
@@ -285,11 +256,6 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
         f"determine, got {names} at rest together; in a loop of few degrees of freedom, or under a "
         "prescribed motion, their shares are undetermined: use friction in one of them"
     )
-
-
-def rubbing(model: Model) -> tuple[Contact, ...]:
-    """Return the contacts that can stick: friction that is zero at v = 0 has no modes."""
-    return tuple(contact for contact in model.contacts if jumps(model, contact))
 
 
 def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX, dict[int, ca.SX]]:
@@ -307,19 +273,23 @@ def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX
         inputs there.
     """
     moving, held = mode_model(model, modes), mode_model(model, {**modes, contact: 0})
-    symbols = [held.t, *(held.vector(letter) for letter in "xzup")]
-    z = symbols[2]
-    newton = z - ca.solve(ca.densify(ca.jacobian(held.alg, z)), held.alg)
-    step = ca.Function("step", symbols, [newton])
+    symbols = arguments(held)
+    step = ca.Function("step", symbols, [newton(held)])
     names = [f"{contact}_reaction", *(f"{contact}_grip_{side}" for side in SIDES.values())]
     outputs = ca.Function("outputs", symbols, [held.expression(name) for name in names])
-    t, x, u, p = moving.t, *(moving.vector(letter) for letter in "xup")
+    t, x, _, u, p = arguments(moving)
     known = {v.name: v.symbol for v in moving.z}  # each mode model has its own reactions
-    found = ca.vertcat(*(known.get(v.name, ca.SX(0)) for v in held.z))
+    z = ca.vertcat(*(known.get(v.name, ca.SX(0)) for v in held.z))
     for _ in range(NEWTON_STEPS):
-        found = step(t, x, found, u, p)
-    force, *rooms = (ca.SX(value) for value in outputs.call([t, x, found, u, p]))
-    return force, dict(zip(SIDES, rooms, strict=True))
+        z = step(t, x, z, u, p)
+    force, *margins = (ca.SX(value) for value in outputs.call([t, x, z, u, p]))
+    return force, dict(zip(SIDES, margins, strict=True))
+
+
+def newton(model: Model) -> ca.SX:
+    """Return the algebraic unknowns after a step of Newton's method."""
+    z = model.vector("z")
+    return z - ca.solve(ca.densify(ca.jacobian(model.alg, z)), model.alg)
 
 
 def excess(model: Model, modes: Mapping[str, int], contact: str, side: int) -> ca.SX:

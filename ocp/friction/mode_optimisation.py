@@ -29,17 +29,16 @@ from ocp.checking.interval_errors import local_errors
 from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.problem import Problem
-from ocp.friction.arc_solution import ModeSolver, Solved, reassemble
-from ocp.friction.arcs import MARGIN
+from ocp.friction.arc_solution import ModeSolver, SolvedSequence, reassemble
+from ocp.friction.arcs import MARGIN, Rules
 from ocp.friction.mode_models import restless
-from ocp.friction.sequence import Leg, flat, inserted, neighbours, pruned, shown
+from ocp.friction.sequence import Legs, flat, inserted, neighbours, pruned, shown
 from ocp.friction.transfer import Known, Reading, sequence_of, sizes_of, starts_at_rest
 from ocp.solving.methods import Ipopt
 from ocp.solving.prepared import Clock
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme
-from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 TOUCH = 1e-5
@@ -78,52 +77,35 @@ CLOSER = 5.0
 """Divisor of the margin for a motion that only shows the cost of a margin."""
 LEAST_INTERVALS = 40
 MOST = 800
-Keep = Callable[[Solved], Solved]
-STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+Keep = Callable[[SolvedSequence], SolvedSequence]
 
 
-def rests_inside(solved: Solved) -> tuple[Leg, ...] | None:
+def rests_inside(solved: SolvedSequence) -> Legs | None:
     """Return the sequence with stick where slipping contacts touch zero; None if none does."""
-    legs, shift = solved.legs, 0
-    found = False
-    slips = [_slips(solved, k) for k in range(len(flat(legs)))]
+    arcs, legs, shift = flat(solved.legs), solved.legs, 0
+    times, slips = list[Array](), list[dict[str, Array]]()
+    for number, (span, arc) in enumerate(
+        zip(solved.transcription.problem.spans, arcs, strict=True)
+    ):
+        model, t = span.model, arc.begin + solved.transcription.fractions(number) * arc.duration
+        times.append(t)
+        slips.append(
+            {n: solved.known.along(model, model.expression(f"{n}_slip"), t)[0] for n in arc.modes}
+        )
     largest: dict[str, float] = {}
-    for _, own in slips:
+    for own in slips:
         for contact, values in own.items():
             largest[contact] = max(largest.get(contact, 0.0), float(np.abs(values).max()))
-    for number, arc in enumerate(flat(solved.legs)):
-        t, own = slips[number]
+    for number, (arc, t, own) in enumerate(zip(arcs, times, slips, strict=True)):
         for contact, mode in arc.modes.items():
-            window = _touching(t, own[contact], TOUCH * largest[contact]) if mode else None
-            if window is not None:
-                before = len(flat(legs))
+            # the interval in which the slip is almost zero, away from the ends of the arc
+            near = np.flatnonzero(np.abs(own[contact][1:-1]) < TOUCH * largest[contact]) + 1
+            if mode and near.size:
+                before, window = len(flat(legs)), (float(t[near[0] - 1]), float(t[near[-1] + 1]))
                 legs = inserted(legs, number + shift, contact, 0, *window)
                 shift += len(flat(legs)) - before
-                found = True
                 break
-    return pruned(legs, 0.0) if found else None
-
-
-def _slips(solved: Solved, number: int) -> tuple[Array, dict[str, Array]]:
-    """Return times of all points of an arc, and sliding velocities there by contact."""
-    span = solved.transcription.problem.spans[number]
-    arc = flat(solved.legs)[number]
-    fractions = solved.transcription.fractions(number)
-    t = arc.begin + fractions * arc.duration
-    names = list(arc.modes)
-    values = [
-        solved.known.along(span.model, span.model.expression(f"{name}_slip"), t)[0]
-        for name in names
-    ]
-    return t, dict(zip(names, values, strict=True))
-
-
-def _touching(t: Array, slip: Array, touch: float) -> tuple[float, float] | None:
-    """Return the interval in which the slip is almost zero, away from the ends of the arc."""
-    near = np.flatnonzero(np.abs(slip[1:-1]) < touch) + 1
-    if not near.size:
-        return None
-    return float(t[near[0] - 1]), float(t[near[-1] + 1])
+    return pruned(legs, 0.0) if legs is not solved.legs else None
 
 
 class _StoppedError(Exception):
@@ -175,63 +157,62 @@ def optimise_modes(
     limits = [MOST_ITERATIONS, PATIENT]
     if "max_iter" in solver.options:
         limits = [int(solver.options["max_iter"])]
-    known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
+    known = Known.of(problem, smooth.motions[0], smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
     whole, first = known.motion.T, max(MARGIN, margin)
+    sizes, at_rest = sizes_of(problem, known), starts_at_rest(problem, known, widths)
     modes_solver = ModeSolver(
-        problem=problem,
-        sizes=sizes_of(problem, known),
-        at_rest=starts_at_rest(problem, known, widths),
+        rules=Rules(problem, sizes, at_rest, SHORTEST * whole, first),
         solver=solver.with_options(max_iter=limits[0]),
         scheme=scheme or Radau(3),
-        shortest=SHORTEST * whole,
         kick=KICK * whole,
         progress=progress,
-        margin=first,
         clock=clock or Clock(),
     )
-    tried: list[Solved] = []
+    tried: list[SolvedSequence] = []
 
-    def keep(solved: Solved) -> Solved:
+    def keep(solved: SolvedSequence) -> SolvedSequence:
         tried.append(solved)
-        if solved.outcome.status in STOPPED:
+        if solved.outcome.status.stopped:
             raise _StoppedError
         return solved
 
-    best: Solved | None = None
+    best: SolvedSequence | None = None
     with suppress(_StoppedError):
         for limit, legs in _attempts(limits, problem, known, widths):
             patient = replace(modes_solver, solver=solver.with_options(max_iter=limit))
             found = keep(patient.solve(legs, known, N, 1e-2))
             if found.ok:
-                best = found
+                best = found  # also if the following steps are stopped
                 best = settled(modes_solver, best, keep)
                 best = better(modes_solver, best, NEW_ARC * whole, keep)
                 best = _fine(modes_solver, best, keep)
                 break
     yield _solution(problem, best, tried), first
-    if best is None or tried[-1].outcome.status in STOPPED or not best.pressed(first):
+    if best is None or tried[-1].outcome.status.stopped or not best.pressed(first):
         return
     least = margin if margin < first else margin / CLOSER
     for closer in (least, sqrt(least * first)):
-        near, found = replace(modes_solver, margin=closer), None
+        rules = modes_solver.rules._replace(margin=closer)
+        near, found = replace(modes_solver, rules=rules), None
         with suppress(_StoppedError):
             found = keep(near.again(best))
             found = _fine(near, found, keep) if found.ok else found
         yield _solution(problem, found, tried), closer
 
 
-def _solution(problem: Problem, best: Solved | None, tried: Sequence[Solved]) -> Solution:
+def _solution(
+    problem: Problem, best: SolvedSequence | None, tried: Sequence[SolvedSequence]
+) -> Solution:
     """Return the best sequence, or the first, with the effort of all and the reason it ended."""
     found = reassemble(problem, best or tried[0], [s.outcome.statistics for s in tried])
     last = tried[-1].outcome
-    if last.status not in STOPPED:
+    if not last.status.stopped:
         return found
     message = f"ocp '{problem.name}': {last.sentence}"
-    if best is None:
-        return replace(found, status=last.status, message=message, cause=last.cause, modes={})
-    message += " The result has the best modes so far."
-    return replace(found, status=last.status, message=message, cause=last.cause)
+    message += "" if best is None else " The result has the best modes so far."
+    modes = {} if best is None else found.modes
+    return replace(found, status=last.status, message=message, cause=last.cause, modes=modes)
 
 
 def refusal(problem: Problem) -> str:
@@ -250,44 +231,28 @@ def refusal(problem: Problem) -> str:
     return ""
 
 
-def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, float]:
-    """Return values of all parameters of the models by name."""
-    found: dict[str, float] = {}
-    for span in problem.spans:
-        found |= {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
-    return found | dict(chosen)
-
-
-def _readings(
-    problem: Problem, known: Known, widths: Mapping[str, float]
-) -> Iterator[tuple[Leg, ...]]:
-    """Yield possible mode sequences of the motion, the most likely one first."""
-    seen: set[str] = set()
-    for rests in (True, False):
-        for factor in CREEP:
-            creep = {name: factor * width for name, width in widths.items()}
-            legs = sequence_of(problem, known, Reading(creep, rests))
-            if shown(legs) not in seen:
-                seen.add(shown(legs))
-                yield legs
-
-
 def _attempts(
     limits: Sequence[int], problem: Problem, known: Known, widths: Mapping[str, float]
-) -> Iterator[tuple[int, tuple[Leg, ...]]]:
-    """Yield iteration limits and sequences: all sequences with one limit, then with the next."""
-    sequences: list[tuple[Leg, ...]] = []
-    for legs in _readings(problem, known, widths):
-        sequences.append(legs)
-        yield limits[0], legs
-    yield from product(limits[1:], sequences)
+) -> Iterator[tuple[int, Legs]]:
+    """Yield iteration limits and possible sequences, the most likely one first.
+
+    All sequences with one limit, then with the next.
+    """
+    sequences: dict[str, Legs] = {}
+    for rests, factor in product((True, False), CREEP):
+        creep = {name: factor * width for name, width in widths.items()}
+        legs = sequence_of(problem, known, Reading(creep, rests))
+        if shown(legs) not in sequences:
+            sequences[shown(legs)] = legs
+            yield limits[0], legs
+    yield from product(limits[1:], sequences.values())
 
 
-def settled(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
+def settled(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> SolvedSequence:
     """Remove superfluous arcs, and insert stick where slipping contacts touch zero."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
-        legs = pruned(solved.legs, GONE * modes_solver.shortest)
+        legs = pruned(solved.legs, GONE * modes_solver.rules.shortest)
         if shown(legs) == shown(solved.legs):
             legs = rests_inside(solved) or legs
         if shown(legs) in seen:
@@ -300,7 +265,9 @@ def settled(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
     return solved
 
 
-def better(modes_solver: ModeSolver, solved: Solved, width: float, keep: Keep) -> Solved:
+def better(
+    modes_solver: ModeSolver, solved: SolvedSequence, width: float, keep: Keep
+) -> SolvedSequence:
     """Return the best of the sequence and its neighbours."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
@@ -309,7 +276,7 @@ def better(modes_solver: ModeSolver, solved: Solved, width: float, keep: Keep) -
                 continue
             seen.add(shown(legs))
             other = keep(modes_solver.solve(legs, solved.known, solved.intervals, AGAIN))
-            left = pruned(other.legs, GONE * modes_solver.shortest)
+            left = pruned(other.legs, GONE * modes_solver.rules.shortest)
             if not other.ok or shown(left) in seen - {shown(legs)}:
                 continue
             other = settled(modes_solver, other, keep)
@@ -321,7 +288,7 @@ def better(modes_solver: ModeSolver, solved: Solved, width: float, keep: Keep) -
     return solved
 
 
-def _fine(modes_solver: ModeSolver, solved: Solved, keep: Keep) -> Solved:
+def _fine(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> SolvedSequence:
     """Refine the intervals until holding the inputs costs almost nothing.
 
     That cost is estimated, reliably if two meshes agree on the cost without it. Until they do, all

@@ -7,9 +7,8 @@ and via points, bound the `Leg`s, inside which durations are free.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,7 @@ SAME_INSTANT = 1e-9
 """Share of the whole duration below which two instants coincide."""
 
 
-@final
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """A contact in one mode from `begin` to `end` [s]: +1 and -1 slip, 0 stick."""
 
     mode: int
@@ -29,9 +26,7 @@ class Run:
     end: float
 
 
-@final
-@dataclass(frozen=True)
-class Track:
+class Track(NamedTuple):
     """Runs of one contact, without gaps; the contact may exist for a part of the motion."""
 
     contact: str
@@ -42,9 +37,7 @@ class Track:
         return next((run.mode for run in self.runs if run.begin <= t <= run.end), None)
 
 
-@final
-@dataclass(frozen=True)
-class Arc:
+class Arc(NamedTuple):
     """Interval [s] with constant modes of all contacts; modes by the name of the contact."""
 
     modes: Mapping[str, int]
@@ -57,9 +50,7 @@ class Arc:
         return self.end - self.begin
 
 
-@final
-@dataclass(frozen=True)
-class Leg:
+class Leg(NamedTuple):
     """Arcs between two instants set by the user.
 
     Attributes:
@@ -77,11 +68,20 @@ class Leg:
         """Sum of the durations [s]."""
         return self.arcs[-1].end - self.arcs[0].begin
 
+    def replaced(self, begin: int, end: int, *arcs: Arc) -> "Leg":
+        """Return the leg with other arcs instead of those from `begin` to before `end`."""
+        return self._replace(arcs=(*self.arcs[:begin], *arcs, *self.arcs[end:]))
+
+
+Legs = tuple[Leg, ...]
+"""A whole sequence."""
+
 
 def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> Track:
     """Deduce the track of one contact from its sliding velocities.
 
     Args:
+        contact: its name.
         t, slip: times [s], and sliding velocities there, shape (n,).
         creep: slower than this it sticks: a smooth law creeps under load.
         shortest: runs shorter than this [s] are merged with their neighbours.
@@ -93,11 +93,8 @@ def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> 
     long = [run for run in runs if run.end - run.begin >= shortest]
     kept = list(_merged(long or [max(runs, key=lambda run: run.end - run.begin)]))
     middles = [(a.end + b.begin) / 2 for a, b in pairwise(kept)]
-    bounds = [float(t[0]), *middles, float(t[-1])]
-    return Track(
-        contact,
-        tuple(Run(run.mode, a, b) for run, (a, b) in zip(kept, pairwise(bounds), strict=True)),
-    )
+    bounds = pairwise([float(t[0]), *middles, float(t[-1])])
+    return Track(contact, tuple(Run(run.mode, *ab) for run, ab in zip(kept, bounds, strict=True)))
 
 
 def with_rests(
@@ -112,106 +109,104 @@ def with_rests(
     ones cannot appear.
 
     Args:
+        track: runs of one contact.
         can_rest: whether some control can hold the contact at a time: stick that nothing can hold
             would make the program infeasible.
+        width: of the stick intervals [s].
         ends: whether the contact sticks at the start and at the end.
     """
     runs: list[Run] = []
     for run in track.runs:
         if runs and runs[-1].mode * run.mode < 0 and can_rest(run.begin):
             half = min(width, run.end - run.begin, runs[-1].end - runs[-1].begin) / 2
-            runs[-1] = replace(runs[-1], end=run.begin - half)
+            runs[-1] = runs[-1]._replace(end=run.begin - half)
             runs.append(Run(0, run.begin - half, run.begin + half))
-            run = replace(run, begin=run.begin + half)
+            run = run._replace(begin=run.begin + half)
         runs.append(run)
-    first, last = runs[0], runs[-1]
+    first = runs[0]
     if ends[0] and first.mode and can_rest(first.begin):
         after = first.begin + min(width, first.end - first.begin) / 2
-        runs[0:1] = [Run(0, first.begin, after), replace(first, begin=after)]
+        runs[0:1] = [Run(0, first.begin, after), first._replace(begin=after)]
     last = runs[-1]
     if ends[1] and last.mode and can_rest(last.end):
         before = last.end - min(width, last.end - last.begin) / 2
-        runs[-1:] = [replace(last, end=before), Run(0, before, last.end)]
-    return replace(track, runs=tuple(runs))
+        runs[-1:] = [last._replace(end=before), Run(0, before, last.end)]
+    return track._replace(runs=tuple(runs))
 
 
 def cut(tracks: Sequence[Track], leg: tuple[int, int], begin: float, end: float) -> Leg:
     """Return the leg (phase, part) from `begin` to `end`, cut at every change of mode."""
     inside = {run.end for track in tracks for run in track.runs if begin < run.end < end}
     near = SAME_INSTANT * (end - begin)
-    times = [begin]
-    times += [t for t in sorted(inside) if t - begin > near and end - t > near]
+    times = [t for t in sorted(inside) if t - begin > near and end - t > near]
     arcs: list[Arc] = []
-    for a, b in pairwise([*times, end]):
-        found = {track.contact: track.at((a + b) / 2) for track in tracks}
-        modes = {name: mode for name, mode in found.items() if mode is not None}
-        arcs.append(Arc(modes, a, b))
+    for a, b in pairwise([begin, *times, end]):
+        modes = {track.contact: track.at((a + b) / 2) for track in tracks}
+        arcs.append(Arc({name: mode for name, mode in modes.items() if mode is not None}, a, b))
     return Leg(*leg, tuple(arcs))
 
 
-def placed(legs: Sequence[Leg], durations: Sequence[float]) -> tuple[Leg, ...]:
+def placed(legs: Legs, durations: Sequence[float]) -> Legs:
     """Return `legs` with other durations of their arcs, in sequence from the same start."""
     times = iter(durations)
     t = legs[0].arcs[0].begin
-    found: list[Leg] = []
+    moved: list[Leg] = []
     for leg in legs:
         arcs: list[Arc] = []
         for arc in leg.arcs:
             begin, t = t, t + next(times)
-            arcs.append(replace(arc, begin=begin, end=t))
-        found.append(replace(leg, arcs=tuple(arcs)))
-    return tuple(found)
+            arcs.append(arc._replace(begin=begin, end=t))
+        moved.append(leg._replace(arcs=tuple(arcs)))
+    return tuple(moved)
 
 
-def pruned(legs: Sequence[Leg], shortest: float) -> tuple[Leg, ...]:
+def pruned(legs: Legs, shortest: float) -> Legs:
     """Return `legs` without arcs up to `shortest` [s] long.
 
-    Equal neighbours are merged; the last arc of a leg always stays.
+    Equal neighbours are merged; the longest arc of a leg always stays.
     """
     return tuple(_without(leg, shortest) for leg in legs)
 
 
-def count(legs: Sequence[Leg]) -> int:
-    """Return the number of arcs."""
-    return sum(len(leg.arcs) for leg in legs)
+def _without(leg: Leg, shortest: float) -> Leg:
+    begin, end = leg.arcs[0].begin, leg.arcs[-1].end
+    kept = [arc for arc in leg.arcs if arc.duration > shortest]
+    kept = kept or [max(leg.arcs, key=lambda arc: arc.duration)]
+    merged = [arc for k, arc in enumerate(kept) if not k or kept[k - 1].modes != arc.modes]
+    bounds = pairwise([begin, *(arc.begin for arc in merged[1:]), end])
+    arcs = (arc._replace(begin=a, end=b) for arc, (a, b) in zip(merged, bounds, strict=True))
+    return leg._replace(arcs=tuple(arcs))
 
 
-def flat(legs: Sequence[Leg]) -> tuple[Arc, ...]:
+def flat(legs: Legs) -> tuple[Arc, ...]:
     """Return all arcs in order."""
     return tuple(arc for leg in legs for arc in leg.arcs)
 
 
-def inserted(
-    legs: Sequence[Leg], number: int, contact: str, mode: int, begin: float, end: float
-) -> tuple[Leg, ...]:
+def inserted(legs: Legs, number: int, contact: str, mode: int, begin: float, end: float) -> Legs:
     """Return `legs` with `contact` in another mode from `begin` to `end` inside arc `number`."""
-    found: list[Leg] = []
-    seen = 0
-    for leg in legs:
-        arcs: list[Arc] = []
-        for arc in leg.arcs:
-            if seen == number:
-                a, b = max(begin, arc.begin), min(end, arc.end)
-                other = Arc({**arc.modes, contact: mode}, a, b)
-                parts = (replace(arc, end=a), other, replace(arc, begin=b))
-                arcs += [part for part in parts if part.end > part.begin]
-            else:
-                arcs.append(arc)
-            seen += 1
-        found.append(replace(leg, arcs=tuple(arcs)))
-    return tuple(found)
+    for k, leg in enumerate(legs):
+        if number < len(leg.arcs):
+            arc = leg.arcs[number]
+            a, b = max(begin, arc.begin), min(end, arc.end)
+            other = Arc({**arc.modes, contact: mode}, a, b)
+            parts = (arc._replace(end=a), other, arc._replace(begin=b))
+            kept = (part for part in parts if part.end > part.begin)
+            return (*legs[:k], leg.replaced(number, number + 1, *kept), *legs[k + 1 :])
+        number -= len(leg.arcs)
+    raise IndexError(number)
 
 
-def tracks_of(legs: Sequence[Leg]) -> dict[str, tuple[Run, ...]]:
+def tracks_of(legs: Legs) -> dict[str, tuple[Run, ...]]:
     """Return contact -> its runs, over all legs."""
-    found: dict[str, list[Run]] = {}
+    runs: dict[str, list[Run]] = {}
     for arc in flat(legs):
         for contact, mode in arc.modes.items():
-            found.setdefault(contact, []).append(Run(mode, arc.begin, arc.end))
-    return {contact: tuple(_merged(runs)) for contact, runs in found.items()}
+            runs.setdefault(contact, []).append(Run(mode, arc.begin, arc.end))
+    return {contact: tuple(_merged(own)) for contact, own in runs.items()}
 
 
-def shown(legs: Sequence[Leg]) -> str:
+def shown(legs: Legs) -> str:
     """Return the sequence as text, such as "0+0- | -0": legs separated, contacts in brackets."""
 
     def sign(modes: Mapping[str, int]) -> str:
@@ -221,38 +216,18 @@ def shown(legs: Sequence[Leg]) -> str:
     return " | ".join("".join(sign(s.modes) for s in leg.arcs) for leg in legs)
 
 
-def _merged(runs: Sequence[Run]) -> Iterator[Run]:
-    """Yield runs with equal neighbours merged."""
-    held: Run | None = None
+def _merged(runs: Sequence[Run]) -> list[Run]:
+    """Return runs with equal neighbours merged."""
+    merged: list[Run] = []
     for run in runs:
-        if held is not None and held.mode == run.mode:
-            held = replace(held, end=run.end)
-            continue
-        if held is not None:
-            yield held
-        held = run
-    if held is not None:
-        yield held
-
-
-def _without(leg: Leg, shortest: float) -> Leg:
-    begin, end = leg.arcs[0].begin, leg.arcs[-1].end
-    kept = [s for s in leg.arcs if s.duration > shortest]
-    kept = kept or [max(leg.arcs, key=lambda s: s.duration)]
-    merged: list[Arc] = []
-    for arc in kept:
-        if merged and merged[-1].modes == arc.modes:
-            merged[-1] = replace(merged[-1], end=arc.end)
+        if merged and merged[-1].mode == run.mode:
+            merged[-1] = merged[-1]._replace(end=run.end)
         else:
-            merged.append(arc)
-    starts = [begin, *(s.begin for s in merged[1:]), end]
-    fitted = [
-        replace(s, begin=a, end=b) for s, (a, b) in zip(merged, pairwise(starts), strict=True)
-    ]
-    return replace(leg, arcs=tuple(fitted))
+            merged.append(run)
+    return merged
 
 
-def neighbours(legs: Sequence[Leg], width: float) -> Iterator[tuple[Leg, ...]]:
+def neighbours(legs: Legs, width: float) -> Iterator[Legs]:
     """Yield sequences with an additional arc of about `width` [s] where changes of mode coincide.
 
     At the end of a leg the modes of the next one start earlier, or its own last modes end later,
@@ -261,44 +236,26 @@ def neighbours(legs: Sequence[Leg], width: float) -> Iterator[tuple[Leg, ...]]:
     for k, (leg, then) in enumerate(pairwise(legs)):
         last, first = leg.arcs[-1], then.arcs[0]
         for contact in _changes(last, first):
-            early = {**last.modes, contact: first.modes[contact]}
-            yield _with_leg(legs, k, _appended(leg, early, width))
-            late = {**first.modes, contact: last.modes[contact]}
-            yield _with_leg(legs, k + 1, _prepended(then, late, width))
+            t = last.end - min(width, last.duration / 2)
+            early = Arc({**last.modes, contact: first.modes[contact]}, t, last.end)
+            n = len(leg.arcs)
+            changed = leg.replaced(n - 1, n, last._replace(end=t), early)
+            yield (*legs[:k], changed, *legs[k + 1 :])
+            t = first.begin + min(width, first.duration / 2)
+            late = Arc({**first.modes, contact: last.modes[contact]}, first.begin, t)
+            changed = then.replaced(0, 1, late, first._replace(begin=t))
+            yield (*legs[: k + 1], changed, *legs[k + 2 :])
     for k, leg in enumerate(legs):
         for i, (before, after) in enumerate(pairwise(leg.arcs)):
             changes = _changes(before, after)
             for contact in changes if len(changes) > 1 else ():
-                modes = {**before.modes, contact: after.modes[contact]}
                 half = min(width, before.duration, after.duration) / 2
-                t = before.end
-                parts = (
-                    replace(before, end=t - half),
-                    Arc(modes, t - half, t + half),
-                    replace(after, begin=t + half),
-                )
-                yield _with_leg(
-                    legs, k, replace(leg, arcs=(*leg.arcs[:i], *parts, *leg.arcs[i + 2 :]))
-                )
+                a, b = before.end - half, before.end + half
+                between = Arc({**before.modes, contact: after.modes[contact]}, a, b)
+                parts = before._replace(end=a), between, after._replace(begin=b)
+                yield (*legs[:k], leg.replaced(i, i + 2, *parts), *legs[k + 1 :])
 
 
 def _changes(before: Arc, after: Arc) -> list[str]:
     """Return contacts of both arcs whose modes differ."""
-    both = [name for name in before.modes if name in after.modes]
-    return [name for name in both if before.modes[name] != after.modes[name]]
-
-
-def _with_leg(legs: Sequence[Leg], number: int, leg: Leg) -> tuple[Leg, ...]:
-    return (*legs[:number], leg, *legs[number + 1 :])
-
-
-def _appended(leg: Leg, modes: dict[str, int], width: float) -> Leg:
-    last = leg.arcs[-1]
-    t = last.end - min(width, last.duration / 2)
-    return replace(leg, arcs=(*leg.arcs[:-1], replace(last, end=t), Arc(modes, t, last.end)))
-
-
-def _prepended(leg: Leg, modes: dict[str, int], width: float) -> Leg:
-    first = leg.arcs[0]
-    t = first.begin + min(width, first.duration / 2)
-    return replace(leg, arcs=(Arc(modes, first.begin, t), replace(first, begin=t), *leg.arcs[1:]))
+    return [n for n, mode in before.modes.items() if n in after.modes and after.modes[n] != mode]

@@ -1,21 +1,21 @@
 """Models with smooth friction, and their smoothing widths in multiples of the speeds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.phase import Chain, Span
+from ocp.formulation.phase import Chain
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import along_points
-from ocp.transcription.unknowns import Points, SpanPoints
+from ocp.transcription.unknowns import Points
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
-from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
+from symfric.foundation.parameters import Variable, parameters, with_values
 from symfric.foundation.variable import at_start, strays
 from symfric.laws import Law
 from symfric.laws.base import smooth
@@ -39,6 +39,7 @@ class Width:
         number: its value in the user's model.
         exponent: of the width in it: 1 for a width, -1 for a steepness.
         layer: smoothing width [m/s] at `number`; None for one of a load, as `JointFriction.eps`.
+        least: smoothing width [m/s] of the user's law; 0 for a substitute.
     """
 
     contact: str
@@ -46,6 +47,7 @@ class Width:
     number: float
     exponent: int
     layer: float | None
+    least: float = 0.0
 
     def at(self, layer: float) -> float:
         """Return its value for a smoothing width [m/s].
@@ -89,58 +91,51 @@ def _made_smooth(model: Model) -> tuple[Model, tuple[Width, ...]]:
     watched: list[Monitor] = []
     for c in model.contacts:
         try:
-            force, own, scale = _smooth_force(model, c)
+            forces[c.name], own, scale = _smooth_force(model, c)
         except ValueError as error:
             raise ValueError(f"model '{model.name}': contact '{c.name}': {error}") from None
-        forces[c.name] = force
         p += own
         layer = float(at_start(scale, (*model.p, *own)))
         if isfinite(layer):
             watched.append(Monitor(c.slip, scale))
-        exponents = c.law.widths
-        found += [
-            Width(c.name, v.name, float(v.start), exponents.get(_local(c, v), 1), layer)
-            for v in own
-        ]
+        least = layer if c.law.widths else 0.0
+        for v in own:
+            exponent = c.law.widths.get(v.name.removeprefix(f"{c.name}_"), 1)
+            found.append(Width(c.name, v.name, float(v.start), exponent, layer, least))
     loads = {v.name: (c.name, v) for c in model.contacts for v in c.widths.values()}
     found += [Width(name, v.name, float(v.start), 1, None) for name, v in loads.values()]
     p += [v for _, v in loads.values()]
     return model.with_forces(forces, p=tuple(p), monitors=tuple(watched)), tuple(found)
 
 
-def _local(contact: Contact, parameter: Variable) -> str:
-    return parameter.name.removeprefix(f"{contact.name}_")
-
-
 def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable], Any]:
     """Return the force [N], its widths as parameters, and the velocity scale [m/s]."""
+
+    def parameter(name: str, unit: str, start: float, **more: Any) -> Variable:
+        name, unit = f"{contact.name}_{name}", contact.unit(unit)
+        return Variable(name, unit, start=start, nominal=start, **more)
+
     law = _law(contact)
     by_itself = not law.states and not any(i.name not in contact.further for i in law.inputs)
-    if by_itself and (law.widths or not jumps(model, contact)):
+    if by_itself and (law.widths or not _jumps(model, contact)):
         known = parameters(law)
-        own = [_parameter(model, contact, known[name]) for name in law.widths]
-        pairs = zip(law.widths, own, strict=True)
-        law = with_values(law, {name: v.symbol for name, v in pairs})
+        own = {
+            w.name: parameter(w.name, w.unit, float(at_start(w.value, model.p)),
+                              lower=w.lower, upper=w.upper, doc=w.doc)
+            for w in (known[name] for name in law.widths)
+        }  # fmt: skip
+        law = with_values(law, {name: v.symbol for name, v in own.items()})
         force = ca.SX(law.force(contact.slip, contact.N, (), **contact.further))
-        return force, [v for v in own if ca.depends_on(force, v.symbol)], law.velocity_scale
+        used = [v for v in own.values() if ca.depends_on(force, v.symbol)]
+        return force, used, law.velocity_scale
     scale = float(at_start(law.velocity_scale, model.p))
-    width = Variable(
-        f"{contact.name}_width", contact.unit("m/s"), start=scale if isfinite(scale) else WIDTH,
-        nominal=scale if isfinite(scale) else WIDTH, lower=0.0, doc="width of the smoothed jump",
-    )  # fmt: skip
-    return _stand_in(contact, width.symbol), [width], width.symbol
+    scale, doc = scale if isfinite(scale) else WIDTH, "width of the smoothed jump"
+    width = parameter("width", "m/s", scale, lower=0.0, doc=doc)
+    return _substitute(contact, width.symbol), [width], width.symbol
 
 
-def _parameter(model: Model, contact: Contact, width: Parameter) -> Variable:
-    """Return a width of a law as a parameter of the model."""
-    number = float(at_start(width.value, model.p))
-    return Variable(
-        f"{contact.name}_{width.name}", contact.unit(width.unit), start=number, nominal=number,
-        lower=width.lower, upper=width.upper, doc=width.doc,
-    )  # fmt: skip
-
-
-def _stand_in(contact: Contact, width: ca.SX) -> ca.SX:
+def _substitute(contact: Contact, width: ca.SX) -> ca.SX:
+    """Return the smooth force [N] of a law that is replaced."""
     v, N, law, given = contact.slip, contact.N, _law(contact), contact.further
     x, speed = v / width, smooth.magnitude(v, width)
     s, bump = tanh(4 * x), x / (0.25 * (x * x) + 0.75) ** 2
@@ -160,7 +155,7 @@ def _law(contact: Contact) -> Law:
     return law
 
 
-def jumps(model: Model, contact: Contact) -> bool:
+def _jumps(model: Model, contact: Contact) -> bool:
     """Return True if friction is nonzero at rest, at the start values of the parameters.
 
     It is zero for viscous friction and for an unloaded contact.
@@ -172,9 +167,12 @@ def jumps(model: Model, contact: Contact) -> bool:
     return float(at_start(one, model.p)) != 0.0
 
 
-@final
-@dataclass(frozen=True)
-class Scale:
+def sticking(model: Model) -> tuple[Contact, ...]:
+    """Return the contacts that can stick: friction that is zero at v = 0 has no modes."""
+    return tuple(contact for contact in model.contacts if _jumps(model, contact))
+
+
+class Scale(NamedTuple):
     """Scales of the widths of one contact.
 
     Attributes:
@@ -197,28 +195,30 @@ def smoothed(problem: Problem) -> Problem:
     return replace(problem, phases=Chain(phases))
 
 
-def scales_of(
-    problem: Problem, smooth: Problem, points: Points, before: Scales | None = None
-) -> Scales:
+def scales_of(problem: Problem, smooth: Problem, points: Points, before: Scales) -> Scales:
     """Return the scales of the motion `points`, at least `LEAST` times the previous ones.
+
+    A normal force that depends on the friction force of another contact is omitted.
 
     Args:
         problem: the user's problem.
         smooth: the problem of `points`, with smooth models.
+        points: the motion.
+        before: previous scales; empty if there are none.
     """
-    found: dict[str, list[float]] = {}
+    largest: dict[str, Array] = {}
     for span, own in zip(smooth.spans, points.spans, strict=True):
         for contact in problem.chain[span.phase].model.contacts:
-            largest = np.abs(values_at(span, contact, own)).max(axis=1)
-            kept = found.setdefault(contact.name, [0.0, 0.0])
-            kept[:] = [max(a, float(b)) for a, b in zip(kept, largest, strict=True)]
-    return {
-        name: Scale(
-            max(speed, LEAST * before[name].speed if before and name in before else 0.0),
-            load if load > 0.0 else 1.0,
-        )
-        for name, (speed, load) in found.items()
-    }
+            column = ca.vertcat(contact.slip, ca.SX(contact.N))
+            if strays(column, ca.vertcat(*span.symbols)):
+                column = ca.vertcat(contact.slip, 0.0)
+            sizes = np.abs(along_points(span, own, column)).max(axis=1)
+            largest[contact.name] = np.maximum(largest.get(contact.name, np.zeros(2)), sizes)
+    scales: dict[str, Scale] = {}
+    for name, (speed, load) in ((name, sizes.tolist()) for name, sizes in largest.items()):
+        least = LEAST * before[name].speed if name in before else 0.0
+        scales[name] = Scale(max(speed, least), load if load > 0.0 else 1.0)
+    return scales
 
 
 def same_size(a: Scales, b: Scales, factor: float) -> bool:
@@ -244,34 +244,31 @@ def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
     }
 
 
+def _all_widths(problem: Problem) -> Iterator[Width]:
+    for phase in problem.chain:
+        yield from widths(phase.model)
+
+
 def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
     """Return values of the widths of the smooth models: `level` times the scales.
 
     The widths of the user's laws are lower bounds.
     """
-    found: dict[str, float] = {}
-    for phase in problem.chain:
-        laws = {c.name: c.law for c in phase.model.contacts}
-        for width in widths(phase.model):
-            own = scales[width.contact]
-            if width.layer is None:
-                found[width.parameter] = max(width.number, level * own.load)
-            else:
-                least = width.layer if laws[width.contact].widths else 0.0
-                found[width.parameter] = width.at(max(least, level * own.speed))
-    return found
+    return {
+        w.parameter: max(w.number, level * scales[w.contact].load)
+        if w.layer is None
+        else w.at(max(w.least, level * scales[w.contact].speed))
+        for w in _all_widths(problem)
+    }
 
 
 def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
     """Return contact -> smoothing width [m/s or rad/s] at `level`."""
-    found: dict[str, float] = {}
-    for phase in problem.chain:
-        laws = {c.name: c.law for c in phase.model.contacts}
-        for width in widths(phase.model):
-            if width.layer is not None:
-                least = width.layer if laws[width.contact].widths else 0.0
-                found[width.contact] = max(least, level * scales[width.contact].speed)
-    return found
+    return {
+        w.contact: max(w.least, level * scales[w.contact].speed)
+        for w in _all_widths(problem)
+        if w.layer is not None
+    }
 
 
 def own_level(problem: Problem, scales: Scales) -> float:
@@ -280,26 +277,8 @@ def own_level(problem: Problem, scales: Scales) -> float:
     The narrowest counts; 0 for laws without smoothing.
     """
     found = [
-        width.layer / scales[width.contact].speed
-        for phase in problem.chain
-        for width in widths(phase.model)
-        if width.layer is not None and scales[width.contact].speed > 0.0
-        if next(c for c in phase.model.contacts if c.name == width.contact).law.widths
+        w.least / scales[w.contact].speed
+        for w in _all_widths(problem)
+        if w.least > 0.0 and scales[w.contact].speed > 0.0
     ]
     return min(found, default=0.0)
-
-
-def has_jumps(problem: Problem) -> bool:
-    """Return True if any contact of any phase has stiction, so that a homotopy is needed."""
-    return any(jumps(phase.model, c) for phase in problem.chain for c in phase.model.contacts)
-
-
-def values_at(span: Span, contact: Contact, points: SpanPoints) -> Array:
-    """Return sliding velocities and normal forces at the collocation points, shape (2, N d).
-
-    A normal force that depends on the friction force of another contact is zero here.
-    """
-    column = ca.vertcat(contact.slip, ca.SX(contact.N))
-    if strays(column, ca.vertcat(*span.symbols)):
-        column = ca.vertcat(contact.slip, 0.0)
-    return along_points(span, points, column)

@@ -9,7 +9,7 @@ the gradient in the states zero (a linear system).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -33,6 +33,15 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[np.float64]
+Reference = float | Callable[[Array], ArrayLike]
+"""A number, or a function of times [s]."""
+
+FROM_ACTIONS = (
+    "residual", "seconds", "cpu", "iterations", "program_iterations", "violation",
+)  # fmt: skip
+"""Attributes of each action that a loop stores."""
+SLACK = 1e-3
+"""Relative difference between a residual and its check that is rounding error."""
 
 
 @final
@@ -41,40 +50,30 @@ class Optimality:
 
     def __init__(self, design: Design) -> None:
         h = design.horizon
-        self._design = design
+        self._design, self._states = design, h.x.numel() * h.count
         X, U = ca.MX.sym("X", h.x.numel(), h.count + 1), ca.MX.sym("U", h.u.numel(), h.count)
         R, t = ca.MX.sym("R", h.r.numel(), h.count + 1), ca.MX.sym("t", 1, h.count + 1)
         p, b = ca.MX.sym("p", h.p.numel()), ca.MX.sym("b", h.b.numel())
-        symbols = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
-        limits = [*h.limits, *h.end_limits]
-        rows = [
-            limit.sign * (limit.expression - h.b[i]) / limit.unit for i, limit in enumerate(limits)
-        ]
-        first = len(h.limits)
-        v = ca.vertcat(ca.SX(0, 1), *rows[:first])
-        cost = h.early.value + h.late.value
         to = h.x
         for _ in range(h.substeps):
             to = h.advance(to, h.u, h.r, h.p)
-        interval = ca.Function("interval", symbols, [to - h.after, v, cost])
-        last = ca.vertcat(ca.SX(0, 1), *rows[first:])
-        end = ca.Function("end", [h.x, h.r, h.p, h.t, h.b], [last, h.end.value])
+        symbols = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
+        results = [to - h.after, h.v, h.early.value + h.late.value]
+        interval = ca.Function("interval", symbols, results)
+        end = ca.Function("end", [h.x, h.r, h.p, h.t, h.b], [h.v_end, h.end.value])
         c, v, q = interval.map(h.count, [False] * 5 + [True, False, True], [False] * 3)(
             X[:, :-1], U, X[:, 1:], R[:, :-1], R[:, 1:], p, t[:, :-1], b
         )
         v_end, q_end = end(X[:, -1], R[:, -1], p, t[:, -1], b)
         every = ca.vertcat(ca.vec(v), v_end)
         m = ca.MX.sym("m", every.numel())
-        w = ca.vertcat(ca.vec(X[:, 1:]), ca.vec(U))
         lagrangian = ca.sum2(q) + q_end - ca.dot(m, every)
         gradient = ca.vertcat(
             ca.vec(ca.gradient(lagrangian, X)[:, 1:]), ca.vec(ca.gradient(lagrangian, U))
         )
         slopes = ca.horzcat(ca.jacobian(ca.vec(c), X)[:, h.x.numel() :], ca.jacobian(ca.vec(c), U))
         results = [ca.densify(gradient), ca.densify(slopes), ca.vec(c), every]
-        self._states = h.x.numel() * h.count
         self._whole = ca.Function("whole", [X, U, R, t, p, b, m], results)
-        self._size = w.numel()
 
     def residual(self, plan: Plan, data: CycleData) -> float:
         """Return the residual as defined in `ocp.mpc.source`."""
@@ -94,18 +93,6 @@ class Optimality:
         rows = np.where(prices.soft & (v < 0.0), np.minimum(kept, np.abs(owed)), kept)
         parts = (left / h.curvature, defects, rows)
         return max(float(np.abs(part).max(initial=0.0)) for part in parts)
-
-
-Array = NDArray[np.float64]
-Reference = float | Callable[[Array], ArrayLike]
-"""A number, or a function of times [s]."""
-
-COLUMNS = (
-    "residual", "seconds", "cpu", "iterations", "program_iterations", "violation",
-)  # fmt: skip
-"""Values of each action that a loop stores."""
-SLACK = 1e-3
-"""Relative difference between a residual and its check that is rounding error."""
 
 
 @final
@@ -186,24 +173,6 @@ class ClosedLoopRun:
         wrong = ~(self.residual <= self.tolerance) | (self.checked > allowed)
         return int(np.count_nonzero(reported & wrong))
 
-    def table(self) -> str:
-        """Return a summary of a few lines."""
-        finite = self.residual[np.isfinite(self.residual)]
-        cycles = self.seconds.size
-        return "\n".join(
-            (
-                f"{self.controller} on plant '{self.plant}', {cycles} cycles to {self.t_end:g} s",
-                f"  cycle time      median {1e3 * self.median:.3f} ms, worst "
-                f"{1e3 * self.worst:.3f} ms (processor {1e3 * self.worst_cpu:.3f} ms)",
-                f"  iterations      median {np.median(self.iterations):g}, most "
-                f"{self.iterations.max(initial=0)}",
-                f"  residual        median {np.median(self.residual):.1e}, worst "
-                f"{finite.max(initial=0.0):.1e}, tolerance {self.tolerance:.0e}",
-                f"  not converged   {self.unconverged} of {cycles}, as reported",
-                f"  unreported      {self.unreported}",
-            )
-        )
-
     def to_dict(self) -> dict[str, Any]:
         """Return the table as plain data."""
         finite = self.residual[np.isfinite(self.residual)]
@@ -219,6 +188,21 @@ class ClosedLoopRun:
             "not_converged": self.unconverged,
             "unreported": self.unreported,
         }
+
+    def table(self) -> str:
+        """Return a summary of a few lines."""
+        d = self.to_dict()
+        return (
+            f"{self.controller} on plant '{self.plant}', {d['cycles']} cycles to {self.t_end:g} s\n"
+            f"  cycle time      median {1e3 * self.median:.3f} ms, worst {1e3 * self.worst:.3f} ms "
+            f"(processor {1e3 * self.worst_cpu:.3f} ms)\n"
+            f"  iterations      median {np.median(self.iterations):g}, most "
+            f"{d['most_iterations']}\n"
+            f"  residual        median {np.median(self.residual):.1e}, worst "
+            f"{d['worst_residual']:.1e}, tolerance {self.tolerance:.0e}\n"
+            f"  not converged   {self.unconverged} of {d['cycles']}, as reported\n"
+            f"  unreported      {self.unreported}"
+        )
 
     def to_csv(self, path: str | Path) -> None:
         """Write a row per cycle: time, signals, controls, references, residual and status."""
@@ -285,7 +269,6 @@ def plot_loops(
 
 
 def run_closed_loop(
-    design: Design,
     session: Session,
     plant: Model,
     t_end: float,
@@ -299,79 +282,48 @@ def run_closed_loop(
     check: bool,
 ) -> ClosedLoopRun:
     """Simulate a closed loop; see `Controller.simulate`."""
-    where = "simulate"
+    where, design = "simulate", session.design
     check_model(where, plant)
-    h = design.horizon
+    h, measured = design.horizon, design.measured_names
     t_end = checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
-    cycles = max(1, round(t_end / h.step))
     driven, inputs = [c.name for c in design.controls], [v.name for v in plant.u]
     checks.check_names(f"{where}: inputs of plant '{plant.name}'", driven, inputs)
-    checks.check_names(
-        f"{where}: signals of plant '{plant.name}'", design.measured_names, plant.signals
-    )
-    spread = checks.named(f"{where}: noise", noise, design.measured_names)
+    checks.check_names(f"{where}: signals of plant '{plant.name}'", measured, plant.signals)
+    spread = checks.named(f"{where}: noise", noise, measured)
     checks.named(f"{where}: references", references, h.references)
-    going = stepper(plant, h.step, x0=x0, p=plant_p)
-    look = Optimality(design) if check else None
-    random = np.random.default_rng(seed)
-    log = _Log({name: [value] for name, value in going.signals.items()})
-    for k in range(cycles):
-        t = k * h.step
+    run = stepper(plant, h.step, x0=x0, p=plant_p)
+    check_of = Optimality(design) if check else None
+    random, cycles = np.random.default_rng(seed), max(1, round(t_end / h.step))
+    signals, actions, checked = [run.signals], list[Action](), list[float]()
+    ahead: list[dict[str, Array]] = []
+    while len(actions) < cycles and not run.terminated:
+        t = len(actions) * h.step
         times = t + h.step * np.arange(h.count + 1.0)
-        wanted = {name: _values(value, times) for name, value in references.items()}
-        measured = {
-            name: going[name] + spread.get(name, 0.0) * random.standard_normal()
-            for name in design.measured_names
-        }
-        action = session.step(measured, wanted, t=t, p=p)
-        opinion = np.nan
-        if look is not None and action.status is not CycleStatus.BAD_INPUT:
-            opinion = look.residual(session.plan, session.data(wanted, t, p, None))
-        log.actions.append(action)
-        log.opinions.append(opinion)
-        log.wanted.append({name: float(values[0]) for name, values in wanted.items()})
-        going.step(action.controls)
-        for name, value in going.signals.items():
-            log.signals[name].append(value)
-        if going.terminated:
-            break
-    return log.loop(design, plant)
+        ahead.append({name: _values(value, times) for name, value in references.items()})
+        x = {n: run[n] + spread.get(n, 0.0) * random.standard_normal() for n in measured}
+        actions.append(session.step(x, ahead[-1], t=t, p=p))
+        checked.append(np.nan)
+        if check_of is not None and actions[-1].status is not CycleStatus.BAD_INPUT:
+            checked[-1] = check_of.residual(session.plan, session.data(ahead[-1], t, p, None))
+        run.step(actions[-1].controls)
+        signals.append(run.signals)
+    columns = {name: np.array([getattr(a, name) for a in actions]) for name in FROM_ACTIONS}
+    return ClosedLoopRun(
+        plant=plant.name,
+        controller=design.name,
+        t=h.step * np.arange(float(len(actions))),
+        t_end=h.step * len(actions),
+        signals={n: np.array([row[n] for row in signals]) for n in signals[0] if n not in driven},
+        units=dict(plant.signals) | {c.name: c.unit for c in design.controls},
+        controls={n: np.array([a.controls[n] for a in actions]) for n in driven},
+        references={n: np.array([float(row[n][0]) for row in ahead]) for n in references},
+        checked=np.array(checked),
+        status=np.array([int(a.status) for a in actions]),
+        tolerance=design.settings.tolerance,
+        **columns,
+    )
 
 
 def _values(reference: Reference, times: Array) -> Array:
     value = reference(times) if callable(reference) else reference
     return np.broadcast_to(np.asarray(value, dtype=float), times.shape)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Log:
-    """Values of a closed loop so far: signals, actions, checks, references."""
-
-    signals: dict[str, list[float]]
-    actions: list[Action] = field(default_factory=list[Action])
-    opinions: list[float] = field(default_factory=list[float])
-    wanted: list[dict[str, float]] = field(default_factory=list[dict[str, float]])
-
-    def loop(self, design: Design, plant: Model) -> ClosedLoopRun:
-        """Return everything as arrays."""
-        step, cycles = design.horizon.step, len(self.actions)
-        names, references = [c.name for c in design.controls], self.wanted[0]
-
-        def column(name: str) -> NDArray[Any]:
-            return np.array([getattr(action, name) for action in self.actions])
-
-        return ClosedLoopRun(
-            plant=plant.name,
-            controller=design.name,
-            t=step * np.arange(float(cycles)),
-            t_end=step * cycles,
-            signals={n: np.array(v) for n, v in self.signals.items() if n not in names},
-            units=dict(plant.signals) | {c.name: c.unit for c in design.controls},
-            controls={n: np.array([a.controls[n] for a in self.actions]) for n in names},
-            references={n: np.array([row[n] for row in self.wanted]) for n in references},
-            checked=np.array(self.opinions),
-            status=np.array([int(action.status) for action in self.actions]),
-            tolerance=design.settings.tolerance,
-            **{name: column(name) for name in COLUMNS},
-        )

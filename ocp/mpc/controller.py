@@ -11,12 +11,11 @@ from tempfile import TemporaryDirectory
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import SLACK, ClosedLoopRun, Optimality, Reference, run_closed_loop
 from ocp.mpc.design import Control, CycleData, CycleStatus, Design, Settings
-from ocp.mpc.horizon import Horizon, horizon_of
+from ocp.mpc.horizon import Horizon
 from ocp.mpc.session import BACKENDS, Session
 from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
@@ -26,8 +25,6 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
     "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos", "memcpy", "memmove",
@@ -98,7 +95,7 @@ class GeneratedController:
                 warnings = tuple(compile_object(compiler, self.files[1], target))
                 needed = needed_symbols(target)
             session = Session(design, *(f.read_text("utf-8") for f in self.files))
-            difference = _difference(design, session, cycles)
+            difference = _difference(session, cycles)
         except CompileError as error:
             return ControllerCheck(f"not verified: {error}", 0, (), None, np.inf, 0)
         foreign = None if needed is None else tuple(sorted(needed - ALLOWED))
@@ -109,12 +106,12 @@ class GeneratedController:
         return ControllerCheck(status, cycles, warnings, foreign, difference, session.bytes)
 
 
-def _difference(design: Design, session: Session, cycles: int) -> float:
+def _difference(session: Session, cycles: int) -> float:
     """Return the largest relative difference over a demanding loop."""
-    h, random, opinion = design.horizon, np.random.default_rng(0), Optimality(design)
-    own = list(design.measured)
-    nominal, settings = h.model.nominal("x")[own], design.settings
-    measured, worst, goals = design.x0[own], 0.0, design.r0
+    design = session.design
+    h, settings, own = design.horizon, design.settings, list(design.measured)
+    random, check, nominal = np.random.default_rng(0), Optimality(design), h.model.nominal("x")[own]
+    measured, goals, worst = design.x0[own], design.r0, 0.0
     for k in range(cycles):
         if k % 25 == 0:
             goals = design.r0 + random.normal(size=design.r0.size)
@@ -128,11 +125,11 @@ def _difference(design: Design, session: Session, cycles: int) -> float:
         plan, pairs = session.plan, list[tuple[float, float, float]]()
         if action.status is not CycleStatus.FAILED:
             planned = (c.of(plan.X, plan.U, data.b) for c in design.controls)
-            given = zip(action.controls.values(), planned, strict=True)
-            pairs += [(u, v, TINY) for u, v in given]
-        if action.status not in (CycleStatus.FAILED, CycleStatus.BAD_INPUT):
-            pairs += [(x, y, TINY) for x, y in zip(plan.X[0, own], measured, strict=True)]
-            pairs.append((action.residual, opinion.residual(plan, data), settings.tolerance))
+            both = zip(action.controls.values(), planned, strict=True)
+            pairs += [(u, v, TINY) for u, v in both]
+            if action.status is not CycleStatus.BAD_INPUT:
+                pairs += [(x, y, TINY) for x, y in zip(plan.X[0, own], measured, strict=True)]
+                pairs.append((action.residual, check.residual(plan, data), settings.tolerance))
         worst = max([worst, *(abs(a - b) / max(abs(b), size) for a, b, size in pairs)])
         measured = plan.X[1, own] + 0.01 * nominal * random.normal(size=nominal.size)
     return float(worst)
@@ -239,7 +236,7 @@ class Controller:
             CompileError: as `start`.
         """
         return run_closed_loop(
-            self.design, self.start(backend), plant, t_end, references or {},
+            self.start(backend), plant, t_end, references or {},
             x0=x0, p=p, plant_p=plant_p, noise=noise, seed=seed, check=check,
         )  # fmt: skip
 
@@ -308,72 +305,50 @@ def controller_of(
     that moves at 1 m/s, 1e-2 m/s leaves stick and 1e-3 m/s does not); the friction of the plant may
     be arbitrarily sharp.
     """
-    where = f"to_mpc '{problem.name}'"
-    horizon = horizon_of(problem, step, method=method, steps=steps)
+    h = Horizon(problem, step, method=method, steps=steps)
     settings = Settings(
         checks.number("to_mpc: tolerance", tolerance, above=0.0),
         checks.count("to_mpc: iterations", iterations, most=1000),
     )
-    own = problem.chain[0].model
-    rated = {v.name for v in own.u} - {v.name for v in horizon.model.u}
-    states = [v.name for v in horizon.model.x if v.name not in rated]
-    wanted = states if measured is None else checks.names("to_mpc: measured", measured, states)
-    span = problem.spans[0]
+    own, span = problem.chain[0].model, problem.spans[0]
+    states, inputs = [v.name for v in h.model.x], [v.name for v in h.model.u]
+    measurable = [name for name in states if name not in {v.name for v in own.u}]  # nothing rated
+    if measured is not None:
+        measurable = checks.names("to_mpc: measured", measured, measurable)
+    bounds = {limit.name: i for i, limit in enumerate(h.limits)}
+    boxes = np.array([span.boxes.get(name, (-np.inf, np.inf)) for name in inputs])
     parameters = dict(zip((v.name for v in span.model.p), span.p.tolist(), strict=True))
-    inputs = horizon.model.values("u")
     design = Design(
         name=name or f"{own.name}_mpc",
-        horizon=horizon,
+        horizon=h,
         settings=settings,
-        measured=tuple(i for i, v in enumerate(horizon.model.x) if v.name in wanted),
-        controls=_controls(own, horizon),
-        x0=horizon.model.initial_state(p=parameters),
-        u0=np.clip(inputs, *_boxes(horizon)),
-        p0=np.array([parameters[name] for name in horizon.parameters]),
-        r0=np.array([parameters[name] for name in horizon.references]),
+        measured=tuple(i for i, state in enumerate(states) if state in measurable),
+        controls=tuple(
+            Control(
+                v.name,
+                v.unit,
+                place=(inputs if v.name in inputs else states).index(v.name),
+                rated=v.name not in inputs,
+                lower=bounds.get(f"lower bound on {v.name}"),
+                upper=bounds.get(f"upper bound on {v.name}"),
+            )
+            for v in own.u
+        ),
+        x0=h.model.initial_state(p=parameters),
+        u0=np.clip(h.model.values("u"), *boxes.T),
+        p0=np.array([parameters[name] for name in h.parameters]),
+        r0=np.array([parameters[name] for name in h.references]),
         penalty=checks.number("to_mpc: penalty", penalty, above=0.0),
     )
-    _check_names(where, design)
+    _check_names(f"to_mpc '{problem.name}'", design)
     return Controller(design)
-
-
-def _rows(horizon: Horizon, name: str) -> tuple[int | None, int | None]:
-    """Return the indices of the bounds of a state or input."""
-    names = [limit.name for limit in horizon.limits]
-    sides = (f"{side} bound on {name}" for side in ("lower", "upper"))
-    lower, upper = (names.index(side) if side in names else None for side in sides)
-    return lower, upper
-
-
-def _boxes(horizon: Horizon) -> tuple[Array, Array]:
-    """Return lower and upper bounds of the inputs."""
-    pairs = [_rows(horizon, v.name) for v in horizon.model.u]
-    lower = [-np.inf if low is None else horizon.limits[low].bound for low, _ in pairs]
-    upper = [np.inf if high is None else horizon.limits[high].bound for _, high in pairs]
-    return np.array(lower), np.array(upper)
-
-
-def _controls(own: Model, horizon: Horizon) -> tuple[Control, ...]:
-    inputs = [v.name for v in horizon.model.u]
-    states = [v.name for v in horizon.model.x]
-    return tuple(
-        Control(
-            v.name,
-            v.unit,
-            (inputs if v.name in inputs else states).index(v.name),
-            v.name not in inputs,
-            *_rows(horizon, v.name),
-        )
-        for v in own.u
-    )
 
 
 def _check_names(where: str, design: Design) -> None:
     """Raise ValueError unless names are C identifiers, unique in their structs."""
     h = design.horizon
-    constants = [v.name for v in h.model.p if v.name not in h.references]
     structs = (
-        [*constants, *design.bound_names, "tolerance", "iterations"],
+        [*h.parameters, *design.bound_names, "tolerance", "iterations"],
         [*design.measured_names, *h.references, *["t"] * timed(design)],
         [*(control.name for control in design.controls), *OWN],
     )
@@ -383,8 +358,8 @@ def _check_names(where: str, design: Design) -> None:
         if not (name.isascii() and fullmatch(r"[A-Za-z]\w*", name)) or name in KEYWORDS
     ]
     for names in structs:
-        repeated = {name for name in names if names.count(name) > 1}
-        problems += [f"expected every name once, got {name!r} twice" for name in sorted(repeated)]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        problems += [f"expected every name once, got {name!r} twice" for name in repeated]
     if not all(map(isfinite, (*design.x0, *design.u0, *design.p0, *design.r0))):
         problems.append("expected finite start values")
     if problems:

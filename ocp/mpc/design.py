@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +56,7 @@ class Settings:
     halvings: int = 6
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(NamedTuple):
     """States (N+1, nx), inputs (N, nu), and multipliers of all rows."""
 
     X: Array
@@ -66,9 +64,7 @@ class Plan:
     z: Array
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class CycleData:
+class CycleData(NamedTuple):
     """Data of the whole horizon in one cycle.
 
     Attributes:
@@ -83,10 +79,8 @@ class CycleData:
     b: Array
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Prices:
-    """rho and sigma of all rows, zero in hard ones, and a mask of soft ones."""
+class Prices(NamedTuple):
+    """Numbers rho and sigma of rows, zero in hard ones, and a mask of soft ones."""
 
     rho: Array
     sigma: Array
@@ -157,17 +151,8 @@ class Design:
 
     @property
     def bounds(self) -> Array:
-        """Bounds of rows of an interval and of the end."""
-        h = self.horizon
-        return np.array([limit.bound for limit in (*h.limits, *h.end_limits)], dtype=float)
-
-    @property
-    def row_prices(self) -> Prices:
-        """Prices of the rows of one interval and of the end."""
-        h = self.horizon
-        soft = np.array([limit.soft for limit in (*h.limits, *h.end_limits)], dtype=bool)
-        price = np.where(soft, self.penalty * h.weight, 0.0)
-        return Prices(price, price.copy(), soft)
+        """Bounds of the rows of an interval and of the end."""
+        return np.array([limit.bound for limit in self.horizon.all_limits], dtype=float)
 
     @property
     def measured_names(self) -> tuple[str, ...]:
@@ -177,24 +162,28 @@ class Design:
     @cached_property
     def bound_names(self) -> tuple[str, ...]:
         """Unique C names of the bounds."""
-        h, found = self.horizon, list[str]()
-        for limit in (*h.limits, *h.end_limits):
+        names: list[str] = []
+        for limit in self.horizon.all_limits:
             side, _, rest = limit.name.partition(" ")
             words = "".join(c if c.isalnum() or c == "_" else " " for c in rest).split()
             stem = "_".join([w for w in words if w not in ("the", "bound", "on")] + [side])
             name, number = stem, 2
-            while name in found:
+            while name in names:
                 name, number = f"{stem}_{number}", number + 1
-            found.append(name)
-        return tuple(found)
+            names.append(name)
+        return tuple(names)
+
+    @cached_property
+    def row_prices(self) -> Prices:
+        """Prices of the rows of one interval and of the end."""
+        soft = np.array([limit.soft for limit in self.horizon.all_limits], dtype=bool)
+        price = np.where(soft, self.penalty * self.horizon.weight, 0.0)
+        return Prices(price, price, soft)
 
     @cached_property
     def prices(self) -> Prices:
-        """Prices of all rows."""
-        one, h = self.row_prices, self.horizon
-        count = len(h.limits)
-
-        def every(values: NDArray[np.generic]) -> NDArray[np.generic]:
-            return np.append(np.tile(values[:count], h.count), values[count:])
-
-        return Prices(every(one.rho), every(one.sigma), every(one.soft))  # pyright: ignore[reportArgumentType]
+        """Prices of the rows of all intervals and of the end."""
+        h, one = self.horizon, self.row_prices
+        rows = np.arange(one.soft.size)
+        rows = np.append(np.tile(rows[: len(h.limits)], h.count), rows[len(h.limits) :])
+        return Prices(one.rho[rows], one.sigma[rows], one.soft[rows])

@@ -14,12 +14,12 @@ Source: Rao, Wright and Rawlings, Application of interior-point methods to model
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, final
 
 import casadi as ca
 
-from ocp.mpc.horizon import Horizon, Limit
+from ocp.mpc.horizon import Horizon
 from symfric.foundation.variable import stacked
 
 
@@ -39,21 +39,14 @@ class Packed:
         for entry in map(ca.SX, entries):
             varies = all_of_it or not entry.is_constant()
             places.append(len(self.entries) if varies else -1)
-            if varies:
-                self.entries.append(entry)
+            self.entries += [entry] * varies
         self._parts[name] = matrix, places
-
-    def column(self) -> ca.SX:
-        """Return all varying entries, (n, 1)."""
-        return stacked(self.entries)
 
     def part(self, name: str, column: ca.SX) -> ca.SX:
         """Return the matrix `name` with entries from `column`."""
         matrix, places = self._parts[name]
-        values = [
-            entry if place < 0 else column[place]
-            for entry, place in zip(matrix.nonzeros(), places, strict=True)
-        ]
+        pairs = zip(matrix.nonzeros(), places, strict=True)
+        values = [entry if place < 0 else column[place] for entry, place in pairs]
         return ca.SX(matrix.sparsity(), stacked(values))
 
 
@@ -91,27 +84,18 @@ class Kernels:
     vector: ca.Function
     forward: ca.Function
     adjoint: ca.Function
-    end_linear: ca.Function | None
-    end_value: ca.Function | None
-    end_matrix: ca.Function | None
-    end_vector: ca.Function | None
-    end_forward: ca.Function | None
-    end_adjoint: ca.Function | None
     identity: tuple[float, ...]
+    end_linear: ca.Function | None = None
+    end_value: ca.Function | None = None
+    end_matrix: ca.Function | None = None
+    end_vector: ca.Function | None = None
+    end_forward: ca.Function | None = None
+    end_adjoint: ca.Function | None = None
 
     @property
     def all(self) -> list[ca.Function]:
         """List of the existing Functions."""
         return [f for f in vars(self).values() if isinstance(f, ca.Function)]
-
-
-def kernels(horizon: Horizon) -> Kernels:
-    """Return the Functions of a horizon."""
-    functions, start = _interval(horizon)
-    whole = [*functions, *_end(horizon)]
-    names = [field.name for field in fields(Kernels)]
-    found: dict[str, Any] = dict(zip(names[:-1], whole, strict=True))
-    return Kernels(**found, identity=start)
 
 
 def upper(matrix: ca.SX) -> ca.SX:
@@ -130,7 +114,7 @@ def symmetric(column: ca.SX, n: int) -> ca.SX:
 
 
 def factored(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return L and 1/D of L D L' = matrix, for a positive definite matrix; without pivoting."""
+    """Return L and 1/D of L D L' = matrix without pivoting, for a positive definite matrix."""
     n = matrix.shape[0]
     lower, inverse = ca.SX.eye(n), ca.SX(n, 1)
     for j in range(n):
@@ -156,8 +140,41 @@ def solved(lower: ca.SX, inverse: ca.SX, right: ca.SX) -> ca.SX:
     return ca.vertcat(*rows)
 
 
-def _value(limit: Limit, bound: ca.SX) -> ca.SX:
-    return limit.sign * (limit.expression - bound) / limit.unit
+def kernels(horizon: Horizon) -> Kernels:
+    """Return the Functions of a horizon."""
+    h = horizon
+    nx, nu = h.x.numel(), h.u.numel()
+    arguments = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
+    moved = h.advance(h.x, h.u, h.r, h.p)
+    slopes, after = _slopes(moved, h.x, h.u)
+    S, to = ca.vertcat(ca.SX(0, 1), slopes.nz[:]), ca.SX.sym("to", nx)
+    c = to - h.after
+    pack = Packed()
+    pack.add("c", c, all_of_it=True)
+    pack.add("v", h.v, all_of_it=True)
+    pack.add("F", slopes)
+    for name, costs in (("early", h.early), ("late", h.late)):
+        pack.add(f"g {name}", costs.gradient)
+        pack.add(f"H {name}", costs.hessian)
+    pack.add("D early", ca.jacobian(h.v, ca.vertcat(h.x, h.u)))
+    pack.add("D late", ca.jacobian(h.v, h.after))
+    lam, E = ca.SX.sym("lam", nx), ca.SX.sym("E", (nx + nu) * (nx + nu + 1) // 2)
+    pack.add("E", ca.SX(*E.shape), all_of_it=True)
+    curvature, gradient = ca.hessian(ca.dot(lam, moved), ca.vertcat(h.x, h.u))
+    chain = ca.vertcat(slopes, ca.horzcat(ca.SX(nu, nx), ca.SX.eye(nu)))
+    bent = E + upper(chain.T @ curvature @ chain)
+    value = ca.vertcat(c, h.v, h.early.value + h.late.value)
+    functions = [
+        _function("tangent", [h.x, S, h.u, h.r, h.p], [moved, after]),
+        _function("bend", [lam, E, h.x, S, h.u, h.r, h.p], [gradient[:nx], bent]),
+        _function("linear", [*arguments, to, S], [stacked(pack.entries)]),
+        _function("value", [*arguments, to], [value]),
+        *_recursion(pack, nx, nu, len(h.limits)),
+        *_end(h),
+    ]
+    identity = ca.project(ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)), slopes.sparsity())
+    start = tuple(map(float, ca.DM(identity).nonzeros()))
+    return Kernels(advance=h.advance, identity=start, **{f.name(): f for f in functions})
 
 
 def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -> ca.Function:
@@ -165,39 +182,20 @@ def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -
     return ca.Function(name, list(arguments), dense, {"cse": True})
 
 
-def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
-    """Return the Functions of an interval, and S at its beginning."""
-    h = horizon
-    nx, nu = h.x.numel(), h.u.numel()
-    arguments = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
-    start = ca.vertcat(h.x, h.u)
-    tangent, slopes = _tangent(horizon)
-    S = ca.vertcat(ca.SX(0, 1), slopes.nz[:])
-    to = ca.SX.sym("to", nx)
-    c = to - h.after
-    v = stacked(_value(limit, h.b[i]) for i, limit in enumerate(h.limits))
-    pack = Packed()
-    pack.add("c", c, all_of_it=True)
-    pack.add("v", v, all_of_it=True)
-    pack.add("F", slopes)
-    for name, costs in (("early", h.early), ("late", h.late)):
-        pack.add(f"g {name}", costs.gradient)
-        pack.add(f"H {name}", costs.hessian)
-    pack.add("D early", ca.jacobian(v, start))
-    pack.add("D late", ca.jacobian(v, h.after))
-    n = nx + nu
-    pack.add("E", ca.SX(n * (n + 1) // 2, 1), all_of_it=True)
-    value = ca.vertcat(c, v, h.early.value + h.late.value)
-    functions = [
-        h.advance,
-        tangent,
-        _bend(horizon, slopes),
-        _function("linear", [*arguments, to, S], [pack.column()]),
-        _function("value", [*arguments, to], [value]),
-        *_recursion(pack, nx, nu, len(h.limits)),
-    ]
-    identity = ca.project(ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)), slopes.sparsity())
-    return functions, tuple(map(float, ca.DM(identity).nonzeros()))
+def _slopes(moved: ca.SX, x: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return the derivative of F as a matrix of symbols, and its entries after a substep."""
+    nx, nu = x.numel(), u.numel()
+    by_x, by_u = ca.jacobian(moved, x), ca.jacobian(moved, u)
+    before = ca.Sparsity(nx, nx + nu)
+    pattern = ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)).sparsity()
+    while pattern != before:
+        before = pattern
+        ones = ca.DM(by_x.sparsity(), 1) @ ca.DM(pattern, 1)
+        ones += ca.horzcat(ca.DM(nx, nx), ca.DM(by_u.sparsity(), 1))
+        pattern = ones.sparsity() + before
+    slopes = ca.SX(pattern, ca.SX.sym("S", pattern.nnz()))
+    after = ca.project(by_x @ slopes + ca.horzcat(ca.SX(nx, nx), by_u), pattern)
+    return slopes, ca.vertcat(ca.SX(0, 1), *ca.vertsplit(after.nz[:]))
 
 
 def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
@@ -238,67 +236,31 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     late = lam + g_late - D_late.T @ m
     gradient = g - D.T @ m + F.T @ late
     return [
-        _function("matrix", [P, L, w], [upper(before), kept.column()]),
+        _function("matrix", [P, L, w], [upper(before), stacked(kept.entries)]),
         _function("vector", [q, L, G, e], [both[:nx] + K.T @ both[nx:], k]),
         _function("forward", [d, L, G, feed], [then, ca.vertcat(du, moved, tilt, bend)]),
         _function("adjoint", [lam, L, m], [gradient[:nx], ca.vertcat(gradient[nx:], late)]),
     ]
 
 
-def _tangent(horizon: Horizon) -> tuple[ca.Function, ca.SX]:
-    """Return the kernel `tangent`, and the derivative of F as a matrix of symbols."""
-    h, nx, nu = horizon, horizon.x.numel(), horizon.u.numel()
-    moved = h.advance(h.x, h.u, h.r, h.p)
-    by_x, by_u = ca.jacobian(moved, h.x), ca.jacobian(moved, h.u)
-    before = ca.Sparsity(nx, nx + nu)
-    pattern = ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)).sparsity()
-    while pattern != before:
-        before = pattern
-        ones = ca.DM(by_x.sparsity(), 1) @ ca.DM(pattern, 1)
-        ones += ca.horzcat(ca.DM(nx, nx), ca.DM(by_u.sparsity(), 1))
-        pattern = ones.sparsity() + before
-    S = ca.SX.sym("S", pattern.nnz())
-    slopes = ca.SX(pattern, S)
-    after = by_x @ slopes + ca.horzcat(ca.SX(nx, nx), by_u)
-    kept = ca.project(after, pattern)
-    entries = ca.vertcat(ca.SX(0, 1), *ca.vertsplit(kept.nz[:]))
-    function = _function("tangent", [h.x, S, h.u, h.r, h.p], [moved, entries])
-    return function, slopes
-
-
-def _bend(horizon: Horizon, slopes: ca.SX) -> ca.Function:
-    """Return the kernel `bend`."""
-    h, nx, nu = horizon, horizon.x.numel(), horizon.u.numel()
-    n = nx + nu
-    lam, E = ca.SX.sym("lam", nx), ca.SX.sym("E", n * (n + 1) // 2)
-    S = ca.vertcat(ca.SX(0, 1), slopes.nz[:])
-    weighted = ca.dot(lam, h.advance(h.x, h.u, h.r, h.p))
-    here = ca.vertcat(h.x, h.u)
-    curvature, gradient = ca.hessian(weighted, here)
-    chain = ca.vertcat(slopes, ca.horzcat(ca.SX(nu, nx), ca.SX.eye(nu)))
-    found = E + upper(chain.T @ curvature @ chain)
-    return _function("bend", [lam, E, h.x, S, h.u, h.r, h.p], [gradient[:nx], found])
-
-
-def _end(horizon: Horizon) -> list[ca.Function | None]:
-    h, nx = horizon, horizon.x.numel()
-    first, rows = len(h.limits), len(h.end_limits)
+def _end(h: Horizon) -> list[ca.Function]:
+    """Return the Functions of the end of the horizon; none without cost and conditions there."""
+    rows = len(h.end_limits)
     if not rows and not ca.depends_on(h.end.value, h.x):
-        return [None] * 6
+        return []
     arguments = [h.x, h.r, h.p, h.t, h.b]
-    v = stacked(_value(limit, h.b[first + i]) for i, limit in enumerate(h.end_limits))
     pack = Packed()
-    pack.add("v", v, all_of_it=True)
+    pack.add("v", h.v_end, all_of_it=True)
     pack.add("g", h.end.gradient)
     pack.add("H", h.end.hessian)
-    pack.add("D", ca.jacobian(v, h.x))
+    pack.add("D", ca.jacobian(h.v_end, h.x))
     L = ca.SX.sym("L", len(pack.entries))
     g, H, D = (pack.part(name, L) for name in "gHD")
-    w, e, d = ca.SX.sym("w", rows), ca.SX.sym("e", rows), ca.SX.sym("d", nx)
+    w, e, d = (ca.SX.sym(n, k) for n, k in (("w", rows), ("e", rows), ("d", h.x.numel())))
     tilt, bend = ca.dot(g, d), ca.dot(d, H @ d)
     return [
-        _function("end_linear", arguments, [pack.column()]),
-        _function("end_value", arguments, [ca.vertcat(v, h.end.value)]),
+        _function("end_linear", arguments, [stacked(pack.entries)]),
+        _function("end_value", arguments, [ca.vertcat(h.v_end, h.end.value)]),
         _function("end_matrix", [L, w], [upper(H + D.T @ ca.diag(w) @ D)]),
         _function("end_vector", [L, e], [g + D.T @ e]),
         _function("end_forward", [d, L], [ca.vertcat(D @ d, tilt, bend)]),

@@ -70,15 +70,15 @@ class Session:
         Raises:
             CompileError: there is no compiler, or it failed.
         """
-        self._design = design
+        self.design = design
         parts = sizes(design)
         self._doubles = len(design.controls) + 2
-        params = parts["NPAR"] + parts["NB"] + 1
-        text = body or source(design)
-        text = text.replace(f'#include "{design.name}.h"', head or header(design))
+        text = (body or source(design)).replace(
+            f'#include "{design.name}.h"', head or header(design)
+        )
         text += "#include <string.h>\n"
-        text += f"#define SF_PARAM {params}\n#define SF_OUT {self._doubles}\n"
-        text += "\n" + WRAPPER.replace("NAME", design.name)
+        text += f"#define SF_PARAM {parts['NPAR'] + parts['NB'] + 1}\n"
+        text += f"#define SF_OUT {self._doubles}\n\n{WRAPPER.replace('NAME', design.name)}"
         names = ("sf_cycle", "sf_init", "sf_bytes", "sf_plan")
         self._library = opened(library(text, *names, flags=SCALAR), names)
         self.bytes: int = int(self._library.sf_bytes())
@@ -118,22 +118,19 @@ class Session:
         Raises:
             ValueError: unknown names, wrong shapes.
         """
-        settings = self._design.settings
+        settings = self.design.settings
+        if iterations is not None:
+            iterations = checks.count("step: iterations", iterations, most=settings.iterations)
         return self.cycle(
             self._measured(x),
             self.data(references, t, p, bounds),
             settings.tolerance if tolerance is None else float(tolerance),
-            settings.iterations
-            if iterations is None
-            else checks.count("step: iterations", iterations, most=settings.iterations),
+            iterations or settings.iterations,
         )
 
     def cycle(self, measured: Array, data: CycleData, tolerance: float, iterations: int) -> Action:
         """Compute one cycle from arrays; see `step`."""
-        columns = [measured, data.R.T.ravel()]
-        if self._timed:
-            columns.append(data.t[:1])
-        into = np.concatenate(columns)
+        into = np.concatenate([measured, data.R.T.ravel(), data.t[: int(self._timed)]])
         param = np.concatenate([data.p, data.b, [tolerance]])
         out, counts = np.zeros(self._doubles), np.zeros(3, dtype=np.int32)
         places = [address(self._self), address(param), iterations]
@@ -143,17 +140,11 @@ class Session:
         seconds, cpu = perf_counter() - began, thread_time() - busy
         *controls, residual, violation = out.tolist()
         programs, steps, status = counts.tolist()
-        names = (control.name for control in self._design.controls)
+        names = (control.name for control in self.design.controls)
         return Action(
-            controls=dict(zip(names, controls, strict=True)),
-            residual=residual,
-            violation=violation,
-            iterations=programs,
-            program_iterations=steps,
-            status=CycleStatus(status),
-            seconds=seconds,
-            cpu=cpu,
-        )
+            dict(zip(names, controls, strict=True)), residual, violation, programs, steps,
+            CycleStatus(status), seconds, cpu,
+        )  # fmt: skip
 
     def forget(self) -> None:
         """Restart from a plan that stays at the start of the model."""
@@ -162,7 +153,7 @@ class Session:
     @property
     def plan(self) -> Plan:
         """Planned states (N+1, nx), inputs (N, nu) and multipliers; the first row is now."""
-        parts = sizes(self._design)
+        parts = sizes(self.design)
         X, U = np.zeros((parts["N"] + 1, parts["NX"])), np.zeros((parts["N"], parts["NU"]))
         z = np.zeros(parts["ALL"])
         arrays = [ctypes.c_void_p(a.ctypes.data) for a in (self._self, X, U, z)]
@@ -170,8 +161,7 @@ class Session:
         return Plan(X, U, z)
 
     def _measured(self, x: ArrayLike | Mapping[str, float]) -> Array:
-        design = self._design
-        names = design.measured_names
+        names = self.design.measured_names
         if isinstance(x, Mapping):
             values = checks.named("step: x", x, names)
             missing = [name for name in names if name not in values]
@@ -179,12 +169,12 @@ class Session:
                 raise ValueError(f"step: x: expected all of {', '.join(names)}, got none for "
                                  f"{', '.join(missing)}")  # fmt: skip
             x = [values[name] for name in names]
-        found = np.asarray(x, dtype=float).ravel()
-        if found.size != len(names):
+        array = np.asarray(x, dtype=float).ravel()
+        if array.size != len(names):
             raise ValueError(
-                f"step: x: expected {len(names)} numbers ({', '.join(names)}), got {found.size}"
+                f"step: x: expected {len(names)} numbers ({', '.join(names)}), got {array.size}"
             )
-        return np.ascontiguousarray(found)
+        return np.ascontiguousarray(array)
 
     def data(
         self,
@@ -194,8 +184,7 @@ class Session:
         bounds: Mapping[str, float] | None,
     ) -> CycleData:
         """Return the arguments of `step` over the whole horizon."""
-        design = self._design
-        h = design.horizon
+        design, h = self.design, self.design.horizon
         R = np.tile(design.r0, (h.count + 1, 1))
         for name, value in checks.named("step: references", references, h.references).items():
             values = np.asarray(value, dtype=float).ravel()
@@ -205,10 +194,10 @@ class Session:
                     f"interval, got {values.size}"
                 )
             R[:, h.references.index(name)] = values
-        numbers = design.p0.copy()
+        parameters = design.p0.copy()
         for name, value in checks.named("step: p", p, h.parameters).items():
-            numbers[h.parameters.index(name)] = value
+            parameters[h.parameters.index(name)] = value
         b, names = design.bounds, design.bound_names
         for name, value in checks.named("step: bounds", bounds, names).items():
             b[names.index(name)] = value
-        return CycleData(R, t + h.step * np.arange(h.count + 1.0), numbers, b)
+        return CycleData(R, t + h.step * np.arange(h.count + 1.0), parameters, b)

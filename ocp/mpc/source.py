@@ -44,24 +44,23 @@ Sources: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36) (weight of
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
 
 from ocp.mpc.design import Control, CycleStatus, Design
-from symfric.codegen.layout import folded
+from symfric.codegen.layout import filled, folded
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
-from symfric.foundation.parameters import Variable
 
-LOOPS = Path(__file__).with_name("cycle.c").read_text(encoding="utf-8")
-"""The loops of a cycle.
+FOLDER = Path(__file__).parent
+"""Folder of the fixed text.
 
-One text for all controllers, called NAME in it: sizes are macros, kernels are functions. Every loop
-is bounded, nothing is allocated, all memory is in the caller's struct.
+The loops in cycle.c are one text for all controllers, called NAME in it: sizes are macros, kernels
+are functions. Every loop is bounded, nothing is allocated, all memory is in the caller's struct.
 """
 PLAIN = 2
 """Iterations without curvature of the equations, which has no meaning yet far from the optimum."""
@@ -78,81 +77,43 @@ AWAY = 0.1
 
 def header(design: Design) -> str:
     """Return the text of the header file."""
-    name, h = design.name, design.horizon
-    guard = f"{name.upper()}_H"
-    statuses = "".join(f"#define {name}_{s.name} {int(s)}\n" for s in CycleStatus)
-    return f"""{_banner(f"{name}.h")}
- *
- * Model predictive controller of '{h.model.name}': every {h.step:g} s, over {h.count} intervals.
- * Quadratic programs by Riccati's recursion and an interior point: no allocation, bounded loops.
- */
-#ifndef {guard}
-#define {guard}
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-{statuses}
-/* A change of the plan. */
-typedef struct {{
-{_move(sizes(design))}\
-    double slope, curvature;
-}} {name}_move_t;
-
-/* Plan and work space; nothing in it needs to be read or written. */
-typedef struct {{
-    int warm;                /* whether there is a plan */
-{_memory(name, sizes(design))}}} {name}_t;
-
-{_structs(design)}
-/* Forget the plan; call it before the first step. */
-void {name}_init({name}_t *self);
-
-/* One cycle. Numbers that are not finite give {name}_BAD_INPUT, and the last plan goes on. */
-void {name}_step({name}_t *self, const {name}_param_t *param, const {name}_in_t *in,
-{" " * (len(name) + 11)}{name}_out_t *out);
-
-#ifdef __cplusplus
-}}
-#endif
-
-#endif /* {guard} */
-"""
-
-
-def _structs(design: Design) -> str:
-    """Return the structs of inputs and outputs."""
-    name, h = design.name, design.horizon
-    parameters = [(v.name, f"{v.doc} [{v.unit}]") for v in _constants(design)]
-    parameters += [(bound, "bound") for bound in design.bound_names]
-    parameters.append(("tolerance", "residual at which a plan is optimal"))
-    into = [
-        (v.name, f"measured: {v.doc} [{v.unit}]") for v in (h.model.x[i] for i in design.measured)
-    ]
+    name, h, parts = design.name, design.horizon, sizes(design)
+    n, nx, nu, rows = parts["N"], parts["NX"], parts["NU"], parts["ALL"]
+    memory = {
+        "x": (n + 1, nx), "u": (n, nu), "z": (rows,), "r": (n + 1, parts["NR"]), "t": (n + 1,),
+        "p": (parts["NPAR"],), "b": (parts["NB"],), "L": (n, parts["NL"]),
+        "L_end": (parts["NL_END"],), "G": (n, parts["NG"]), "k": (n, nu), "lam": (n, nx),
+        "w": (rows,), "e": (rows,),
+    }  # fmt: skip
+    of_rows = ("v", "ts", "zn", "s", "y", "f", "a", "o", "goal_t", "goal_s", "dt", "dz", "ds", "dy")
+    memory |= dict.fromkeys(of_rows, (rows,)) if rows else {}
+    model = {v.name: v for v in (*h.model.p, *h.model.x)}
+    param = [(name, f"{model[name].doc} [{model[name].unit}]") for name in h.parameters]
+    param += [(bound, "bound") for bound in design.bound_names]
+    param.append(("tolerance", "residual at which a plan is optimal"))
+    states = [model[name] for name in design.measured_names]
+    into = [(v.name, f"measured: {v.doc} [{v.unit}]") for v in states]
     into += [(f"{r}[{h.count + 1}]", "reference now and after each interval") for r in h.references]
     into += [("t", "time now [s]")] * timed(design)
     out = [(c.name, f"input over the next {h.step:g} s [{c.unit}]") for c in design.controls]
     out.append(("residual", "of the conditions of optimality, of the plan that this is from"))
     out.append(("violation", "largest of a soft bound, in units of its signal"))
-    return f"""typedef struct {{
-{_members(parameters)}\
-    int iterations;          /* quadratic programs in a cycle at most; 1: real-time iteration */
-}} {name}_param_t;
-
-extern const {name}_param_t {name}_default;
-
-typedef struct {{
-{_members(into)}}} {name}_in_t;
-
-typedef struct {{
-{_members(out)}\
-    int iterations;          /* quadratic programs */
-    int program_iterations;  /* of the interior point, over all of them */
-    int status;              /* one of {name}_CONVERGED ... */
-    int converged;           /* 1: residual <= tolerance */
-}} {name}_out_t;
-"""
+    return filled(
+        FOLDER / "controller.h",
+        banner=_banner(f"{name}.h"),
+        name=name,
+        model=h.model.name,
+        step=f"{h.step:g}",
+        count=h.count,
+        guard=f"{name.upper()}_H",
+        statuses="".join(f"#define {name}_{s.name} {int(s)}\n" for s in CycleStatus),
+        change=_arrays({"x": (n + 1, nx), "u": (n, nu), "D": (rows,)}),
+        memory=_arrays(memory),
+        param=_members(param),
+        into=_members(into),
+        out=_members(out),
+        indent=" " * (len(name) + 11),
+    )
 
 
 def source(design: Design) -> str:
@@ -161,29 +122,46 @@ def source(design: Design) -> str:
     Raises:
         ValueError: an operation without counterpart in C99.
     """
-    name = design.name
-    functions, calls = list[str](), Counter[str]()
+    h, kernels, calls = design.horizon, list[str](), Counter[str]()
     for kernel in design.kernels.all:
         text, called = _kernel(kernel)
-        functions.append(text)
+        kernels.append(text)
         calls += called
-    macros = "".join(
-        f"#ifndef {macro(c, DOUBLE)}\n#define {macro(c, DOUBLE)} {c}\n#endif\n"
-        for c in sorted(set(calls) & set(TRANSCENDENTAL.values()))
+    parameters = [f"m->p[{i}] = param->{name};" for i, name in enumerate(h.parameters)]
+    bounds = [f"m->b[{i}] = param->{bound};" for i, bound in enumerate(design.bound_names)]
+    needed = [f"in->{name}" for name in design.measured_names] + ["param->tolerance"]
+    needed += ["in->t"] * timed(design)
+    needed += [f"m->p[{i}]" for i in range(len(parameters))]
+    needed += [f"m->b[{i}]" for i in range(len(bounds))]
+    finite = [f"sound = sound && isfinite({number});" for number in needed]
+    now = "in->t + " if timed(design) else ""
+    each = [f"m->t[k] = {now}{DOUBLE.literal(h.step)} * (double)k;"]
+    each += [f"m->r[k][{i}] = in->{name}[k];" for i, name in enumerate(h.references)]
+    each += [f"sound = sound && isfinite(m->r[k][{i}]);" for i in range(len(h.references))]
+    pairs = zip(design.measured, design.measured_names, strict=True)
+    return filled(
+        FOLDER / "controller.c",
+        banner=_banner(f"{design.name}.c"),
+        name=design.name,
+        count=h.count,
+        booleans="#include <stdbool.h>\n" * any("bool " in kernel for kernel in kernels),
+        constants=_lines([*parameters, *bounds, *finite], 4),
+        each=_lines(each, 8),
+        measured=_lines((f"m->x[0][{i}] = in->{name};" for i, name in pairs), 4),
+        controls="".join(map(_shown, design.controls)),
+        macros=_macros(design),
+        functions_of_libm="".join(
+            f"#ifndef {macro(c, DOUBLE)}\n#define {macro(c, DOUBLE)} {c}\n#endif\n"
+            for c in sorted(set(calls) & set(TRANSCENDENTAL.values()))
+        ),
+        tables=_tables(design),
+        kernels="".join(kernels),
+        loops=(FOLDER / "cycle.c")
+        .read_text(encoding="utf-8")
+        .rstrip()
+        .replace("NAME", design.name)
+        .replace("move_t", f"{design.name}_move_t"),
     )
-    booleans = "#include <stdbool.h>\n" if any("bool " in f for f in functions) else ""
-    loops = LOOPS.replace("NAME", name).replace("move_t", f"{name}_move_t")
-    return f"""{_banner(f"{name}.c")}
- */
-#include "{name}.h"
-
-#include <math.h>
-{booleans}
-{_user_functions(design)}
-{_macros(design)}
-{macros}
-{_constants_of(design)}
-{"".join(functions)}{loops}"""
 
 
 def _banner(file: str) -> str:
@@ -221,9 +199,12 @@ def sizes(design: Design) -> dict[str, int]:
     }
 
 
-def _constants(design: Design) -> list[Variable]:
+def timed(design: Design) -> bool:
+    """Return True if a cost or a bound depends on time."""
     h = design.horizon
-    return [v for v in h.model.p if v.name not in h.references]
+    values = [h.early.value, h.late.value, h.end.value]
+    values += [limit.expression for limit in h.all_limits]
+    return ca.depends_on(ca.vertcat(*values), h.t)
 
 
 def _members(rows: Iterable[tuple[str, str]]) -> str:
@@ -233,58 +214,36 @@ def _members(rows: Iterable[tuple[str, str]]) -> str:
     )
 
 
-def _array(what: str, *shape: int) -> str:
-    """Return a member; no size is zero in C."""
-    return f"    double {what}{''.join(f'[{max(size, 1)}]' for size in shape)};\n"
+def _arrays(shapes: dict[str, tuple[int, ...]]) -> str:
+    """Return members name -> shape; no size is zero in C."""
+    lines = (name + "".join(f"[{max(n, 1)}]" for n in shape) for name, shape in shapes.items())
+    return "".join(f"    double {line};\n" for line in lines)
 
 
-def _move(parts: dict[str, int]) -> str:
-    n, nx, nu = parts["N"], parts["NX"], parts["NU"]
-    return _array("x", n + 1, nx) + _array("u", n, nu) + _array("D", parts["ALL"])
-
-
-def _memory(name: str, parts: dict[str, int]) -> str:
-    """Return the members of the plan and the work space."""
-    n, every = parts["N"], max(parts["ALL"], 1)
-
-    states, inputs = (n + 1, parts["NX"]), (n, parts["NU"])
-    lines = [_array("x", *states), _array("u", *inputs), _array("z", every)]
-    lines += [_array("r", n + 1, parts["NR"]), _array("t", n + 1), _array("p", parts["NPAR"])]
-    lines += [
-        _array("b", parts["NB"]),
-        _array("L", n, parts["NL"]),
-        _array("L_end", parts["NL_END"]),
-    ]
-    lines += [_array("G", n, parts["NG"]), _array("k", *inputs), _array("lam", n, parts["NX"])]
-    rows = ["w", "e"]
-    if parts["ALL"]:
-        rows += ["v", "ts", "zn", "s", "y", "f", "a", "o", "goal_t", "goal_s"]
-        rows += ["dt", "dz", "ds", "dy"]
-    lines += [_array(row, every) for row in rows]
-    lines.append(f"    {name}_move_t go, aim;\n")
-    return "".join(lines)
+def _lines(lines: Iterable[str], margin: int) -> str:
+    return "".join(f"{' ' * margin}{line}\n" for line in lines)
 
 
 def _macros(design: Design) -> str:
     parts: dict[str, int | str] = dict(sizes(design))
-    h, prices = design.horizon, design.prices
-    parts["PAIRS"] = DOUBLE.literal(float(parts["ALL"]) + float(prices.soft.sum()))
-    for name, value in (
-        ("CURVATURE", h.curvature),
-        ("CLOSE", CLOSE),
-        ("AWAY", AWAY),
-        ("BACK", BACK),
-        ("ARMIJO", ARMIJO),
-        ("ROUNDING", ROUNDING),
-    ):
-        parts[name] = DOUBLE.literal(value)
+    numbers = {
+        "PAIRS": float(parts["ALL"]) + float(design.prices.soft.sum()),
+        "CURVATURE": design.horizon.curvature,
+        "CLOSE": CLOSE,
+        "AWAY": AWAY,
+        "BACK": BACK,
+        "ARMIJO": ARMIJO,
+        "ROUNDING": ROUNDING,
+    }
+    parts |= {name: DOUBLE.literal(value) for name, value in numbers.items()}
     lines = [f"#define {name} {value}" for name, value in parts.items()]
     row = "((j) < N * ROWS ? (j) % ROWS : ROWS + (j) - N * ROWS)" if parts["ROWS"] else "(j)"
     return "\n".join([*lines, f"#define ROW(j) {row}", ""])
 
 
-def _constants_of(design: Design) -> str:
-    h, prices = design.horizon, design.row_prices
+def _tables(design: Design) -> str:
+    """Return the constant arrays and the default parameters."""
+    name, h, prices = design.name, design.horizon, design.row_prices
     tables = {
         "nominal_x": h.model.nominal("x").tolist(),
         "nominal_u": h.model.nominal("u").tolist(),
@@ -295,17 +254,15 @@ def _constants_of(design: Design) -> str:
     if prices.soft.size:
         tables |= {"rho": prices.rho.tolist(), "sigma": prices.sigma.tolist()}
     text = ""
-    for name, values in tables.items():
+    for table, values in tables.items():
         numbers = ", ".join(map(DOUBLE.literal, values))
-        text += folded(f"static const double {name}[{len(values)}] = {{{numbers}}};", "") + "\n"
+        text += folded(f"static const double {table}[{len(values)}] = {{{numbers}}};", "") + "\n"
     if prices.soft.size:
         flags = ", ".join(str(int(flag)) for flag in prices.soft)
         text += f"static const int soft[{prices.soft.size}] = {{{flags}}};\n"
-    name = design.name
     values = [*design.p0.tolist(), *design.bounds.tolist(), design.settings.tolerance]
-    numbers = [*map(DOUBLE.literal, values), str(design.settings.iterations)]
-    text += f"\nconst {name}_param_t {name}_default = {{\n    {', '.join(numbers)}\n}};\n"
-    return text + "\n"
+    numbers = ", ".join([*map(DOUBLE.literal, values), str(design.settings.iterations)])
+    return f"{text}\nconst {name}_param_t {name}_default = {{\n    {numbers}\n}};\n\n"
 
 
 def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
@@ -324,52 +281,6 @@ def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
     head = folded(f"static void {function.name()}({', '.join(arguments)})", "")
     body = "".join(folded(line, "    ") + "\n" for line in (*idle, *loads, *code.lines))
     return f"{head}\n{{\n{body}}}\n\n", code.calls
-
-
-def _user_functions(design: Design) -> str:
-    """Return functions with names of the user, placed before all macros."""
-    name, h = design.name, design.horizon
-    p = [f"m->p[{i}] = param->{v.name};" for i, v in enumerate(_constants(design))]
-    b = [f"m->b[{i}] = param->{bound};" for i, bound in enumerate(design.bound_names)]
-    r = [f"m->r[k][{i}] = in->{reference}[k];" for i, reference in enumerate(h.references)]
-    needed = [f"in->{h.model.x[i].name}" for i in design.measured] + ["param->tolerance"]
-    needed += ["in->t"] * timed(design)
-    needed += [f"m->p[{i}]" for i in range(len(p))] + [f"m->b[{i}]" for i in range(len(b))]
-    checks = [f"sound = sound && isfinite({what});" for what in needed]
-    now = "in->t + " if timed(design) else ""
-    each = [f"m->t[k] = {now}{DOUBLE.literal(h.step)} * (double)k;", *r]
-    each += [f"sound = sound && isfinite(m->r[k][{i}]);" for i in range(len(r))]
-    measured = [f"m->x[0][{i}] = in->{h.model.x[i].name};" for i in design.measured]
-    return f"""/* Take everything that is given but the states; whether all of it is finite. */
-static int take({name}_t *m, const {name}_param_t *param, const {name}_in_t *in)
-{{
-    int k, sound = 1;
-{_lines(p + b + checks, 4)}    for (k = 0; k <= {h.count}; k++) {{
-{_lines(each, 8)}    }}
-    return sound;
-}}
-
-static void measure({name}_t *m, const {name}_in_t *in)
-{{
-{_lines(measured, 4)}}}
-
-static void show(const {name}_t *m, {name}_out_t *out)
-{{
-    double u;
-{"".join(map(_shown, design.controls))}}}
-"""
-
-
-def timed(design: Design) -> bool:
-    """Return True if a cost or a bound depends on time."""
-    h = design.horizon
-    values = [h.early.value, h.late.value, h.end.value]
-    values += [limit.expression for limit in (*h.limits, *h.end_limits)]
-    return ca.depends_on(ca.vertcat(*values), h.t)
-
-
-def _lines(lines: Sequence[str], margin: int) -> str:
-    return "".join(f"{' ' * margin}{line}\n" for line in lines)
 
 
 def _shown(control: Control) -> str:

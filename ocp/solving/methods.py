@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any, ClassVar, Self, final
+from typing import Any, ClassVar, NamedTuple, Self, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.solving.prepared import Built, Option, Prepared, made
-from ocp.solving.watch import OVERDETERMINED, GradientHook, IterationHook, Shaped
+from ocp.solving.prepared import OVERDETERMINED, Built, Option, Prepared, made
+from ocp.solving.watch import GradientHook, IterationHook, Shaped
 from ocp.transcription.program import Program
 from symfric.foundation import checks
 from symfric.foundation.status import Status
@@ -83,20 +83,18 @@ FLOOR = 1e-8
 """Smallest eigenvalue of a block, over its largest."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Size:
+class _Size(NamedTuple):
     """All blocks of the same size n, with the sources and targets of their entries.
 
     Attributes:
-        source: index of the triangle's nonzero of each entry, the number of nonzeros for none,
-            shape (blocks, n, n).
-        share: factor of each entry; entries common to several blocks are split between them.
+        share: factor of each entry, shape (blocks, n, n); entries common to several blocks are
+            split between them.
+        source: index of the triangle's nonzero of each entry, the number of nonzeros for none.
         target: index of the result's nonzero of each entry.
     """
 
-    source: Indices
     share: Array
+    source: Indices
     target: Indices
 
 
@@ -133,48 +131,35 @@ def _plan(triangle: ca.Sparsity, hubs: NDArray[np.bool_]) -> tuple[list[_Size], 
     """Return the blocks of a symmetric matrix from its upper triangle, and their pattern."""
     n = triangle.size1()
     rows, columns = (np.array(part, np.int64) for part in triangle.get_triplet())
-    number = {
-        (r, c): k for k, (r, c) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True))
-    }
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    number = {pair: k for k, pair in enumerate(pairs)}
     border = np.flatnonzero(hubs)
     groups = _groups(rows, columns, hubs, n) or [np.zeros(0, np.int64)]
-    columns_of = [np.concatenate([group, border]) for group in groups]
-    entries = {
-        (int(i), int(j)) for block in columns_of for i in block for j in block
-    }  # the pattern of all blocks
+    blocks = [np.concatenate([group, border]).tolist() for group in groups]
+    entries = {(i, j) for block in blocks for i in block for j in block}  # of all blocks
     ordered = sorted(entries, key=lambda e: (e[1], e[0]))
     pattern = ca.Sparsity.triplet(n, n, [e[0] for e in ordered], [e[1] for e in ordered])
     place = {entry: k for k, entry in enumerate(ordered)}
-    sizes: dict[int, list[Indices]] = {}
-    for block in columns_of:
-        sizes.setdefault(block.size, []).append(block)
-    none, parts = rows.size, len(groups)
-    found: list[_Size] = []
-    for size, blocks in sizes.items():
-        source = np.full((len(blocks), size, size), none, np.int64)
-        target = np.zeros_like(source)
-        share = np.ones((len(blocks), size, size))
-        own = size - border.size
-        share[:, own:, own:] = 1.0 / parts
-        for k, block in enumerate(blocks):
-            for a, i in enumerate(block.tolist()):
-                for b, j in enumerate(block.tolist()):
-                    source[k, a, b] = number.get((min(i, j), max(i, j)), none)
-                    target[k, a, b] = place[i, j]
-        found.append(_Size(source, share, target))
-    return found, pattern
+    sizes: list[_Size] = []
+    for size in dict.fromkeys(map(len, blocks)):
+        alike = [block for block in blocks if len(block) == size]
+        source = [[[number.get((min(i, j), max(i, j)), rows.size) for j in block] for i in block]
+                  for block in alike]  # fmt: skip
+        target = [[[place[i, j] for j in block] for i in block] for block in alike]
+        share, own = np.ones((len(alike), size, size)), size - border.size
+        share[:, own:, own:] = 1.0 / len(groups)
+        indices = (np.array(part, np.int64).reshape(share.shape) for part in (source, target))
+        sizes.append(_Size(share, *indices))
+    return sizes, pattern
 
 
 def _groups(rows: Indices, columns: Indices, hubs: NDArray[np.bool_], n: int) -> list[Indices]:
     """Return groups of coupled unknowns, without hubs and unknowns without an entry."""
     inside = ~hubs[rows] & ~hubs[columns]
-    touched = np.unique(np.concatenate([rows, columns]))
     graph = ca.Sparsity.triplet(n, n, rows[inside].tolist(), columns[inside].tolist())
-    graph = graph + graph.T + ca.Sparsity.diag(n)
-    _, order, offsets = graph.scc()
-    listed = np.array(order, np.int64)
+    _, order, offsets = (graph + graph.T + ca.Sparsity.diag(n)).scc()
+    listed, known = np.array(order, np.int64), {*rows.tolist(), *columns.tolist()}
     parts = [np.sort(listed[a:b]) for a, b in pairwise(offsets)]
-    known = set(touched.tolist())
     return [part for part in parts if not hubs[part[0]] and (part.size > 1 or part[0] in known)]
 
 
@@ -340,16 +325,16 @@ class Fatrop(_Method):
             ValueError: a program without stages, or an unknown option (the
                 latter at the first run).
         """
-        if program.stages is None:
+        stages, reason = program.structure()
+        if stages is None:
             raise ValueError(
-                f"Fatrop: expected a program of stages, got one with {program.unstaged}; "
-                "use Ipopt()"
+                f"Fatrop: expected a program of stages, got one with {reason}; use Ipopt()"
             )
         return super().prepared(program)
 
     def _build(self, program: Program, warm: bool) -> Built:
         del warm
-        hook, stages = GradientHook(program), program.stages
+        hook, stages = GradientHook(program), program.structure()[0]
         sizes = {name: list(getattr(stages, name)) for name in ("nx", "nu", "ng")}
         derivatives = {
             "nlp_grad": gradients(program),

@@ -1,16 +1,15 @@
-"""Motions of one scenario by name: signals over time, and values for a warm start."""
+"""Motions of one scenario by name: signals over time, and their values at any time."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.phase import Span
-from ocp.formulation.problem import Problem
-from ocp.transcription.program import Iterate
+from ocp.formulation.problem import Posed, Problem
 from ocp.transcription.schemes import Coefficients, Scheme
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import check_names
@@ -101,9 +100,7 @@ class Motion:
         return self.signals[name]
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Piece:
+class _Piece(NamedTuple):
     """Signals of one phase."""
 
     t: Array
@@ -111,42 +108,50 @@ class _Piece:
     values: dict[str, Array]
     edges: Array
     controls: dict[str, Array]
-    jumps: bool
 
 
-def motion_of(
-    name: str,
-    spans: Sequence[tuple[int, Span]],
-    points: Sequence[SpanPoints],
-    meshes: Sequence[Array],
-    scheme: Coefficients,
-    chosen: Mapping[str, float],
-) -> Motion:
-    """Return the motion of one scenario.
+def motions_of(
+    problem: Problem, meshes: Sequence[Array], scheme: Coefficients, points: Points
+) -> tuple[Motion, ...]:
+    """Return the motion of each scenario.
 
     Args:
-        name: of the scenario.
-        spans: its spans with their numbers, in order.
-        points, meshes: of each of these spans.
+        problem: the problem.
+        meshes: of its spans.
         scheme: the collocation points.
-        chosen: values of the chosen parameters.
+        points: values of all unknowns.
     """
+    phases = len(problem.chain)
+    motions: list[Motion] = []
+    for k, name in enumerate(problem.scenario_names or ("",)):
+        numbers = range(k * phases, (k + 1) * phases)
+        motions.append(_motion(name, problem, numbers, meshes, scheme, points))
+    return tuple(motions)
+
+
+def _motion(
+    name: str,
+    problem: Problem,
+    numbers: Sequence[int],
+    meshes: Sequence[Array],
+    scheme: Coefficients,
+    points: Points,
+) -> Motion:
+    spans, own = [problem.spans[k] for k in numbers], [points.spans[k] for k in numbers]
     pieces: list[_Piece] = []
     phases: list[Stretch] = []
-    begin = 0.0
-    for k, (_, span) in enumerate(spans):
-        before = (spans[k - 1][1], points[k - 1]) if k else None
-        jumps = before is not None and _jumps(*before, span, points[k])
-        pieces.append(_piece(span, points[k], meshes[k], scheme, chosen, begin, jumps))
-        phases.append(Stretch(span.name, begin, points[k].T))
-        begin += points[k].T
+    ends: list[int] = []
+    for k, span in enumerate(spans):
+        begin = phases[-1].end if phases else 0.0
+        pieces.append(_piece(span, own[k], meshes[numbers[k]], scheme, points.chosen, begin))
+        phases.append(Stretch(span.name, begin, own[k].T))
+        goes_on = k + 1 < len(spans) and not _jumps(span, own[k], spans[k + 1], own[k + 1])
+        ends.append(pieces[-1].t.size - int(goes_on))
     units: dict[str, str] = {}
-    for _, span in spans:
-        units = span.model.signals | units  # the names of the first phase come first
-    ordered = list(dict.fromkeys(name for _, span in spans for name in span.model.signals))
-    inputs = list(dict.fromkeys(v.name for _, span in spans for v in span.model.u))
-    ends = [piece.t.size - int(k + 1 < len(pieces) and not pieces[k + 1].jumps)
-            for k, piece in enumerate(pieces)]  # fmt: skip
+    for span in spans:
+        units = span.model.signals | units  # the units of the first phase take precedence
+    names = dict.fromkeys(name for span in spans for name in span.model.signals)
+    inputs = dict.fromkeys(v.name for span in spans for v in span.model.u)
 
     def joined(of: Callable[[_Piece], NDArray[Any]]) -> NDArray[Any]:
         return np.concatenate([of(p)[:n] for p, n in zip(pieces, ends, strict=True)])
@@ -161,20 +166,19 @@ def motion_of(
     return Motion(
         name=name,
         t=joined(lambda p: p.t),
-        signals={name: signal(name) for name in ordered},
-        units={name: units[name] for name in ordered},
+        signals={name: signal(name) for name in names},
+        units={name: units[name] for name in names},
         nodes=joined(lambda p: p.nodes),
         t_control=np.concatenate([p.edges[:-1] for p in pieces]),
         controls={name: control(name) for name in inputs},
         phases=tuple(phases),
-        spans=tuple(number for number, _ in spans),
+        spans=tuple(numbers),
     )
 
 
 def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
-    """True if a state jumps at the joint, or is not in both phases."""
-    there = {v.name: k for k, v in enumerate(before.model.x)}
-    if [*there] != [v.name for v in after.model.x]:
+    """Return True if a state jumps at the joint, or is not in both phases."""
+    if [v.name for v in before.model.x] != [v.name for v in after.model.x]:
         return True
     gap = np.abs(new.nodes[:, 0] - old.nodes[:, -1])
     return bool((gap > SAME * after.model.nominal("x")).any())
@@ -187,15 +191,13 @@ def _piece(
     scheme: Coefficients,
     chosen: Mapping[str, float],
     begin: float,
-    jumps: bool,
 ) -> _Piece:
     """Return signals at the nodes and collocation points of one phase."""
-    model, N = span.model, mesh.size - 1
-    inside = scheme.nodes[1:-1] if scheme.degree and scheme.meets_end else scheme.nodes[1:]
+    model, N, d = span.model, mesh.size - 1, scheme.degree
+    inside = scheme.nodes[1:-1] if d and scheme.meets_end else scheme.nodes[1:]
     shown = inside.size
     fractions = mesh[:-1, None] + np.diff(mesh)[:, None] * np.append(0.0, inside)
     at = begin + points.T * np.append(fractions.ravel(), 1.0)
-    d = scheme.degree
 
     def joined(nodes: Array, inner: Array) -> Array:
         """Return columns in the order of time."""
@@ -203,8 +205,12 @@ def _piece(
         held = np.concatenate([nodes[:, :-1, None], blocks], axis=2)
         return np.column_stack([held.reshape(nodes.shape[0], N * (shown + 1)), nodes[:, -1]])
 
-    x = joined(points.nodes, points.inner)
-    z = joined(_at_nodes(points.z, N, scheme), points.z)
+    # algebraic variables at nodes: those at the end of the previous interval; unknown for shooting
+    z = np.full((points.z.shape[0], N + 1), np.nan)
+    if d:
+        blocks = points.z.reshape(points.z.shape[0], N, d)
+        z = np.column_stack([blocks[:, 0, 0], blocks @ scheme.inner_ends])
+    x, z = joined(points.nodes, points.inner), joined(z, points.z)
     held = points.u[:, np.minimum(np.arange(at.size) // (shown + 1), N - 1)]
     p = np.array([chosen.get(v.name, number) for v, number in zip(model.p, span.p, strict=True)])
     values = model.function("signals").map(at.size)(
@@ -216,50 +222,23 @@ def _piece(
         dict(zip(model.signals, values.full(), strict=True)),
         begin + points.T * mesh,
         {v.name: row for v, row in zip(model.u, points.u, strict=True)},
-        jumps,
     )
 
 
-def _at_nodes(z: Array, intervals: int, scheme: Coefficients) -> Array:
-    """Return algebraic variables at the nodes: at the end of the previous interval, first at 0.
-
-    NaN for shooting, which does not compute them.
-    """
-    if not scheme.degree:
-        return np.full((z.shape[0], intervals + 1), np.nan)
-    blocks = z.reshape(z.shape[0], intervals, scheme.degree)
-    return np.column_stack([blocks[:, 0, 0], blocks @ scheme.inner_ends])
-
-
-Array = NDArray[np.float64]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class StoredSpan:
-    """A phase of a scenario.
+class SpanMotion(NamedTuple):
+    """The motion of a phase, whose signals are known at any time.
 
     Attributes:
-        scenario, phase: their numbers.
-        T: duration [s].
+        span: the phase.
         mesh: fractions of T that bound the intervals, shape (N + 1,).
         nodes: collocation points of an interval, start included, shape (d + 1,).
-        x: state -> values at the start and the collocation points of each interval, shape
-            (N, d + 1).
-        x_end: state -> value at the end.
-        z: algebraic variable -> values at the collocation points, shape (N, d).
-        u: input -> value of each interval, shape (N,).
+        points: values of the unknowns.
     """
 
-    scenario: int
-    phase: int
-    T: float
+    span: Span
     mesh: Array
     nodes: Array
-    x: Mapping[str, Array]
-    x_end: Mapping[str, float]
-    z: Mapping[str, Array]
-    u: Mapping[str, Array]
+    points: SpanPoints
 
     def at(self, name: str, fractions: Array) -> Array | None:
         """Return a signal at fractions of T; None without a signal of this name.
@@ -267,107 +246,57 @@ class StoredSpan:
         A state is the polynomial of its interval, an algebraic variable is interpolated between
         the collocation points, an input is held.
         """
-        if name in self.x:
-            return self._state(name, fractions)
-        if name in self.z and self.nodes.size > 1:
+        x, z, u = ([v.name for v in getattr(self.span.model, letter)] for letter in "xzu")
+        interval = np.searchsorted(self.mesh, fractions, side="right") - 1
+        interval = np.clip(interval, 0, self.mesh.size - 2)
+        if name in x:
+            return self._state(x.index(name), fractions, interval)
+        if name in z and self.nodes.size > 1:
             inner = self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * self.nodes[1:]
-            return np.interp(fractions, inner.ravel(), self.z[name].ravel())
-        if name in self.u:
-            return self.u[name][self._interval(fractions)]
-        return None
+            return np.interp(fractions, inner.ravel(), self.points.z[z.index(name)])
+        return self.points.u[u.index(name)][interval] if name in u else None
 
-    def _interval(self, fractions: Array) -> NDArray[np.intp]:
-        found = np.searchsorted(self.mesh, fractions, side="right") - 1
-        return np.clip(found, 0, self.mesh.size - 2)
-
-    def _state(self, name: str, fractions: Array) -> Array:
-        k = self._interval(fractions)
-        ends = np.append(self.x[name][1:, 0], self.x_end[name])
+    def _state(self, i: int, fractions: Array, k: NDArray[np.intp]) -> Array:
+        nodes = self.points.nodes[i]
         s = (fractions - self.mesh[k]) / np.diff(self.mesh)[k]
         if self.nodes.size == 1:  # shooting: values inside an interval are unknown
-            return (1 - s) * self.x[name][k, 0] + s * ends[k]
+            return (1 - s) * nodes[k] + s * nodes[k + 1]
         weights = np.ones((self.nodes.size, s.size))
-        for i, node in enumerate(self.nodes):
+        for i_node, node in enumerate(self.nodes):
             for j, other in enumerate(self.nodes):
-                if i != j:
-                    weights[i] *= (s - other) / (node - other)
-        values = np.einsum("is,si->s", weights, self.x[name][k])
-        return np.where(fractions >= 1.0, ends[-1], values)
+                if i_node != j:
+                    weights[i_node] *= (s - other) / (node - other)
+        inner = self.points.inner[i].reshape(self.mesh.size - 1, -1)
+        values = np.einsum("is,si->s", weights, np.column_stack([nodes[:-1], inner])[k])
+        return np.where(fractions >= 1.0, nodes[-1], values)
 
 
-@final
-@dataclass(frozen=True, eq=False, repr=False)
-class Stored:
-    """A solution as a start for others, on any mesh and for any model with some of its names.
-
-    Attributes:
-        name: of the problem.
-        status, message, cost: of the end.
-        structure: of the nonlinear program; if it and all meshes are the same, the multipliers of
-            `iterate` are also used.
-        spans: one for each phase and scenario.
-        chosen: values of chosen parameters.
-        iterate: unknowns and multipliers, scaled.
-    """
-
-    name: str
-    status: str
-    message: str
-    cost: float
-    structure: str
-    spans: tuple[StoredSpan, ...]
-    chosen: Mapping[str, float]
-    iterate: Iterate
-
-    def __repr__(self) -> str:
-        return f"<Stored solution of '{self.name}': {self.status}, J = {self.cost:.6g}>"
+def span_motions(
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+) -> list[SpanMotion]:
+    """Return the motions of all phases and scenarios."""
+    nodes = scheme.coefficients().nodes
+    every = zip(problem.spans, meshes, points.spans, strict=True)
+    return [SpanMotion(span, mesh, nodes, values) for span, mesh, values in every]
 
 
-def along(spans: Sequence[StoredSpan], name: str, fractions: Array) -> Array | None:
+def along(spans: Sequence[SpanMotion], name: str, fractions: Array) -> Array | None:
     """Return a signal at fractions of the total duration of phases; None if one lacks it."""
-    ends = np.cumsum([span.T for span in spans])
+    ends = np.cumsum([span.points.T for span in spans])
     times = fractions * ends[-1]
     which = np.minimum(np.searchsorted(ends, times, side="right"), len(spans) - 1)
-    found = np.zeros(fractions.size)
+    signal = np.zeros(fractions.size)
     for k in np.unique(which):
         span, here = spans[k], which == k
-        local = np.clip((times[here] - (ends[k] - span.T)) / span.T, 0.0, 1.0)
-        values = span.at(name, local)
+        begin, T = ends[k] - span.points.T, span.points.T
+        values = span.at(name, np.clip((times[here] - begin) / T, 0.0, 1.0))
         if values is None:
             return None
-        found[here] = values
-    return found
+        signal[here] = values
+    return signal
 
 
-def stored_spans(
-    problem: Problem, scheme: Scheme, meshes: Sequence[Array], points: Points
-) -> tuple[StoredSpan, ...]:
-    """Return the phases of a solution by name."""
-    nodes = scheme.coefficients().nodes
-    found: list[StoredSpan] = []
-    for span, mesh, values in zip(problem.spans, meshes, points.spans, strict=True):
-        N, d = mesh.size - 1, nodes.size - 1
-        inner = values.inner.reshape(len(values.inner), N, d)
-        x = np.concatenate([values.nodes[:, :-1, None], inner], axis=2)
-        z = values.z.reshape(len(values.z), N, d)
-        model = span.model
-        found.append(
-            StoredSpan(
-                span.scenario,
-                span.phase,
-                values.T,
-                mesh,
-                nodes,
-                {v.name: row for v, row in zip(model.x, x, strict=True)},
-                {v.name: float(row[-1]) for v, row in zip(model.x, values.nodes, strict=True)},
-                {v.name: row for v, row in zip(model.z, z, strict=True)},
-                {v.name: row for v, row in zip(model.u, values.u, strict=True)},
-            )
-        )
-    return tuple(found)
-
-
-def structure_of(problem: Problem, scheme: Scheme) -> str:
+def structure_of(problem: Problem | Posed, scheme: Scheme) -> str:
     """Return a text that is equal for programs with equal unknowns and rows on equal meshes."""
     spans = [
         [

@@ -4,22 +4,22 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ocp.solving.watch import (
-    OVERDETERMINED,
+    FAR,
     At,
-    Halt,
     Hook,
     Seen,
     Watch,
+    as_fraction,
     interrupts,
-    plainly,
-    sentence,
+    not_finite,
+    worst,
 )
 from ocp.transcription.program import (
     Iterate,
@@ -28,22 +28,39 @@ from ocp.transcription.program import (
     Report,
     SolverStatistics,
     in_stage,
-    outside,
     worst_of,
 )
-from ocp.transcription.transcription import Transcription
-from symfric.foundation import checks
+from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 Option = str | float | int
 LEAST = 1e-3
 """Least time limit of a solver [s]; it then stops at once."""
+OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
+"""Ipopt's answer to a program with more equations than unknowns."""
+HINTS: dict[str, str] = {
+    OVERDETERMINED: (
+        "There are more equations than unknowns; use fewer end and via conditions, or more "
+        "intervals."
+    ),
+    "Insufficient_Memory": "The memory is exhausted; use fewer intervals.",
+}
+"""Return code -> message, if the status alone is not specific."""
+TRIED = (
+    "It happened at a point tried by the solver, not at an iterate; bound the states to where "
+    "the equations are defined."
+)
+LEAN: dict[str, Any] = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "calc_lam_p": False,
+    "no_nlp_grad": True,
+}
+"""Options for no output and no unused derivatives."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Built:
+class Built(NamedTuple):
     """A CasADi solver and the hook that monitors it.
 
     Attributes:
@@ -53,23 +70,6 @@ class Built:
     function: ca.Function
     hook: Hook
     kept: tuple[ca.Callback, ...] = ()
-
-
-HALTED = {
-    Halt.USER: Status.INTERRUPTED,
-    Halt.ERROR: Status.INTERRUPTED,
-    Halt.TIME: Status.TIME_LIMIT,
-    Halt.FAR: Status.UNBOUNDED,
-}
-"""Reason to stop -> status of the solve."""
-
-LEAN: dict[str, Any] = {
-    "print_time": False,
-    "show_eval_warnings": False,
-    "calc_lam_p": False,
-    "no_nlp_grad": True,
-}
-"""Options for no output and no unused derivatives."""
 
 
 def made(
@@ -91,10 +91,10 @@ def made(
     except (RuntimeError, NotImplementedError) as error:
         if not options:
             raise
-        raise refused_options(solver, options, reason_of(error)) from None
+        raise refused_options(solver, options, _reason_of(error)) from None
 
 
-def reason_of(error: Exception) -> str:
+def _reason_of(error: Exception) -> str:
     """Return the last line of an error of CasADi, without the place in its source."""
     lines = [line for line in str(error).strip().splitlines() if line.strip()]
     return re.sub(r"^\S*:\d+: ", "", lines[-1]).strip()
@@ -134,10 +134,11 @@ class Prepared:
     def run(
         self,
         start: Iterate,
-        values: ArrayLike | None = None,
+        values: Array | None = None,
         progress: Report | None = None,
         warm: bool = False,
-        at: At = plainly,
+        at: At = as_fraction,
+        begin: float | None = None,
     ) -> Outcome:
         """Solve from `start`; a failure is an outcome, not an exception.
 
@@ -149,44 +150,43 @@ class Prepared:
                 INTERRUPTED, holds the best iterate, and `cause` the exception.
             warm: start near a solution, with the multipliers.
             at: (w, place) -> text for the time of a place, for the message.
+            begin: value of `perf_counter` at which building the program began; now if none.
 
         Raises:
-            ValueError: unknown options, or a start of the wrong size.
+            ValueError: unknown options, or a start that is not finite.
         """
-        begin = perf_counter()
+        begin = perf_counter() if begin is None else begin
         program = self.program
-        numbers = program.values if values is None else _numbers(values, program)
-        w = np.clip(_start(start, program), program.lower_w, program.upper_w)
+        values = program.values if values is None else values
+        w = np.clip(_finite(start, program), program.lower_w, program.upper_w)
         watch = Watch(program, progress, self.max_time)
         result, answer, status = None, OVERDETERMINED, Status.INFEASIBLE
-        if _equations(program) > program.w.numel():
-            built = begin  # no solver takes it
-        else:
-            solver = self._of(warm)
-            built = perf_counter()
-            sides = {"lbx": program.lower_w, "ubx": program.upper_w}
-            sides |= {"lbg": program.lower_g, "ubg": program.upper_g}
-            begins = {"x0": w, "p": numbers, "lam_x0": start.lam_w, "lam_g0": start.lam_g}
-            result, answer, status = self._called(solver, watch, sides | begins)
+        fixed = (program.lower_g == program.upper_g).sum()
+        fixed += (program.lower_w == program.upper_w).sum()
+        overdetermined = fixed > w.size  # no solver accepts it
+        if not overdetermined and warm not in self._built:
+            self._built[warm] = self.build(warm)
+        built = perf_counter()
+        if not overdetermined:
+            result, answer, status = self._called(self._built[warm], watch, {
+                "lbx": program.lower_w, "ubx": program.upper_w, "lbg": program.lower_g,
+                "ubg": program.upper_g, "x0": w, "p": values, "lam_x0": start.lam_w,
+                "lam_g0": start.lam_g,
+            })  # fmt: skip
         if watch.halt is not None:
-            status = HALTED[watch.halt]
+            status = watch.halt
         elif not status.ok and watch.last is not None and not watch.last.finite:
             status = Status.NOT_FINITE
-        point = self._point(result, watch, status, w, numbers)
-        limit = self.told_time or self.max_time
+        point = self._point(result, watch, status, w, values)
         return Outcome(
             iterate=Iterate(point.w, point.lam_w, point.lam_g),
             cost=point.f,
-            violations=outside(point.g, program.lower_g, program.upper_g),
-            bound_violations=outside(point.w, program.lower_w, program.upper_w),
+            violation=point.violation,
             status=status,
-            sentence=sentence(
-                program, watch, point, status, answer, self.solver, limit, numbers, at
-            ),
-            answer=answer,
+            sentence=self._sentence(watch, point, status, answer, values, at),
             cycles=not status.ok and watch.cycles,
             statistics=SolverStatistics(
-                unknowns=program.w.numel(),
+                unknowns=w.size,
                 constraints=program.g.numel(),
                 jacobian_nonzeros=program.jacobian.nnz_out(1),
                 hessian_nonzeros=program.hessian.nnz_out(0),
@@ -206,7 +206,7 @@ class Prepared:
             with interrupts(watch):
                 result = solver.function(**arguments)
         except RuntimeError as error:  # some solvers check options and structure only now
-            reason = reason_of(error)
+            reason = _reason_of(error)
             if "option" in reason.lower():
                 raise refused_options(self.solver, self.options, reason) from None
             return None, reason, Status.SOLVER_FAILED
@@ -218,15 +218,9 @@ class Prepared:
         watch.counted = int(stats["iter_count"])
         answer, status = self.read(stats)
         if answer == "Invalid_Option":
-            raise refused_options(
-                self.solver, self.options, "they do not go together, or need a missing library"
-            )
+            reason = "they do not go together, or need a missing library"
+            raise refused_options(self.solver, self.options, reason)
         return result, answer, status
-
-    def _of(self, warm: bool) -> Built:
-        if warm not in self._built:
-            self._built[warm] = self.build(warm)
-        return self._built[warm]
 
     def _point(
         self,
@@ -248,6 +242,37 @@ class Prepared:
         f, g = program.gradient(w, values)[0], program.jacobian(w, values)[0].full().ravel()
         lam_w, lam_g = np.zeros(w.size), np.zeros(g.size)
         return Seen(w, float(f), g, lam_w, lam_g, worst_of(program, w, g))
+
+    def _sentence(
+        self, watch: Watch, point: Seen, status: Status, answer: str, values: Array, at: At
+    ) -> str:
+        """Return the message on the end of a solve, the worst row at `point`, and what to try."""
+        if status.ok:
+            return status.value
+        count, limit = watch.iterations, self.told_time or self.max_time
+        reason = HINTS.get(answer, status.value)
+        if watch.error is not None:
+            reason = f"Stopped by an exception in progress after {count} iterations: "
+            reason += f"{watch.error!r}."
+        elif watch.halt is Status.INTERRUPTED:
+            reason = f"Stopped by the user after {count} iterations; the result is the best "
+            reason += "iterate."
+        elif status is Status.TIME_LIMIT:
+            reason = "The time limit" if limit is None else f"The time limit of {limit:g} s"
+            reason += f" ended {self.solver} after {count} iterations; allow more time or continue "
+            reason += "from the result, which is the best iterate."
+        elif watch.halt is Status.UNBOUNDED:
+            reason = f"{status.value} Unknowns were {FAR:g} times their typical size after {count} "
+            reason += "iterations."
+        if watch.halt is None:
+            reason += f" ({self.solver} after {count} iterations: {answer}.)"
+        if status is Status.NOT_FINITE:
+            tried = [seen for seen in (watch.last, point) if seen is not None]
+            named = (not_finite(self.program, seen.w, values, at) for seen in tried)
+            return f"{reason} {next(filter(None, named), TRIED)}"
+        if watch.cycles:
+            reason += " The last iterations repeat without improvement, as at a kink."
+        return f"{reason} {worst(self.program, point, at)}"
 
 
 @final
@@ -274,13 +299,6 @@ class Clock:
         """True if no time remains."""
         return self.left == LEAST
 
-    def within(self, prepared: Prepared) -> Prepared:
-        """Return `prepared` with the remaining time as its limit, if that is less than its own."""
-        left = self.left
-        if left is None or (prepared.max_time is not None and prepared.max_time <= left):
-            return prepared
-        return replace(prepared, max_time=left, told_time=self.allowed)
-
     def run(
         self,
         transcription: Transcription,
@@ -288,41 +306,25 @@ class Clock:
         start: Iterate,
         progress: Report | None,
         stage: str,
-        values: ArrayLike | None = None,
+        values: Array | None = None,
+        warm: bool = False,
+        begin: float | None = None,
     ) -> Outcome:
         """Solve within the remaining time, and report progress as that of a `stage`."""
-        return self.within(prepared).run(
-            start, values, in_stage(progress, stage), at=transcription.when
-        )
+        left = self.left
+        if left is not None and (prepared.max_time is None or prepared.max_time > left):
+            prepared = replace(prepared, max_time=left, told_time=self.allowed)
+        report = in_stage(progress, stage)
+        values = transcription.program.values if values is None else values  # of this mesh
+        return prepared.run(start, values, report, warm, transcription.when, begin)
 
 
-def _numbers(values: ArrayLike, program: Program) -> Array:
-    """Return the values of the parameters."""
-    found = checks.array("values", values)
-    if found.size != program.p.numel():
-        raise ValueError(
-            f"values: expected {program.p.numel()} numbers of parameters, got {found.size}; "
-            "transcription.values(...) returns them"
-        )
-    return found
-
-
-def _equations(program: Program) -> int:
-    """Return the number of rows and unknowns with two equal bounds."""
-    rows = program.lower_g == program.upper_g
-    return int(rows.sum() + (program.lower_w == program.upper_w).sum())
-
-
-def _start(start: Iterate, program: Program) -> Array:
-    """Return the initial unknowns."""
-    n, m = program.w.numel(), program.g.numel()
-    sizes = (start.w.size, start.lam_w.size, start.lam_g.size)
-    if sizes != (n, n, m):
-        raise ValueError(f"start: expected {n} unknowns and {n} + {m} multipliers, got {sizes}")
+def _finite(start: Iterate, program: Program) -> Array:
+    """Return the initial unknowns, which must be finite."""
     if not np.isfinite(start.w).all():
         place = program.unknowns[int(np.argmin(np.isfinite(start.w)))]
         raise ValueError(
             f"start: expected finite numbers, got NaN or infinity for {place.name} "
-            f"{plainly(start.w, place)}"
+            f"{as_fraction(start.w, place)}"
         )
     return start.w

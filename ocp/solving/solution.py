@@ -2,17 +2,18 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field, replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.phase import Free
 from ocp.formulation.problem import Posed, Problem, posed
-from ocp.solving.motion import Motion, Stored, Stretch, stored_spans, structure_of
+from ocp.solving.motion import Motion, Stretch
+from ocp.solving.verification import Verification
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
@@ -31,29 +32,6 @@ Array = NDArray[np.float64]
 
 AT_BOUND = 1e-5
 """Relative distance from a bound within which a duration counts as at it."""
-
-
-class Verdict(Protocol):
-    """Verification of a solution, made by `ocp.checking`."""
-
-    @property
-    def ok(self) -> bool:
-        """True if nothing missed by more than the tolerance."""
-        ...
-
-    @property
-    def largest(self) -> float:
-        """The largest relative miss."""
-        ...
-
-    @property
-    def trajectories(self) -> Sequence[Trajectory]:
-        """Re-simulated motion of each phase, in order."""
-        ...
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        ...
 
 
 @final
@@ -105,7 +83,7 @@ class Solution(packed.Portable):
     points: Points
     iterate: Iterate
     modes: Mapping[str, tuple[Mode, ...]] = field(default_factory=dict[str, tuple[Mode, ...]])
-    verification: Verdict | None = None
+    verification: Verification | None = None
     cause: BaseException | None = None
 
     def __repr__(self) -> str:
@@ -223,20 +201,6 @@ class Solution(packed.Portable):
         """The inputs among the signals."""
         return {name: self.signals[name] for name in self.controls}
 
-    @property
-    def stored(self) -> Stored:
-        """Values for a warm start, without models."""
-        return Stored(
-            name=self.problem.name,
-            status=self.status.name,
-            message=self.message,
-            cost=self.cost,
-            structure=structure_of(self.problem, self.scheme),
-            spans=stored_spans(self.problem, self.scheme, self.meshes, self.points),
-            chosen=self.chosen,
-            iterate=self.iterate,
-        )
-
     def save(self, path: str | Path) -> None:
         """Write everything to one file, which `ocp.load` reads exactly.
 
@@ -261,16 +225,6 @@ class Solution(packed.Portable):
             path: image file; its extension selects the format.
         """
         return plot_solutions({self.problem.name: self}, names, path)
-
-    def runs_of(self, motion: Motion) -> list[Trajectory]:
-        """Return the re-simulated phases of a motion; empty if not verified."""
-        return [run for k, run in enumerate(self.trajectories) if k in motion.spans]
-
-    def ending(self, motion: Motion) -> str:
-        """Return duration, cost and status of a motion as text."""
-        ended = "" if self.ok else f", {self.status.name.lower().replace('_', ' ')}"
-        checked = ", verified" * self.verified
-        return f"T = {motion.T:.4g} s, J = {self.cost:.5g}{checked}{ended}"
 
     def to_csv(self, path: str | Path) -> None:
         """Write all signals as columns with units in the header, such as `v [m/s]`.
@@ -336,6 +290,11 @@ class Solution(packed.Portable):
         write_text(path, json.dumps(self.to_dict(), allow_nan=False))
 
 
+def with_sentence(solution: Solution, sentence: str) -> Solution:
+    """Return `solution` with a further sentence in its message."""
+    return replace(solution, message=f"{solution.message} {sentence}".rstrip())
+
+
 def plot_solutions(
     solutions: Mapping[str, Solution],
     names: Sequence[str] = (),
@@ -363,11 +322,14 @@ def plot_solutions(
     first = next(iter(solutions.values()))
     shared = [n for n in first.signals if all(n in s.signals for s in solutions.values())]
     check_names(f"plot of '{first.problem.name}'", names, shared)
-    drawn = [
-        Drawn(f"{label} {motion.name}".strip(), motion, one.runs_of(motion), one.ending(motion))
-        for label, one in solutions.items()
-        for motion in one.motions
-    ]
+    drawn: list[Drawn] = []
+    for label, one in solutions.items():
+        status = "" if one.ok else f", {one.status.name.lower().replace('_', ' ')}"
+        status = ", verified" * one.verified + status
+        for motion in one.motions:
+            ending = f"T = {motion.T:.4g} s, J = {one.cost:.5g}{status}"
+            runs = [run for k, run in enumerate(one.trajectories) if k in motion.spans]
+            drawn.append(Drawn(f"{label} {motion.name}".strip(), motion, runs, ending))
     alone = len(solutions) == 1
     spans = [first.problem.spans[i] for i in first.motions[0].spans] if alone else []
     modes = {name: [*map(astuple, each)] for name, each in first.modes.items()} if alone else {}

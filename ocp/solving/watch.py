@@ -1,14 +1,12 @@
-"""Monitoring of a running solver: its best iterate, reasons to stop, and the final message."""
+"""Monitoring of a running solver: its best iterate, reasons to stop, and what went wrong."""
 
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import Enum
 from time import perf_counter
 from types import FrameType
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -29,18 +27,7 @@ RESTING = 1e-6
 """Steps of scaled unknowns below this count as zero."""
 
 
-class Halt(Enum):
-    """Reasons to stop a solver."""
-
-    USER = "the user"
-    TIME = "the time limit"
-    ERROR = "an exception in `progress`"
-    FAR = "unknowns that grow without bound"
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(NamedTuple):
     """An iterate of the solver; multipliers are zero if it does not report them."""
 
     w: Array
@@ -72,7 +59,7 @@ class Watch:
         best, last: iterates; None before the first one.
         trace: cost, violation and largest step of each iterate.
         counted: iterations counted by the solver, after its return.
-        halt: reason of a stop, if any.
+        halt: status of a stop, if any.
         error: an exception in `progress`.
     """
 
@@ -83,7 +70,7 @@ class Watch:
         self.last: Seen | None = None
         self.trace: list[tuple[float, float, float]] = []
         self.counted: int | None = None
-        self.halt: Halt | None = None
+        self.halt: Status | None = None
         self.error: BaseException | None = None
 
     @property
@@ -101,46 +88,38 @@ class Watch:
             self.best = self.last
         self.trace.append((f, violation, step))
         if self._deadline is not None and perf_counter() > self._deadline:
-            self.halt = self.halt or Halt.TIME
+            self.halt = self.halt or Status.TIME_LIMIT
         if np.abs(w).max(initial=0.0) > FAR:
-            self.halt = self.halt or Halt.FAR
+            self.halt = self.halt or Status.UNBOUNDED
         if self._progress is not None:
             try:
                 self._progress(Progress(self.iterations, f, violation))
             except KeyboardInterrupt:
-                self.halt = Halt.USER
+                self.halt = Status.INTERRUPTED
             # An exception cannot cross C++: it is stored here and raised again afterwards.
             except BaseException as error:  # noqa: BLE001
-                self.error, self.halt = error, Halt.ERROR
+                self.error, self.halt = error, Status.INTERRUPTED
         return self.halt is not None
 
     @property
     def cycles(self) -> bool:
-        """True if the last iterations were cyclic (see `goes_round`)."""
-        return goes_round(self.trace)
+        """True if neither cost nor violation improved in the last iterations, while w moved.
 
-
-def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
-    """Return True if neither cost nor violation improved in the last iterations, while w moved.
-
-    A Newton method behaves like this at a kink that is smoothed over less than one step: it jumps
-    from one side to the other.
-
-    Args:
-        trace: cost, violation and largest step of a scaled unknown of each iterate.
-    """
-    if len(trace) <= 2 * WINDOW:
-        return False
-    halves = np.array(trace[-2 * WINDOW :]).reshape(2, WINDOW, 3)
-    costs, violations, steps = np.moveaxis(halves, 2, 0)
-    before, now = np.median(steps, axis=1)
-    moves = now > RESTING and now > 0.1 * before
-    far, near = violations.min(axis=1)
-    closer = near < 0.5 * far and far > FEASIBLE
-    dear, cheap = costs.min(axis=1)
-    feasible = max(far, near) <= FEASIBLE
-    cheaper = feasible and cheap < dear - 1e-4 * max(abs(dear), 1e-8)
-    return bool(moves and not closer and not cheaper)
+        A Newton method behaves like this at a kink that is smoothed over less than one step: it
+        jumps from one side to the other.
+        """
+        if len(self.trace) <= 2 * WINDOW:
+            return False
+        halves = np.array(self.trace[-2 * WINDOW :]).reshape(2, WINDOW, 3)
+        costs, violations, steps = np.moveaxis(halves, 2, 0)
+        before, now = np.median(steps, axis=1)
+        moves = now > RESTING and now > 0.1 * before
+        far, near = violations.min(axis=1)
+        closer = near < 0.5 * far and far > FEASIBLE
+        dear, cheap = costs.min(axis=1)
+        feasible = max(far, near) <= FEASIBLE
+        cheaper = feasible and cheap < dear - 1e-4 * max(abs(dear), 1e-8)
+        return bool(moves and not closer and not cheaper)
 
 
 class Shaped(ca.Callback):
@@ -232,7 +211,7 @@ def interrupts(watch: Watch) -> Generator[None, None, None]:
 
     def stop(number: int, frame: FrameType | None) -> None:
         del number, frame
-        watch.halt = Halt.USER
+        watch.halt = Status.INTERRUPTED
         signal.signal(signal.SIGINT, before)
 
     signal.signal(signal.SIGINT, stop)
@@ -242,85 +221,21 @@ def interrupts(watch: Watch) -> Generator[None, None, None]:
         signal.signal(signal.SIGINT, before)
 
 
-Array = NDArray[np.float64]
-
 At = Callable[[Array, Place], str]
 """(w, place) -> text for its time."""
-
-OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
-"""Ipopt's answer to a program with more equations than unknowns."""
-
-HINTS: dict[str, str] = {
-    OVERDETERMINED: (
-        "There are more equations than unknowns; use fewer end and via conditions, or more "
-        "intervals."
-    ),
-    "Insufficient_Memory": "The memory is exhausted; use fewer intervals.",
-}
-"""Return code -> message, if the status alone is not specific."""
-
-TRIED = (
-    "It happened at a point tried by the solver, not at an iterate; bound the states to where "
-    "the equations are defined."
-)
-
-
-def sentence(
-    program: Program,
-    watch: Watch,
-    point: Seen,
-    status: Status,
-    answer: str,
-    solver: str,
-    max_time: float | None,
-    values: Array,
-    at: At,
-) -> str:
-    """Return the message on the end of a solve, the worst row at `point`, and what to try."""
-    if status.ok:
-        return status.value
-    count = watch.iterations
-    reason = _reason(watch, status, answer, solver, max_time)
-    if watch.halt is None:
-        reason += f" ({solver} after {count} iterations: {answer}.)"
-    if status is Status.NOT_FINITE:
-        tried = [seen for seen in (watch.last, point) if seen is not None]
-        named = (not_finite(program, seen.w, values, at) for seen in tried)
-        return f"{reason} {next(filter(None, named), TRIED)}"
-    if watch.cycles:
-        reason += " The last iterations repeat without improvement, as at a kink."
-    return f"{reason} {worst(program, point, at)}"
-
-
-def _reason(watch: Watch, status: Status, answer: str, solver: str, max_time: float | None) -> str:
-    count = watch.iterations
-    if watch.halt is Halt.ERROR:
-        return f"Stopped by an exception in progress after {count} iterations: {watch.error!r}."
-    if watch.halt is Halt.USER:
-        return f"Stopped by the user after {count} iterations; the result is the best iterate."
-    if status is Status.TIME_LIMIT:
-        limit = "The time limit" if max_time is None else f"The time limit of {max_time:g} s"
-        return (
-            f"{limit} ended {solver} after {count} iterations; allow more time or continue from "
-            "the result, which is the best iterate."
-        )
-    if watch.halt is Halt.FAR:
-        size = f"{FAR:g} times their typical size"
-        return f"{status.value} Unknowns were {size} after {count} iterations."
-    return HINTS.get(answer, status.value)
 
 
 def worst(program: Program, point: Seen, at: At) -> str:
     """Return a message on the most violated row or bound, or that there is none."""
-    rows = outside(point.g, program.lower_g, program.upper_g)
-    bounds = outside(point.w, program.lower_w, program.upper_w)
     far = point.violation
     if far <= FEASIBLE:
         return f"The best iterate satisfies all constraints, at a cost of {point.f:.6g}."
+    rows = outside(point.g, program.lower_g, program.upper_g)
     if rows.max(initial=0.0) >= far:
         place = program.rows[int(np.argmax(rows))]
         name = place.name
     else:
+        bounds = outside(point.w, program.lower_w, program.upper_w)
         place = program.unknowns[int(np.argmax(bounds))]
         name = f"the bound on {place.name}"
     return f"Most violated is {name} {at(point.w, place)}, by {far:.3g} in scaled units."
@@ -330,7 +245,6 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
     """Return a message on a NaN or infinite equation or derivative at `w`; "" if none."""
     cost, slope = program.gradient(w, values)
     g, jacobian = program.jacobian(w, values)
-    rows, columns = (np.array(part) for part in jacobian.sparsity().get_triplet())
     bad = ~np.isfinite(g.full().ravel())
     if bad.any():
         place = program.rows[int(np.argmax(bad))]
@@ -339,8 +253,9 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
         return "It is the cost."
     bad = ~np.isfinite(np.array(jacobian.nonzeros()))
     if bad.any():
+        rows, columns = jacobian.sparsity().get_triplet()
         k = int(np.argmax(bad))
-        row, unknown = program.rows[int(rows[k])], program.unknowns[int(columns[k])]
+        row, unknown = program.rows[rows[k]], program.unknowns[columns[k]]
         return f"It is the derivative of {row.name} in {unknown.name} {at(w, row)}."
     bad = ~np.isfinite(ca.densify(slope).full().ravel())
     if bad.any():
@@ -349,7 +264,7 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
     return ""
 
 
-def plainly(w: Array, place: Place) -> str:
+def as_fraction(w: Array, place: Place) -> str:
     """Return the time of a place as a fraction, without known durations."""
     del w
     return f"at {place.fraction:.4g} of the duration"

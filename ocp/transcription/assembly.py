@@ -8,31 +8,19 @@ nothing is differentiated again, and the graph does not grow with the mesh.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 
 from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Selection
 
-
-@final
-@dataclass(frozen=True, eq=False)
-class Slot:
-    """Target of the shares of one cost.
-
-    Attributes:
-        weight: factor in the objective; 0 if a row bounds the cost instead.
-        piece: index of the piece with that single row; -1 if there is none.
-    """
-
-    weight: float = 1.0
-    piece: int = -1
+Slot = tuple[float, int]
+"""Target of the shares of one cost: weight in the objective, and -1; or, if a row bounds the cost
+instead, 0 and the index of the piece with that row."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Assembled:
+class Assembled(NamedTuple):
     """Functions of a program (see `Program`), and row indices of each piece, (m, places)."""
 
     f: ca.MX
@@ -65,13 +53,19 @@ def assemble(
     """
     at = row_numbers(pieces)
     n, m = w.numel(), sum(piece.m * piece.places for piece in pieces)
+    targets = [(weight, -1 if k < 0 else int(at[k][0, 0])) for weight, k in slots]
     parts = [
-        _Part(piece, piece.block, piece.selection, rows, *_slot(slots[piece.slot], at), w)
+        _Part(piece, piece.block, piece.selection, rows, *targets[piece.slot], w)
         for piece, rows in zip(pieces, at, strict=True)
         if piece.block is not None and piece.selection is not None
     ]
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)
-    constant = _linear(pieces, at)
+    linear = [
+        (rows[A.rows, A.places], A.columns, A.weights)
+        for piece, rows in zip(pieces, at, strict=True)
+        if (A := piece.linear) is not None
+    ]
+    constant = _joined(linear)
     f = ca.mtimes(ca.DM(c).T, w)
     for part in parts:
         if part.block.share is not None and part.weight:
@@ -100,23 +94,14 @@ def assemble(
     )
 
 
-def _slot(slot: Slot, at: tuple[Indices, ...]) -> tuple[float, int]:
-    return slot.weight, -1 if slot.piece < 0 else int(at[slot.piece][0, 0])
-
-
 Triplets = tuple[Indices, Indices, Array]
 """Rows, columns and values."""
 EMPTY: Triplets = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
 
 
-def _linear(pieces: Sequence[Piece], at: tuple[Indices, ...]) -> Triplets:
-    """Return rows, columns and values of A."""
-    found = [EMPTY]
-    for piece, numbers in zip(pieces, at, strict=True):
-        if (A := piece.linear) is not None:
-            found.append((numbers[A.rows, A.places], A.columns, A.weights))
-    rows, columns, weights = map(np.concatenate, zip(*found, strict=True))
-    return rows, columns, weights
+def _joined(triplets: Sequence[Triplets]) -> Triplets:
+    rows, columns, values = map(np.concatenate, zip(EMPTY, *triplets, strict=True))
+    return rows, columns, values
 
 
 @final
@@ -222,10 +207,8 @@ class _Sum:
     """A sparse matrix whose entries are constants plus weighted sums of values of blocks."""
 
     shape: tuple[int, int]
-    rows: list[Indices] = field(default_factory=list[Indices])
-    columns: list[Indices] = field(default_factory=list[Indices])
+    varying: list[Triplets] = field(default_factory=list[Triplets])
     sources: list[Indices] = field(default_factory=list[Indices])
-    weights: list[Array] = field(default_factory=list[Array])
     values: list[ca.MX] = field(default_factory=list[ca.MX])
     count: int = 0
     fixed: list[Triplets] = field(default_factory=list[Triplets])
@@ -281,30 +264,27 @@ class _Sum:
         for part in (still, ~still):
             kept = (weights != 0.0) & part
             at, term = np.nonzero(kept)
-            triplet = rows[kept], columns[kept], weights[kept]
             if part is still:
-                self.fixed.append((*triplet[:2], triplet[2] * number[source[term]]))
-                continue
-            self.rows.append(triplet[0])
-            self.columns.append(triplet[1])
-            self.weights.append(triplet[2])
-            self.sources.append(self.count + nv * at + position[source[term]])
+                constants = weights[kept] * number[source[term]]
+                self.fixed.append((rows[kept], columns[kept], constants))
+            else:
+                self.varying.append((rows[kept], columns[kept], weights[kept]))
+                self.sources.append(self.count + nv * at + position[source[term]])
         self.values.append(ca.vec(values))
         self.count += nv * places
 
     def matrix(self) -> ca.MX:
         """Return the matrix with its structural nonzeros."""
-        rows, columns, numbers = map(np.concatenate, zip(EMPTY, *self.fixed, strict=True))
-        count = rows.size
-        rows, columns = np.concatenate([rows, *self.rows]), np.concatenate([columns, *self.columns])
+        rows, columns, numbers = _joined(self.fixed)
+        count, (more, right, weights) = rows.size, _joined(self.varying)
+        rows, columns = np.concatenate([rows, more]), np.concatenate([columns, right])
         keys, number = np.unique(columns * self.shape[0] + rows, return_inverse=True)
         pattern = _sparsity(keys % self.shape[0], keys // self.shape[0], self.shape)
         start = np.asarray(np.bincount(number[:count], numbers, keys.size), dtype=float)
-        sources, weights = np.concatenate([np.zeros(0, np.int64), *self.sources]), self.weights
-        if not sources.size:
+        if not weights.size:
             return ca.MX(ca.DM(pattern, start))
-        weight, values = np.concatenate(weights), ca.vertcat(*self.values)
-        return ca.MX(pattern, _gathered(values, (number[count:], sources, weight), start))
+        sources, values = np.concatenate(self.sources), ca.vertcat(*self.values)
+        return ca.MX(pattern, _gathered(values, (number[count:], sources, weights), start))
 
 
 def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:

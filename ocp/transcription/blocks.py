@@ -13,7 +13,7 @@ Source: Griewank and Toint, Numerische Mathematik 39, 1982, 119-137 (partial sep
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -152,29 +152,19 @@ def select(parts: Sequence[Indices | tuple[Indices, Array]], places: int) -> Sel
         parts: (k, places) columns of k local unknowns; or columns and weights, both
             (k, terms, places), of k sums.
     """
-    local: list[Indices] = []
-    columns: list[Indices] = []
-    weights: list[Array] = []
-    count = 0
+    local, columns = [np.zeros(0, np.int64)], [np.zeros((0, places), np.int64)]
+    weights, count = [np.zeros((0, places))], 0
     for part in parts:
-        chosen, factor = part if isinstance(part, tuple) else (part[:, None, :], None)
+        chosen, factors = part if isinstance(part, tuple) else (part[:, None, :], np.ones(1))
         k, terms, _ = chosen.shape
         local.append(count + np.repeat(np.arange(k), terms))
         columns.append(chosen.reshape(k * terms, places))
-        weights.append(
-            np.ones((k * terms, places)) if factor is None else factor.reshape(k * terms, places)
-        )
+        weights.append(np.broadcast_to(factors, chosen.shape).reshape(k * terms, places))
         count += k
-    return Selection(
-        np.concatenate([np.zeros(0, np.int64), *local]),
-        np.concatenate([np.zeros((0, places), np.int64), *columns]).T,
-        np.concatenate([np.zeros((0, places)), *weights]).T,
-    )
+    return Selection(np.concatenate(local), np.concatenate(columns).T, np.concatenate(weights).T)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Linear:
+class Linear(NamedTuple):
     """Constant entries of the rows of a `Piece`: row `rows` of place `places` at `columns`."""
 
     places: Indices

@@ -15,16 +15,15 @@ levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import final
+from dataclasses import dataclass, replace
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.phase import Box, Free, Span, fixed, meet
-from ocp.transcription.blocks import Array, Block, Indices, Piece, Rows, block, order_of
-from ocp.transcription.schemes import Coefficients
-from ocp.transcription.unknowns import Data, Layout, Local, SpanPoints
+from ocp.formulation.phase import Box, Span, fixed, initial, meet
+from ocp.transcription.blocks import Array, Block, Piece, Rows, block, order_of
+from ocp.transcription.unknowns import Grid, Local, SpanPoints
 from symfric.foundation.checks import listed
 from symfric.model.holonomic import Holonomic
 
@@ -44,14 +43,14 @@ class Loops:
         """Set up a phase that starts at the time `begin` [s]; `free`: its begin or end is free."""
         self.span, self.n, self.begin = span, mechanics.n, begin
         p = {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
-        self.start = span.model.initial_state(None, p)
+        self.start = span.model.initial_state(None, p)[: self.n]
         q, t, p = span.model.vector("x")[: self.n], span.model.t, span.model.vector("p")
         phi = mechanics.phi
         outputs = [phi, ca.jacobian(phi, q), ca.jacobian(phi, t)]
         self._function = ca.Function("loops", [q, t, p], [ca.densify(part) for part in outputs])
         self.nominal = span.model.nominal("x")[: self.n]
         self.sizes = np.ones(phi.numel())
-        A = np.abs(self.at(self.start[: self.n], 0.0)[1]).max(axis=1)
+        A = np.abs(self.at(self.start, 0.0)[1]).max(axis=1)
         self.sizes = np.where(A > 0, A, 1.0)
         chosen = [v.symbol for v in span.model.p if v.name in span.chosen]
         unknown = [*chosen, *([t] if free else [])]
@@ -70,7 +69,7 @@ class Loops:
         Gauss-Newton with continuation from the start of the model, the shortest change in each
         step. Also returns the remaining residual of the constraints.
         """
-        now = self._towards(self.start[: self.n], q, held, t, (STEPS, ITERATIONS))
+        now = self._towards(self.start, q, held, t, (STEPS, ITERATIONS))
         return now, float(np.abs(self.at(now, t)[0]).max())
 
     def follow(self, x: Array, times: Array, lead: Sequence[int]) -> Array:
@@ -79,8 +78,7 @@ class Loops:
         As many of the coordinates `lead` as the constraints leave free keep their values, in their
         order.
         """
-        n, found = self.n, x.copy()
-        now = self.start[:n]
+        n, moved, now = self.n, x.copy(), self.start
         for k, t in enumerate(times.tolist()):
             spare = dependent(self.at(now, t)[1], lead, (), ()) or ()
             held = [i for i in lead if i not in spare]
@@ -89,8 +87,8 @@ class Loops:
             _, A, A_t = self.at(now, t)
             v = x[n:, k] / self.nominal
             v[free] += np.linalg.lstsq(A[:, free], -A @ v - A_t, rcond=RANK)[0]
-            found[:n, k], found[n:, k] = now, v * self.nominal
-        return found
+            moved[:n, k], moved[n:, k] = now, v * self.nominal
+        return moved
 
     def _towards(
         self, start: Array, q: Array, held: Sequence[int], t: float, pace: tuple[int, int]
@@ -119,12 +117,14 @@ def dependent(
 
     As few as possible: `plain` ones before those `given`; None if they are not sufficient.
     """
-    taken = {*given, *plain, *strict}
-    free = [i for i in range(A.shape[1]) if i not in taken]
     u, s, _ = np.linalg.svd(A, full_matrices=False)
     rank, size = int((s > RANK * s[0]).sum()), float(s[0])
     rest = u[:, :rank].T @ A  # independent rows
-    basis = _range(rest[:, free], size)
+    basis = np.zeros((rank, 0))
+    free = [i for i in range(A.shape[1]) if i not in {*given, *plain, *strict}]
+    if free and rank:
+        u, s, _ = np.linalg.svd(rest[:, free], full_matrices=False)
+        basis = u[:, s > RANK * size]
     released: list[int] = []
     for candidates in (plain, given):
         left = list(candidates)
@@ -139,14 +139,6 @@ def dependent(
     return released if basis.shape[1] == rank else None
 
 
-def _range(A: Array, size: float) -> Array:
-    """Return an orthonormal basis of the columns of A."""
-    if not A.size:
-        return np.zeros((A.shape[0], 0))
-    u, s, _ = np.linalg.svd(A, full_matrices=False)
-    return u[:, s > RANK * size]
-
-
 CLOSED = 1e-7
 """Largest residual of constraints with which named coordinates count as consistent, scaled by
 nominal coordinates; user-specified numbers have six digits or more."""
@@ -155,19 +147,17 @@ BRANCH = 0.1
 loops might close in another configuration."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Known:
+class Known(NamedTuple):
     """Prescribed coordinates, or rates, at a node with conditions.
 
     Attributes:
-        imposed: whether the constraints are rows there; False if they follow from links.
         released: prescribed states that follow from others -> the range that replaces their
             value.
+        imposed: whether the constraints are rows there; False if they follow from links.
     """
 
+    released: Mapping[int, Box]
     imposed: bool = True
-    released: Mapping[int, Box] = field(default_factory=dict[int, Box])
 
 
 @final
@@ -178,20 +168,21 @@ class Closing:
     Attributes:
         local: its unknowns.
         loops: numbers of the constraints.
-        m: number of constraints.
         correction: rows of the gaps with the multipliers, for all states.
         levels: phi and its rate, scaled.
-        scale: SI values of phi and its rate, divided by the rows.
         known: fraction of T -> prescribed q and v there.
     """
 
     local: Local
     loops: Loops
-    m: int
     correction: Block
     levels: tuple[Block, Block]
-    scale: Array
     known: Mapping[float, tuple[Known, Known]]
+
+    @property
+    def m(self) -> int:
+        """Number of constraints."""
+        return self.loops.sizes.size
 
     @property
     def released(self) -> dict[float, dict[int, Box]]:
@@ -214,39 +205,34 @@ class Closing:
         x[: 2 * n, order] = self.loops.follow(x[: 2 * n, order], times[order] * points.T, [*held])
         return replace(points, nodes=x[:, : nodes.size], inner=x[:, nodes.size :])
 
-    def corrected(
-        self, gap: Piece, x: tuple[Indices, Array], layout: Layout, scheme: Coefficients, data: Data
-    ) -> Piece:
-        """Return the piece of the gaps with corrections of all intervals, whose states end at x."""
-        own = layout.spans[self.local.number]
-        z = own.z[:, scheme.degree - 1 :: scheme.degree]
-        parts = [*self.local.columns(layout, x, z, own.u, own.intervals), own.extra]
-        at = gap.interval, gap.offset
+    def corrected(self, gap: Piece, grid: Grid) -> Piece:
+        """Return the piece of the gaps with corrections of all intervals."""
+        own, d = grid.layout.spans[self.local.number], grid.scheme.degree
+        columns = own.ends(grid.scheme), own.z[:, d - 1 :: d], own.u
         return self.local.piece(
-            gap.rows, self.correction, parts, data, at, gap.order, linear=gap.linear
-        )
+            grid, gap.rows, self.correction, columns, (gap.interval, gap.offset), gap.order,
+            extra=[own.extra], linear=gap.linear,
+        )  # fmt: skip
 
-    def pieces(
-        self, layout: Layout, data: Data, nodes: Mapping[float, int], everywhere: bool
-    ) -> Iterator[Piece]:
-        """Yield constraints at the nodes, on both levels; or only at the first one.
+    def pieces(self, grid: Grid) -> Iterator[Piece]:
+        """Yield constraints at the nodes, on both levels; for shooting only at the first one.
 
         The steps of an integrator end on the constraints.
         """
         number = self.local.number
-        own = layout.spans[number]
+        own, nodes = grid.layout.spans[number], grid.nodes[number]
         for level, what in enumerate(("loop", "rate of loop")):
-            dropped = {nodes[at] for at, known in self.known.items() if not known[level].imposed}
-            every = range(own.intervals + 1 if everywhere else 1)
-            at = np.array([k for k in every if k not in dropped], dtype=np.int64)
+            implied = {nodes[at] for at, known in self.known.items() if not known[level].imposed}
+            every = range(own.intervals + 1 if grid.scheme.degree else 1)
+            at = np.array([k for k in every if k not in implied], dtype=np.int64)
             if not at.size:
                 continue
             interval, offset = np.maximum(at - 1, 0), np.minimum(at, 1).astype(float)
             z = np.tile(own.z[:, :1], (1, at.size))  # not in the constraints
-            parts = self.local.columns(layout, own.nodes[:, at], z, own.u[:, interval], at.size)
-            rows = Rows.zero([f"the {what} {i + 1}" for i in range(self.m)], self.scale)
-            at, order = (interval, offset), order_of(number, at, 1)
-            yield self.local.piece(rows, self.levels[level], parts, data, at, order)
+            rows = Rows.zero([f"the {what} {i + 1}" for i in range(self.m)], self.loops.sizes)
+            columns, order = (own.nodes[:, at], z, own.u[:, interval]), order_of(number, at, 1)
+            place = interval, offset
+            yield self.local.piece(grid, rows, self.levels[level], columns, place, order)
 
 
 def closing(
@@ -255,6 +241,7 @@ def closing(
     """Return the constraints of a phase; None if there are none.
 
     Args:
+        local: its unknowns.
         before: the phase before it in the same scenario.
         periodic: periodic states of the problem, if this is its first phase.
         named: states with a start given by the user; others are released if constraints require it.
@@ -266,35 +253,31 @@ def closing(
     span, mechanics = local.span, local.span.model.holonomic
     if mechanics is None or not mechanics.phi.numel():
         return None
-    n, m = mechanics.n, mechanics.phi.numel()
-    q, v = (span.model.vector("x")[part] for part in (slice(0, n), slice(n, 2 * n)))
-    slope = ca.jacobian(mechanics.phi, q)
-    rate = slope @ v + ca.jacobian(mechanics.phi, span.model.t)
+    n, x = mechanics.n, span.model.vector("x")
+    slope = ca.jacobian(mechanics.phi, x[:n])
+    rate = slope @ x[n : 2 * n] + ca.jacobian(mechanics.phi, span.model.t)
     phi, phi_dot, phi_q = ca.Function(
         "constraints", span.symbols, [ca.densify(part) for part in (mechanics.phi, rate, slope)]
     ).call(local.values)
-    begin = sum(T.start if isinstance(T := s.T, Free) else T for _, s in local.before)
+    begin = sum(initial(s.T) for _, s in local.before)
     loops = Loops(span, mechanics, begin, local.free or bool(local.free_before))
-    size = loops.sizes
-    nominal = span.model.nominal("x")
+    m, size, nominal = loops.sizes.size, ca.DM(loops.sizes), span.model.nominal("x")
     multipliers = ca.SX.sym("multipliers", 2 * m)
-    W_q, W_v = (phi_q @ ca.diag(ca.DM(nominal[part])) for part in (slice(n), slice(n, 2 * n)))
-    moved = ca.vertcat(
-        -(W_q / ca.repmat(ca.DM(size), 1, n)).T @ multipliers[:m],
-        -(W_v / ca.repmat(ca.DM(size), 1, n)).T @ multipliers[m:],
-        ca.SX(len(span.model.x) - 2 * n, 1),
-    )
+    moved = [
+        -(phi_q @ ca.diag(ca.DM(nominal[k * n : (k + 1) * n])) / ca.repmat(size, 1, n)).T
+        @ multipliers[k * m : (k + 1) * m]
+        for k in (0, 1)
+    ]
+    rows = ca.vertcat(*moved, ca.SX(len(span.model.x) - 2 * n, 1))
     return Closing(
         local=local,
         loops=loops,
-        m=m,
-        correction=block("correction", ca.vertcat(local.v, multipliers), local.theta, moved),
+        correction=block("correction", ca.vertcat(local.v, multipliers), local.theta, rows),
         levels=(
-            block("loops", local.v, local.theta, phi / ca.DM(size)),
-            block("loop_rates", local.v, local.theta, phi_dot / ca.DM(size)),
+            block("loops", local.v, local.theta, phi / size),
+            block("loop_rates", local.v, local.theta, phi_dot / size),
         ),
-        scale=size,
-        known={at: _known(span, loops, at, before, (periodic, named)) for at in span.nodes},
+        known={at: _known(span, loops, at, before, periodic, named) for at in span.nodes},
     )
 
 
@@ -303,57 +286,52 @@ def _known(
     loops: Loops,
     at: float,
     before: Span | None,
-    start: tuple[Sequence[str], Collection[str]],
+    periodic: Sequence[str],
+    named: Collection[str],
 ) -> tuple[Known, Known]:
-    """Return prescribed coordinates and rates at a node, and those that follow from the others.
-
-    `start` is periodic and named states of the start.
-    """
+    """Return prescribed coordinates and rates at a node, and those that follow from the others."""
     n, names = loops.n, [v.name for v in span.model.x]
     boxes = [span.nodes[at][name] for name in names]
     held = [i for i in range(2 * n) if fixed(boxes[i])]
-    first = at == 0.0 and before is None
-    linked = _linked(span, before, start[0], names) if at == 0.0 else {}
-    default = [i for i in held if first and names[i] not in start[1]]
-    T = span.T.start if isinstance(span.T, Free) else span.T
-    target = np.array([low if fixed((low, high)) else 0.0 for low, high in boxes])
+    linked = _linked(span, before, periodic, names) if at == 0.0 else {}
+    default = [i for i in held if at == 0.0 and before is None and names[i] not in named]
+    t = at * initial(span.T)
+    target = np.array([box[0] if fixed(box) else 0.0 for box in boxes])
     own = [i for i in held if i < n]
-    q, off = loops.closed(target[:n], own, at * T)
+    q, off = loops.closed(target[:n], own, t)
     if off > CLOSED and default:
         own = [i for i in own if i not in default]
-        q, off = loops.closed(target[:n], own, at * T)
+        q, off = loops.closed(target[:n], own, t)
     if off > CLOSED and not loops.open:
         raise ValueError(_inconsistent(span, at, [names[i] for i in own], off))
-    _, A, A_t = loops.at(q, at * T)
-    found: list[Known] = []
-    for level in range(2):
-        inside = range(level * n, (level + 1) * n)
+    _, A, A_t = loops.at(q, t)
+    levels: list[Known] = []
+    for level, what in enumerate(("coordinates", "rates")):
         if all(linked.get(i, False) for i in range((level + 1) * n)):
-            found.append(Known(imposed=False))  # rates of the same coordinates
+            levels.append(Known({}, imposed=False))  # rates of the same coordinates
             continue
-        given = [i - level * n for i in held if i in inside]
-        plain = [i - level * n for i in inside if linked.get(i) is True or i in default]
-        given = [i for i in given if i not in plain]
-        strict = [i - level * n for i in inside if linked.get(i) is False]
+        inside, offset = range(level * n, (level + 1) * n), level * n
+        plain = [i - offset for i in inside if linked.get(i) is True or i in default]
+        given = [i - offset for i in held if i in inside and i - offset not in plain]
+        strict = [i - offset for i in inside if linked.get(i) is False]
         released = dependent(A, given, plain, strict)
         if released is None:
             raise ValueError(
                 f"{span.name}: link: expected at most {n - np.linalg.matrix_rank(A)} expressions "
-                f"for {'rates' if level else 'coordinates'} of a mechanism with loops, got "
-                f"{len(strict)}; name independent ones, the others follow from the constraints"
+                f"for {what} of a mechanism with loops, got {len(strict)}; name independent ones, "
+                "the others follow from the constraints"
             )
         ranges: dict[int, Box] = {}
-        for i in (i + level * n for i in released):
-            ranges[i] = span.box(names[i])
+        for i in (i + offset for i in released):
+            ranges[i] = span.boxes[names[i]]
             if i in own:  # loops may close in several configurations: keep the named one
                 around = BRANCH * loops.nominal[i]
                 ranges[i] = meet(ranges[i], (target[i] - around, target[i] + around))
-        found.append(Known(released=ranges))
+        levels.append(Known(ranges))
     stated = [i for i in held if i not in default]
     if off := _rate_error(span, loops, (A, A_t), stated, target):
-        rates = [names[i] for i in stated if i >= n]
-        raise ValueError(_inconsistent(span, at, rates, off))
-    return found[0], found[1]
+        raise ValueError(_inconsistent(span, at, [names[i] for i in stated if i >= n], off))
+    return levels[0], levels[1]
 
 
 def _linked(
@@ -362,10 +340,8 @@ def _linked(
     """Return index of a linked state -> True if linked to a state, False to an expression."""
     if before is None:
         return {names.index(name): True for name in periodic}
-    known = {v.name: v.symbol for v in before.model.x}
     return {
-        names.index(link.state): link.state in known
-        and bool(ca.is_equal(link.expression, known[link.state]))
+        names.index(link.state): before.same_state(link.expression) == link.state
         for link in span.links
     }
 
@@ -379,14 +355,14 @@ def _rate_error(
     free_q = [i for i in range(n) if i not in held]
     if loops.open or np.linalg.matrix_rank(A[:, free_q], RANK) < len(free_q):
         return 0.0  # the coordinates are not known
-    scaled = A * span.model.nominal("x")[n : 2 * n] / loops.nominal
-    values = target[known] / span.model.nominal("x")[known]
-    fixed_part = scaled[:, [i - n for i in known]] @ values
+    nominal = span.model.nominal("x")
+    scaled = A * nominal[n : 2 * n] / loops.nominal
+    imposed = scaled[:, [i - n for i in known]] @ (target[known] / nominal[known])
+    right = -A_t - imposed
     free_v = [i for i in range(n) if i + n not in known]
-    right = -A_t - fixed_part
     change = np.linalg.lstsq(scaled[:, free_v], right, rcond=RANK)[0] if free_v else np.zeros(0)
     off = float(np.abs(scaled[:, free_v] @ change - right).max())
-    return off if off > CLOSED * max(1.0, float(np.abs(fixed_part).max(initial=0.0))) else 0.0
+    return off if off > CLOSED * max(1.0, float(np.abs(imposed).max(initial=0.0))) else 0.0
 
 
 def _inconsistent(span: Span, at: float, names: Sequence[str], off: float) -> str:

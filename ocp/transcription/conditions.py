@@ -1,14 +1,16 @@
-"""Conditions at single nodes and between phases: ends, via points, links, joins, end costs."""
+"""Conditions at single nodes and between phases: ends, via points, links, joins, end costs.
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+Each condition is differentiated once; a `Maker` then writes it at its places on a grid.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from math import inf
-from typing import final
 
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.phase import Free, Row, Span
+from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
 from ocp.transcription.blocks import (
     LAST,
@@ -22,57 +24,59 @@ from ocp.transcription.blocks import (
     order_of,
     select,
 )
-from ocp.transcription.schemes import Coefficients
-from ocp.transcription.unknowns import Columns, Data, Layout, Local, time_scale
+from ocp.transcription.unknowns import Columns, Grid, Layout, Local, time_scale
 from symfric.foundation.variable import stacked
 
+Maker = Callable[[Grid], Piece | None]
+"""Function that writes a condition on a grid; None if it has no place there."""
 
-@final
-@dataclass(frozen=True, eq=False)
-class AtNode:
-    """Rows, or a share of the cost, at one node of a phase.
 
-    Attributes:
-        local: their unknowns.
-        fraction: of the node, as a fraction of T.
-        rows: the conditions; none for a cost.
-        block: rows and share.
-        inside: whether they contain inputs or algebraic variables, which belong to an interval.
+def at_nodes(local: Local) -> Iterator[Maker]:
+    """Yield conditions at the ends and at via points of a phase, and its cost at the end."""
+    span = local.span
+    for fraction, rows in span.rows_at.items():
+        for inside in (False, True):
+            some = [row for row in rows if _knows_inside(span, row.expression) == inside]
+            if some:
+                sizes = ca.DM([row.nominal for row in some])
+                made = _node_block(local, stacked(row.expression for row in some) / sizes)
+                yield partial(_at_node, local, fraction, Rows.of(some), made, inside)
+    if not span.end.is_zero():
+        made = _node_block(local, ca.SX(0, 1), span.end)
+        yield partial(_at_node, local, 1.0, Rows.of(()), made, _knows_inside(span, span.end))
+
+
+def _at_node(
+    local: Local, fraction: float, rows: Rows, made: Block, inside: bool, grid: Grid
+) -> Piece:
+    """Return rows, or a share of the cost, at one node of a phase.
+
+    With inputs or algebraic variables they belong to an interval.
     """
-
-    local: Local
-    fraction: float
-    rows: Rows
-    block: Block
-    inside: bool
-
-    def piece(self, layout: Layout, scheme: Coefficients, data: Data, node: int) -> Piece:
-        """Return the piece at node number `node` of the mesh."""
-        interval, offset, parts = columns_at(self.local, layout, scheme, node, self.inside)
-        stage, inside = (interval, LAST - 1) if self.inside else (node, 1)
-        order = order_of(self.local.number, np.array([stage]), inside)
-        at = np.array([interval]), np.array([offset])
-        return self.local.piece(self.rows, self.block, parts, data, at, order)
+    node = grid.nodes[local.number][fraction]
+    interval, columns = _columns_at(local, grid, node, inside)
+    stage, k = (interval, LAST - 1) if inside else (node, 1)
+    at = np.array([interval]), np.array([float(node > 0)])
+    return local.piece(grid, rows, made, columns, at, order_of(local.number, np.array([stage]), k))
 
 
-def columns_at(
-    local: Local, layout: Layout, scheme: Coefficients, node: int, inside: bool
-) -> tuple[int, float, list[Columns]]:
-    """Return interval, place in it, and columns of the local unknowns at a node of the mesh.
+def _columns_at(
+    local: Local, grid: Grid, node: int, inside: bool
+) -> tuple[int, tuple[Columns, Columns, Indices]]:
+    """Return the interval, and columns of x, z and u, at a node of the mesh.
 
     Algebraic variables and inputs belong to the interval before; at node 0 to the first
     collocation point. With `inside` states belong to that interval, not to the copy at the node.
     """
-    span, d = layout.spans[local.number], scheme.degree
-    interval, offset = (0, 0.0) if node == 0 else (node - 1, 1.0)
+    span, scheme = grid.layout.spans[local.number], grid.scheme
+    interval, d = max(node - 1, 0), scheme.degree
     x: Columns = span.nodes[:, [node]]
     z: Columns = span.z[:, :1]  # not used under shooting
     if node and d:
-        points = slice(interval * d, node * d)
-        z = _sum(span.z[:, points], scheme.inner_ends)
+        z = _sum(span.z[:, interval * d : node * d], scheme.inner_ends)
         if inside:
-            x = _sum(span.points_of(interval), scheme.ends)
-    return interval, offset, local.columns(layout, x, z, span.u[:, [interval]], 1)
+            x = _sum(span.carrying[:, :, interval], scheme.ends)
+    return interval, (x, z, span.u[:, [interval]])
 
 
 def _sum(columns: Indices, weights: Array) -> Columns:
@@ -82,55 +86,24 @@ def _sum(columns: Indices, weights: Array) -> Columns:
     return columns[:, kept, None], factors[:, :, None]
 
 
-def at_nodes(local: Local) -> list[AtNode]:
-    """Return conditions at the ends and at via points of a phase, and its cost at the end."""
-    span = local.span
-    found: list[AtNode] = []
-    for fraction, rows in span.rows_at.items():
-        for inside in (False, True):
-            some = [row for row in rows if _knows_inside(span, row.expression) == inside]
-            if some:
-                sizes = ca.DM([row.nominal for row in some])
-                made = _node_block(local, stacked(row.expression for row in some) / sizes)
-                found.append(AtNode(local, fraction, Rows.of(some), made, inside))
-    if not span.end.is_zero():
-        made = _node_block(local, ca.SX(0, 1), span.end)
-        found.append(AtNode(local, 1.0, Rows.of(()), made, _knows_inside(span, span.end)))
-    return found
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class AtStarts:
-    """Rows at the starts of the intervals of a phase, with the inputs that begin there.
+def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
+    """Return conditions at the starts of all intervals of a phase but the first one.
 
     Inputs are held: expressions with them jump there, before the first collocation point. The first
     interval is covered by the conditions at the start of the phase.
-
-    Attributes:
-        local: their unknowns.
-        rows: the conditions.
-        block: their values.
     """
+    made = _node_block(local, stacked(row.expression / row.nominal for row in rows))
 
-    local: Local
-    rows: Rows
-    block: Block
+    def piece(grid: Grid) -> Piece | None:
+        span = grid.layout.spans[local.number]
+        at = np.arange(1, span.intervals)
+        if not at.size:
+            return None
+        columns = span.nodes[:, at], span.z[:, at * grid.scheme.degree], span.u[:, at]
+        order = order_of(local.number, at, LAST - 1)
+        return local.piece(grid, Rows.of(rows), made, columns, (at, np.zeros(at.size)), order)
 
-    def piece(self, layout: Layout, scheme: Coefficients, data: Data) -> Piece:
-        """Return the piece; algebraic variables are those of the first collocation points."""
-        number = self.local.number
-        span, at = layout.spans[number], np.arange(1, layout.spans[number].intervals)
-        z = span.z[:, at * scheme.degree]
-        parts = self.local.columns(layout, span.nodes[:, at], z, span.u[:, at], at.size)
-        order = order_of(number, at, LAST - 1)
-        return self.local.piece(self.rows, self.block, parts, data, (at, np.zeros(at.size)), order)
-
-
-def at_starts(local: Local, rows: Sequence[Row]) -> AtStarts:
-    """Return conditions at the starts of all intervals of a phase but the first one."""
-    expressions = stacked(row.expression / row.nominal for row in rows)
-    return AtStarts(local, Rows.of(rows), _node_block(local, expressions))
+    return piece
 
 
 def _knows_inside(span: Span, expression: ca.SX) -> bool:
@@ -145,126 +118,91 @@ def _node_block(local: Local, rows: ca.SX, share: ca.SX | None = None) -> Block:
     return block("node", local.v, local.theta, r, None if share is None else q)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Between:
-    """Rows between the end of one phase and the start of the next one.
-
-    Attributes:
-        before, after: unknowns of both.
-        block: its rows, in the local unknowns of both.
-        rows: names, sizes and ranges.
-        link: whether the rows determine the start of states; False for joins.
-    """
-
-    before: Local
-    after: Local
-    block: Block
-    rows: Rows
-    link: bool
-
-    def piece(self, layout: Layout, scheme: Coefficients, data: Sequence[Data]) -> Piece:
-        """Return the piece."""
-        a, b = self.before.number, self.after.number
-        N = layout.spans[a].intervals
-        zero, one, last = np.zeros(1, np.int64), np.ones(1), np.array([N - 1])
-        ends = columns_at(self.before, layout, scheme, N, False)[2]
-        starts = columns_at(self.after, layout, scheme, 0, False)[2]
-        theta = data[a].theta(last, one), data[b].theta(zero, 0 * one)
-        return Piece(
-            rows=self.rows,
-            order=order_of(a, np.array([N]), 0 if self.link else LAST),
-            span=b,
-            interval=zero,
-            offset=0 * one,
-            block=self.block,
-            selection=select([*ends, *starts], 1),
-            theta=ca.vertcat(*theta),
-        )
-
-
-def between(before: Local, after: Local) -> list[Between]:
-    """Return links that are expressions, and joins, of a phase to the one before."""
+def between(before: Local, after: Local) -> Iterator[Maker]:
+    """Yield links that are expressions, and joins, of a phase to the previous one."""
     span = after.span
     v, theta = ca.vertcat(before.v, after.v), ca.vertcat(before.theta, after.theta)
-    found: list[Between] = []
-    states = [v.name for v in span.model.x]
-    links = [link for link in span.links if _same_state(before.span, link.expression) < 0]
+    links = [link for link in span.links if not before.span.same_state(link.expression)]
     if links:
+        states = [v.name for v in span.model.x]
         at = [states.index(link.state) for link in links]
         sizes = span.model.nominal("x")[at]
         expressions = stacked(link.expression for link in links)
         (ends,) = ca.Function("link", before.span.symbols, [expressions]).call(before.values)
         made = block("link", v, theta, (after.values[1][at] - ends) / ca.DM(sizes))
         rows = Rows.zero([f"the start of {link.state}" for link in links], sizes)
-        found.append(Between(before, after, made, rows, link=True))
+        yield partial(_between, before, after, made, rows, 0)
     if span.joins:
         rows = Rows.of(span.joins)
         values = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
         made = block("join", v, theta, stacked(values) / ca.DM(rows.scale))
-        found.append(Between(before, after, made, rows, link=False))
-    return found
+        yield partial(_between, before, after, made, rows, LAST)
 
 
-def _same_state(before: Span, expression: ca.SX) -> int:
-    """Return the index of the state equal to the expression, or -1."""
-    return next((i for i, v in enumerate(before.model.x) if ca.is_equal(expression, v.symbol)), -1)
+def _between(
+    before: Local, after: Local, made: Block, rows: Rows, inside: int, grid: Grid
+) -> Piece:
+    """Return rows between the end of one phase and the start of the next one."""
+    a, b, layout = before.number, after.number, grid.layout
+    N = layout.spans[a].intervals
+    zero, one = np.zeros(1, np.int64), np.ones(1)
+    ends = before.columns(layout, *_columns_at(before, grid, N, False)[1])
+    starts = after.columns(layout, *_columns_at(after, grid, 0, False)[1])
+    theta = grid.data[a].theta(np.array([N - 1]), one), grid.data[b].theta(zero, 0 * one)
+    return Piece(
+        rows=rows,
+        order=order_of(a, np.array([N]), inside),
+        span=b,
+        interval=zero,
+        offset=0 * one,
+        block=made,
+        selection=select([*ends, *starts], 1),
+        theta=ca.vertcat(*theta),
+    )
 
 
-def plain_links(
-    number: int, before: Span, span: Span, layout: Layout, released: Collection[int]
-) -> list[Piece]:
+def plain_links(number: int, before: Span, span: Span, grid: Grid) -> list[Piece]:
     """Return the continuity of states from phase `number - 1`, `before`, to phase `number`.
 
-    Args:
-        released: states of `span` whose start follows from other states.
+    States whose start follows from other states have no such row.
     """
-    a, b = layout.spans[number - 1], layout.spans[number]
-    states = [v.name for v in span.model.x]
-    pairs = [
-        (states.index(link.state), _same_state(before, link.expression)) for link in span.links
-    ]
-    pairs = [(to, origin) for to, origin in pairs if origin >= 0 and to not in released]
+    a, b = grid.layout.spans[number - 1], grid.layout.spans[number]
+    old, new = ([v.name for v in s.model.x] for s in (before, span))
+    pairs = [(new.index(link.state), before.same_state(link.expression)) for link in span.links]
+    released = grid.released[number].get(0.0, ())
+    pairs = sorted((to, old.index(name)) for to, name in pairs if name and to not in released)
     if not pairs:
         return []
-    to, origin = (np.array(part) for part in zip(*sorted(pairs), strict=True))
-    sizes, old = span.model.nominal("x")[to], before.model.nominal("x")[origin]
-    rows = Rows.zero([f"the continuity of {states[i]}" for i in to], sizes)
+    to, origin = (np.array(part) for part in zip(*pairs, strict=True))
+    sizes = span.model.nominal("x")[to]
+    rows = Rows.zero([f"the continuity of {new[i]}" for i in to], sizes)
     columns = np.column_stack([b.nodes[to, 0], a.nodes[origin, -1]])
-    weights = np.column_stack([np.ones(to.size), -old / sizes])
+    weights = np.column_stack([np.ones(to.size), -before.model.nominal("x")[origin] / sizes])
     return [linear_piece(rows, columns, weights, number, order_of(number - 1, a.intervals, 0))]
 
 
-def whole(
-    problem: Problem, layout: Layout, released: Sequence[Mapping[float, Collection[int]]]
-) -> list[Piece]:
-    """Return periodicity, shared starts and sums of durations.
-
-    Args:
-        released: for each phase, states at fractions of T whose values follow from others.
-    """
-    spans, phases = problem.spans, len(problem.chain)
+def whole(problem: Problem, grid: Grid) -> Iterator[Piece]:
+    """Yield periodicity, shared starts and sums of durations."""
+    spans, phases, layout = problem.spans, len(problem.chain), grid.layout
     end = order_of(len(spans), 0, 0)
-    found: list[Piece] = []
     for first in range(0, len(spans), phases):
         last = first + phases - 1
-        loose = [spans[first].model.x[i].name for i in released[first].get(0.0, ())]
-        kept = [name for name in problem.periodic if name not in loose]
-        found += _equal_states(problem, layout, (last, -1), (first, 0), kept, end)
+        released = [spans[first].model.x[i].name for i in grid.released[first].get(0.0, ())]
+        names = [name for name in problem.periodic if name not in released]
+        if names:
+            yield _equal_states(problem, layout, (last, -1), (first, 0), names, end)
         for phase, name in problem.shared_starts if first else ():
-            a, b = (phase, 0), (first + phase, 0)
-            found += _equal_states(problem, layout, a, b, (name,), end)
+            yield _equal_states(problem, layout, (phase, 0), (first + phase, 0), [name], end)
     for numbers, total in problem.durations:
-        free = [(i, spans[i]) for i in numbers if isinstance(spans[i].T, Free)]
-        given = sum(T for i in numbers if not isinstance(T := spans[i].T, Free))
-        low, high = (total.lower, total.upper) if isinstance(total, Free) else (total, total)
+        free = [i for i in numbers if isinstance(spans[i].T, Free)]
+        fixed = sum(limits(spans[i].T)[0] for i in numbers if i not in free)
+        low, high = limits(total)
         size = np.array([high])
         name = "the duration of phases " + ", ".join(str(i + 1) for i in numbers)
-        rows = Rows((name,), size, np.array([low - given]), np.array([high - given]))
-        columns = np.array([[layout.spans[i].T for i, _ in free]])
-        weights = np.array([[time_scale(span) for _, span in free]]) / size
-        found.append(linear_piece(rows, columns, weights, numbers[0], end))
-    return found
+        rows = Rows((name,), size, np.array([low - fixed]), np.array([high - fixed]))
+        columns = np.array([[layout.spans[i].T for i in free]])
+        weights = np.array([[time_scale(spans[i]) for i in free]]) / size
+        yield linear_piece(rows, columns, weights, numbers[0], end)
 
 
 def _equal_states(
@@ -274,10 +212,8 @@ def _equal_states(
     b: tuple[int, int],
     names: Sequence[str],
     order: Indices,
-) -> list[Piece]:
+) -> Piece:
     """Return rows for equal states `names` at (phase, node) a and b."""
-    if not names:
-        return []
     columns: list[Indices] = []
     sizes: list[Array] = []
     for span, node in (a, b):
@@ -288,7 +224,7 @@ def _equal_states(
     what = "the period" if a[1] < 0 else "the start in all scenarios"
     rows = Rows.zero([f"{what} of {name}" for name in names], sizes[1])
     weights = np.column_stack([sizes[0] / sizes[1], -np.ones(len(names))])
-    return [linear_piece(rows, np.column_stack(columns), weights, a[0], order)]
+    return linear_piece(rows, np.column_stack(columns), weights, a[0], order)
 
 
 def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece]:

@@ -1,24 +1,22 @@
 """The nonlinear program for a solver, and the result of the solver."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ocp.formulation.phase import Box, limits
 from ocp.formulation.problem import Problem
 from ocp.transcription.assembly import Assembled
 from ocp.transcription.blocks import Array, Indices, Piece
-from ocp.transcription.unknowns import Layout
+from ocp.transcription.unknowns import Grid, Layout, scale_of
+from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
 
 
-@final
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Name and place of a row or an unknown of the program.
 
     Attributes:
@@ -34,36 +32,7 @@ class Place:
     scale: float = 1.0
 
 
-@final
-class Places(Sequence[Place]):
-    """Places of all rows or unknowns, computed on demand."""
-
-    def __init__(
-        self, count: int, make: Callable[[], tuple[Sequence[str], Indices, Indices, Array, Array]]
-    ) -> None:
-        """Store `make`, which returns names, and index, phase, fraction, scale of each place."""
-        self._count, self._make = count, make
-
-    @cached_property
-    def _columns(self) -> tuple[Sequence[str], Indices, Indices, Array, Array]:
-        return self._make()
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __getitem__(self, index: int) -> Place:  # pyright: ignore[reportIncompatibleMethodOverride]
-        names, name, span, fraction, scale = self._columns
-        return Place(
-            names[int(name[index])], int(span[index]), float(fraction[index]), float(scale[index])
-        )
-
-    def __iter__(self) -> Iterator[Place]:
-        return (self[i] for i in range(self._count))
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Stages:
+class Stages(NamedTuple):
     """Stages of the program for structured solvers: x_k with u_k, rows of its gap first.
 
     Attributes:
@@ -76,11 +45,6 @@ class Stages:
     nu: tuple[int, ...]
     ng: tuple[int, ...]
     equality: tuple[bool, ...]
-
-
-def no_structure() -> tuple[Stages | None, str]:
-    """Return the structure of a program that was not analysed."""
-    return None, "no known structure"
 
 
 @final
@@ -97,9 +61,9 @@ class Program:
         jacobian: (x, p) -> (g, jac_g_x).
         hessian: (x, p, lam_f, lam_g) -> triu_hess_gamma_x_x.
         values: values of p.
-        rows, unknowns: name and place of each row and unknown.
         scale: SI values of the unknowns divided by w.
-        structure: function that returns the stages.
+        places: function that returns name and place of each row, and of each unknown.
+        structure: function that returns the stages, or None and the reason why there are none.
     """
 
     w: ca.MX
@@ -114,20 +78,19 @@ class Program:
     lower_g: Array
     upper_g: Array
     values: Array
-    rows: Sequence[Place]
-    unknowns: Sequence[Place]
     scale: Array
-    structure: Callable[[], tuple[Stages | None, str]] = no_structure
+    places: Callable[[], tuple[Sequence[Place], Sequence[Place]]] = lambda: ((), ())
+    structure: Callable[[], tuple[Stages | None, str]] = lambda: (None, "no known structure")
 
     @property
-    def stages(self) -> Stages | None:
-        """Structure for solvers that use it; None if there is none, see `unstaged`."""
-        return self.structure()[0]
+    def rows(self) -> Sequence[Place]:
+        """Name and place of each row."""
+        return self.places()[0]
 
     @property
-    def unstaged(self) -> str:
-        """Reason why there are no stages."""
-        return self.structure()[1]
+    def unknowns(self) -> Sequence[Place]:
+        """Name and place of each unknown."""
+        return self.places()[1]
 
     @property
     def nlp(self) -> dict[str, ca.MX]:
@@ -140,68 +103,93 @@ class Program:
         return {"grad_f": self.gradient, "jac_g": self.jacobian, "hess_lag": self.hessian}
 
 
+def bounds_of(problem: Problem, grid: Grid) -> tuple[Array, Array]:
+    """Return lower and upper bounds of w, scaled.
+
+    If the last collocation point is the end of its interval, only the copy at the node is bounded:
+    bounds on both would be dependent.
+    """
+    layout, scale = grid.layout, scale_of(problem, grid.layout)
+    d = grid.scheme.degree
+    sides: list[Array] = []
+    for side, meet in enumerate((np.maximum, np.minimum)):
+        bound = np.full(layout.size, (-np.inf, np.inf)[side])
+        pairs = zip(problem.spans, layout.spans, grid.nodes, grid.released, strict=True)
+        for span, own, nodes, released in pairs:
+            model, N = span.model, own.intervals
+
+            def of(group: Sequence[Variable], boxes: Mapping[str, Box], side: int = side) -> Array:
+                return np.array([boxes[v.name][side] for v in group], dtype=float)
+
+            x, u = of(model.x, span.boxes), np.tile(of(model.u, span.boxes)[:, None], (1, N))
+            inner = own.inner.reshape(x.size, N, d)
+            bound[own.nodes] = x[:, None]
+            bound[inner[:, :, : d - 1 if grid.scheme.meets_end else d]] = x[:, None, None]
+            bound[own.z] = of(model.z, span.boxes)[:, None]
+            for fraction, column in ((0.0, 0), (1.0, -1)):
+                u[:, column] = meet(u[:, column], of(model.u, span.inputs_at[fraction]))
+            bound[own.u] = meet(u, bound[own.u])  # shared inputs may be bounded in each scenario
+            for fraction, node in nodes.items():
+                bound[own.nodes[:, node]] = of(model.x, span.nodes[fraction])
+                for i, box in released.get(fraction, {}).items():
+                    bound[own.nodes[i, node]] = box[side]
+            if own.T >= 0:
+                bound[own.T] = limits(span.T)[side]
+        bound[layout.chosen] = [(c.lower, c.upper)[side] for c in problem.chosen]
+        sides.append(bound / scale)
+    return sides[0], sides[1]
+
+
 def stages_of(
     problem: Problem,
     layout: Layout,
-    pieces: tuple[Piece, ...],
+    pieces: Sequence[Piece],
     made: Assembled,
     equality: Array,
 ) -> tuple[Stages | None, str]:
     """Return the stages, or None and the coupling that prevents them.
 
     Args:
+        problem, layout, pieces, made: of the program.
         equality: mask of the rows that are equations, shape (m,).
     """
-    common = _common(problem, layout)
-    if common:
-        return None, common
-    first, nx, stage_of = _columns(layout)
-    owner, gap = _rows(layout, pieces, made)
+    if len(problem.scenarios) > 1:
+        return None, "several scenarios"
+    if problem.chosen:
+        return None, f"the chosen parameter {problem.chosen[0].name}"
+    if any(span.T >= 0 for span in layout.spans):
+        return None, "a free duration"
+    first = np.concatenate([span.nodes[0] for span in layout.spans])
+    nx = np.concatenate([np.full(s.nodes.shape[1], s.nodes.shape[0]) for s in layout.spans])
+    stage_of = np.searchsorted(first, np.arange(layout.size), side="right") - 1
+    owner, gap = _owners(layout, pieces, made)
     K = nx.size - 1
     gaps = np.bincount(owner[gap], minlength=K + 1)
     if (gaps[:-1] != nx[1:]).any() or gaps[-1]:
         return None, "states that restart after a phase"
-    rows, columns = (
-        np.array(part, np.int64) for part in made.jacobian.sparsity_out(1).get_triplet()
-    )
+    triplet = made.jacobian.sparsity_out(1).get_triplet()
+    rows, columns = (np.array(part, np.int64) for part in triplet)
     place = columns - first[np.minimum(owner[rows] + 1, K)]
     number = np.arange(owner.size) - np.searchsorted(owner, owner)
     own = stage_of[columns] == owner[rows]
     identity = gap[rows] & (stage_of[columns] == owner[rows] + 1) & (place == number[rows])
-    wrong = ~own & ~identity
-    if wrong.any():
-        return None, _named(pieces, made, int(rows[wrong][0]))
+    wrong = rows[~own & ~identity]
+    if wrong.size:
+        names = (
+            name
+            for piece, at in zip(pieces, made.at, strict=True)
+            for name, numbers in zip(piece.names, at, strict=True)
+            if wrong[0] in numbers
+        )
+        return None, f"{next(names)}, which depends on more than its interval"
     sizes = np.diff(np.append(first, layout.size))
     ng = np.bincount(owner[~gap], minlength=K + 1)
-    return Stages(
-        tuple(nx.tolist()),
-        tuple((sizes - nx).tolist()),
-        tuple(ng.tolist()),
-        tuple(np.asarray(equality, dtype=bool).tolist()),
-    ), ""
+    counts = (nx, sizes - nx, ng, np.asarray(equality, dtype=bool))
+    return Stages(*(tuple(part.tolist()) for part in counts)), ""
 
 
-def _common(problem: Problem, layout: Layout) -> str:
-    """Return the name of an unknown common to the whole motion, if there is one."""
-    if len(problem.scenarios) > 1:
-        return "several scenarios"
-    if problem.chosen:
-        return f"the chosen parameter {problem.chosen[0].name}"
-    if any(span.T >= 0 for span in layout.spans):
-        return "a free duration"
-    return ""
-
-
-def _columns(layout: Layout) -> tuple[Indices, Indices, Indices]:
-    """Return first column and number of states of each stage, and the stage of each column."""
-    first = np.concatenate([span.nodes[0] for span in layout.spans])
-    nx = np.concatenate([np.full(s.nodes.shape[1], s.nodes.shape[0]) for s in layout.spans])
-    stage_of = np.searchsorted(first, np.arange(layout.size), side="right") - 1
-    return first, nx, stage_of
-
-
-def _rows(
-    layout: Layout, pieces: tuple[Piece, ...], made: Assembled
+def _owners(
+    layout: Layout, pieces: Sequence[Piece], made: Assembled
 ) -> tuple[Indices, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
     """Return the stage of each row, and whether it closes the gap to the next one."""
     begins = np.cumsum([0, *(span.intervals + 1 for span in layout.spans)])
@@ -214,18 +202,6 @@ def _rows(
         owner[at] = np.where(known, stage, begins[-1] - 1)
         gap[at] = known & ((piece.order & 63) == 0)
     return owner, gap
-
-
-def _named(pieces: tuple[Piece, ...], made: Assembled, row: int) -> str:
-    """Return the name of a row."""
-    for piece, at in zip(pieces, made.at, strict=True):
-        for name, numbers in zip(piece.names, at, strict=True):
-            if row in numbers:
-                return f"{name}, which depends on more than its interval"
-    return "a row that depends on more than its interval"
-
-
-Array = NDArray[np.float64]
 
 
 @final
@@ -298,13 +274,9 @@ class SolverStatistics:
 
     def then(self, later: "SolverStatistics") -> "SolverStatistics":
         """Return the total: the sizes of the later one, counts and times of both."""
+        summed = ("iterations", "solves", "build_time", "solve_time", "verify_time")
         return replace(
-            later,
-            iterations=self.iterations + later.iterations,
-            solves=self.solves + later.solves,
-            build_time=self.build_time + later.build_time,
-            solve_time=self.solve_time + later.solve_time,
-            verify_time=self.verify_time + later.verify_time,
+            later, **{name: getattr(self, name) + getattr(later, name) for name in summed}
         )
 
 
@@ -317,10 +289,8 @@ class Outcome:
         iterate: the solution, or the best iterate: among feasible ones the one of least cost, else
             of least violation.
         cost: J there.
-        violations: of each row of g, scaled.
-        bound_violations: of each unknown, scaled.
-        status: of the end; `sentence` describes it with the worst row and a remedy; `answer` is the
-            solver's return code.
+        violation: largest violation of a row or a bound there, scaled.
+        status: of the end; `sentence` describes it with the worst row and a remedy.
         cycles: whether the last iterations were cyclic.
         statistics: size, iterations, times.
         cause: the exception in `progress` that stopped it, if any.
@@ -328,20 +298,12 @@ class Outcome:
 
     iterate: Iterate
     cost: float
-    violations: Array
-    bound_violations: Array
+    violation: float
     status: Status
     sentence: str
-    answer: str
     cycles: bool
     statistics: SolverStatistics
     cause: BaseException | None = None
-
-    @property
-    def violation(self) -> float:
-        """Largest of all violations, scaled."""
-        worst = max(self.violations.max(initial=0.0), self.bound_violations.max(initial=0.0))
-        return float(worst)
 
 
 def outside(values: Array, lower: Array, upper: Array) -> Array:

@@ -1,30 +1,24 @@
-"""Discretisation of a motion: schemes, meshes, and bounds of the unknowns on them.
+"""Discretisation of a motion: Radau and Gauss-Legendre collocation, shooting, and meshes."""
 
-Radau and Gauss-Legendre collocation, and shooting.
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, final
+from typing import ClassVar, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-from ocp.formulation.phase import Box, Free, Span
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
 from ocp.transcription.blocks import Array
-from ocp.transcription.unknowns import Layout, SpanLayout, time_scale
 from symfric.foundation import checks
 
 MAX_DEGREE = 9
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Coefficients:
+class Coefficients(NamedTuple):
     """Collocation on one interval [0, 1].
 
     A state is the polynomial through s_0 = 0 < s_1 < ... < s_d <= 1,
@@ -186,16 +180,32 @@ MOST_INTERVALS = 10**6
 WHAT = "their number or increasing fractions of T from 0 to 1"
 
 
-def make_mesh(span: Span, intervals: int | ArrayLike) -> Array:
-    """Return fractions of T that bound the intervals of a phase.
+def make_meshes(problem: Problem, intervals: int | ArrayLike | Sequence[ArrayLike]) -> list[Array]:
+    """Return a mesh for each phase of each scenario: fractions of T that bound the intervals.
 
     Args:
-        span: its `via` fractions become nodes.
-        intervals: number of equal intervals, or the fractions 0 = s_0 < s_1 < ... < s_N = 1.
+        problem: the problem; the `via` fractions of its phases become nodes.
+        intervals: the number of equal intervals of each phase, increasing fractions from 0 to 1
+            for each phase, or a list with one of these for each phase.
 
     Raises:
         ValueError: an invalid value.
     """
+    phases = len(problem.chain)
+    first = next(iter(intervals), 0.0) if isinstance(intervals, Iterable) else 0.0
+    single = checks.as_number(intervals) is not None or np.ndim(first) == 0
+    if single and not (isinstance(intervals, list | tuple) and _counts(intervals, phases)):
+        given: list[ArrayLike] = [intervals] * phases  # pyright: ignore[reportAssignmentType]
+    else:
+        given = list(checks.many("intervals", intervals, "meshes, one for each phase"))
+    if len(given) != phases:
+        raise ValueError(
+            f"intervals: expected one mesh for each of {phases} phases, got {len(given)}"
+        )
+    return [_mesh(span, given[span.phase]) for span in problem.spans]
+
+
+def _mesh(span: Span, intervals: ArrayLike) -> Array:
     if checks.as_number(intervals) is not None:
         count = checks.count("intervals", intervals, most=MOST_INTERVALS)
         mesh = np.linspace(0.0, 1.0, count + 1)
@@ -212,34 +222,6 @@ def _bounds_intervals(mesh: Array) -> bool:
     return mesh.size > 1 and mesh[0] == 0.0 and mesh[-1] == 1.0 and bool((np.diff(mesh) > 0).all())
 
 
-def make_meshes(problem: Problem, intervals: int | ArrayLike | Sequence[ArrayLike]) -> list[Array]:
-    """Return a mesh for each phase of each scenario.
-
-    Args:
-        problem: the problem.
-        intervals: the number for each phase, fractions for each phase, or a list with one of
-            these for each phase.
-
-    Raises:
-        ValueError: an invalid value.
-    """
-    phases = len(problem.chain)
-    single = checks.as_number(intervals) is not None or np.ndim(_first(intervals)) == 0
-    if single and not (isinstance(intervals, list | tuple) and _counts(intervals, phases)):
-        given: list[ArrayLike] = [intervals] * phases  # pyright: ignore[reportAssignmentType]
-    else:
-        given = list(checks.many("intervals", intervals, "meshes, one for each phase"))
-    if len(given) != phases:
-        raise ValueError(
-            f"intervals: expected one mesh for each of {phases} phases, got {len(given)}"
-        )
-    return [make_mesh(span, given[span.phase]) for span in problem.spans]
-
-
-def _first(intervals: object) -> Any:
-    return next(iter(intervals), 0.0) if isinstance(intervals, Iterable) else 0.0
-
-
 def _counts(intervals: Sequence[object], phases: int) -> bool:
     """Return True for numbers of intervals, one for each phase, instead of fractions."""
     return len(intervals) == phases and all(
@@ -253,16 +235,16 @@ def nodes_of(span: Span, mesh: Array) -> dict[float, int]:
     Raises:
         ValueError: there is no such node.
     """
-    found: dict[float, int] = {}
+    nodes: dict[float, int] = {}
     for fraction in span.nodes:
         node = int(np.argmin(np.abs(mesh - fraction)))
         if abs(mesh[node] - fraction) > SAME_NODE:
             raise ValueError(
                 f"mesh of {span.name}: expected a node at {fraction:g}, where the phase has "
-                f"conditions, got one at {mesh[node]:g}; use make_mesh"
+                f"conditions, got one at {mesh[node]:g}; use make_meshes"
             )
-        found[fraction] = node
-    return found
+        nodes[fraction] = node
+    return nodes
 
 
 def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]:
@@ -283,116 +265,13 @@ def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]
         )
     for span, mesh in zip(spans, given, strict=True):
         if not _bounds_intervals(mesh):
+            ends = f" numbers from {mesh[0]:g} to {mesh[-1]:g}" if mesh.size else ""
             raise ValueError(
                 f"mesh of {span.name}: expected increasing fractions of T from 0 to 1, got "
-                f"{mesh.size} numbers from {mesh[0]:g} to {mesh[-1]:g}"
-                if mesh.size
-                else f"mesh of {span.name}: expected fractions of T from 0 to 1, got none"
+                f"{mesh.size or 'none'}{ends}"
             )
         if problem.shared_inputs and not np.array_equal(mesh, given[span.phase]):
             raise ValueError(
                 f"mesh of {span.name}: expected the same in all scenarios, which share inputs"
             )
     return tuple(given)
-
-
-def split(mesh: Array, parts: Sequence[int]) -> Array:
-    """Divide interval k into `parts[k]` equal ones.
-
-    Raises:
-        ValueError: not a number >= 1 for each interval.
-    """
-    counts = np.asarray(parts, dtype=int)
-    if counts.shape != (mesh.size - 1,) or (counts < 1).any():
-        raise ValueError(
-            f"split: expected {mesh.size - 1} numbers of parts >= 1, got {counts.tolist()}"
-        )
-    pieces = [
-        np.linspace(low, high, n, endpoint=False)
-        for low, high, n in zip(mesh[:-1], mesh[1:], counts, strict=True)
-    ]
-    return np.concatenate([*pieces, mesh[-1:]])
-
-
-def join(mesh: Array, away: Sequence[int], keep: Iterable[float] = ()) -> Array:
-    """Remove inner nodes by their indices, except those at fractions to `keep`."""
-    kept = np.ones(mesh.size, dtype=bool)
-    kept[list(away)] = False
-    kept[[0, -1]] = True
-    for fraction in keep:
-        kept[np.abs(mesh - fraction) <= SAME_NODE] = True
-    return mesh[kept]
-
-
-def scale_of(problem: Problem, layout: Layout) -> Array:
-    """Return SI values of the unknowns divided by w, shape (n,)."""
-    scale = np.ones(layout.size)
-    for span, own in zip(problem.spans, layout.spans, strict=True):
-        model = span.model
-        for letter, columns in (("x", own.nodes), ("x", own.inner), ("z", own.z), ("u", own.u)):
-            scale[columns] = model.nominal(letter)[:, None]
-        if own.T >= 0:
-            scale[own.T] = time_scale(span)
-    scale[layout.chosen] = [choice.nominal for choice in problem.chosen]
-    return scale
-
-
-def bounds_of(
-    problem: Problem,
-    layout: Layout,
-    scheme: Coefficients,
-    nodes: Sequence[Mapping[float, int]],
-    released: Sequence[Mapping[float, Mapping[int, Box]]],
-) -> tuple[Array, Array]:
-    """Return lower and upper bounds of w, scaled.
-
-    Args:
-        nodes: for each phase, index of the node at each fraction with conditions.
-        released: for each phase, states at these fractions that follow from others, and their
-            ranges.
-
-    If the last collocation point is the end of its interval, only the copy at the node is bounded:
-    bounds on both would be dependent.
-    """
-    lower, upper = np.full(layout.size, -np.inf), np.full(layout.size, np.inf)
-    every = zip(problem.spans, layout.spans, nodes, released, strict=True)
-    for span, own, at, loose in every:
-        _bound(span, own, scheme, (at, loose), (lower, upper))
-    for column, choice in zip(layout.chosen, problem.chosen, strict=True):
-        lower[column], upper[column] = choice.lower, choice.upper
-    scale = scale_of(problem, layout)
-    return lower / scale, upper / scale
-
-
-def _bound(
-    span: Span,
-    own: SpanLayout,
-    scheme: Coefficients,
-    conditions: tuple[Mapping[float, int], Mapping[float, Mapping[int, Box]]],
-    sides: tuple[Array, Array],
-) -> None:
-    model, d = span.model, scheme.degree
-    states = [v.name for v in model.x]
-    open_end = scheme.meets_end and d > 0
-    inner = own.inner.reshape(len(states), own.intervals, d)[:, :, : d - 1 if open_end else d]
-    for side, bound in enumerate(sides):
-
-        def of(names: Sequence[str], boxes: Mapping[str, Box], side: int = side) -> Array:
-            return np.array([boxes[name][side] for name in names], dtype=float)
-
-        x = of(states, span.boxes)
-        bound[own.nodes] = x[:, None]
-        bound[inner] = x[:, None, None]
-        bound[own.z] = of([v.name for v in model.z], span.boxes)[:, None]
-        inputs = [v.name for v in model.u]
-        u = np.tile(of(inputs, span.boxes)[:, None], (1, own.intervals))
-        meet = (np.maximum, np.minimum)[side]
-        for fraction, column in ((0.0, 0), (1.0, -1)):
-            u[:, column] = meet(u[:, column], of(inputs, span.inputs_at[fraction]))
-        bound[own.u] = meet(u, bound[own.u])  # shared inputs may be bounded in each scenario
-        for fraction, node in conditions[0].items():
-            bound[own.nodes[:, node]] = of(states, span.nodes[fraction])
-            for i, box in conditions[1].get(fraction, {}).items():
-                bound[own.nodes[i, node]] = box[side]
-        if isinstance(span.T, Free):
-            bound[own.T] = (span.T.lower, span.T.upper)[side]

@@ -9,27 +9,21 @@ fractions, like all parameters, are parameters of the program.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import final
+from functools import cached_property
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ocp.formulation.phase import Box, Free, Row
+from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
-from ocp.transcription.assembly import Slot, assemble
+from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.closed_loops import Closing, closing
-from ocp.transcription.collocation import (
-    PointEquations,
-    ends_of,
-    gaps,
-    pieces_of_points,
-    point_equations,
-)
+from ocp.transcription.collocation import PointEquations, gaps, piece_of_points, point_equations
 from ocp.transcription.conditions import (
-    AtNode,
-    AtStarts,
-    Between,
+    Maker,
     at_nodes,
     at_starts,
     between,
@@ -37,176 +31,24 @@ from ocp.transcription.conditions import (
     plain_links,
     whole,
 )
-from ocp.transcription.program import Program
-from ocp.transcription.schemes import (
-    Coefficients,
-    Scheme,
-    Shooting,
-    bounds_of,
-    check_meshes,
-    nodes_of,
+from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
+from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
+from ocp.transcription.shooting import Shot, pieces_of_intervals, shot
+from ocp.transcription.unknowns import (
+    Grid,
+    Layout,
+    Local,
+    Points,
+    SpanPoints,
+    data_of,
+    lay_out,
     scale_of,
 )
-from ocp.transcription.shooting import Shot, pieces_of_intervals, shot
-from ocp.transcription.transcription import LARGEST, Skeleton, Transcription, numbers_of
-from ocp.transcription.unknowns import Data, Layout, Local, Sizes, lay_out
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Equations:
-    """The equations of a problem at points and nodes, with derivatives.
-
-    Attributes:
-        problem, scheme: the problem and its scheme.
-        spans: for each phase the equations at its collocation points, or of its intervals.
-        closing: for each phase the constraints of its mechanism; None if it has none.
-        nodes: conditions at single nodes.
-        between: conditions between phases.
-        starts: conditions at the starts of all intervals.
-    """
-
-    problem: Problem
-    scheme: Scheme
-    spans: tuple[PointEquations | Shot, ...]
-    closing: tuple[Closing | None, ...]
-    nodes: tuple[AtNode, ...]
-    between: tuple[Between, ...]
-    starts: tuple[AtStarts, ...] = ()
-
-    @property
-    def released(self) -> list[dict[float, dict[int, Box]]]:
-        """For each phase: fraction of T -> states that follow from others -> their range."""
-        return [{} if part is None else part.released for part in self.closing]
-
-
-def _data(problem: Problem, p: ca.MX, meshes: Sequence[Array]) -> list[Data]:
-    """Return the parts of p that belong to each phase."""
-    found: list[Data] = []
-    first, phases = 0, len(problem.chain)
-    before = ca.MX(0)
-    for number, (span, mesh) in enumerate(zip(problem.spans, meshes, strict=True)):
-        n = len(span.model.p)
-        T = p[first + n]
-        before = before if number % phases else ca.MX(0)
-        found.append(
-            Data(p[first : first + n], T, before, p[first + n + 1 : first + n + 1 + mesh.size])
-        )
-        before = before if isinstance(span.T, Free) else before + T
-        first += n + 1 + mesh.size
-    return found
-
-
-def skeleton_of(
-    made: Equations, meshes: Sequence[Array], nodes: Sequence[Mapping[float, int]]
-) -> Skeleton:
-    """Assemble the program for the numbers of intervals of `meshes`."""
-    problem, scheme = made.problem, made.scheme.coefficients()
-    layout = _layout(made, scheme, meshes)
-    w = ca.MX.sym("w", layout.size)
-    p = ca.MX.sym("p", numbers_of(problem, meshes, {}).size)
-    data = _data(problem, p, meshes)
-    phases = len(problem.chain)
-    pieces = list(_pieces(made, layout, scheme, data, nodes))
-    scenarios = len(problem.spans) // phases
-    c = np.zeros(layout.size)
-    slots = [Slot()]
-    if problem.kind == "mean":
-        slots = [Slot(1.0 / scenarios)]
-    elif problem.kind == "worst":
-        slots = [Slot(0.0, len(pieces) + i) for i in range(scenarios)]
-        pieces = [replace(piece, slot=piece.span // phases) for piece in pieces]
-        pieces += largest(layout, scenarios, len(problem.spans), LARGEST)
-        c[layout.largest] = 1.0
-    assembled = assemble(w, p, pieces, slots, c)
-    lower_g, upper_g = np.zeros(assembled.g.numel()), np.zeros(assembled.g.numel())
-    for piece, at in zip(pieces, assembled.at, strict=True):
-        rows = piece.rows
-        lower_g[at], upper_g[at] = (
-            (bound / rows.scale)[:, None] for bound in (rows.lower, rows.upper)
-        )
-    program = Program(
-        w,
-        p,
-        assembled.f,
-        assembled.g,
-        assembled.gradient,
-        assembled.jacobian,
-        assembled.hessian,
-        *bounds_of(problem, layout, scheme, nodes, made.released),
-        lower_g,
-        upper_g,
-        values=np.zeros(0),
-        rows=(),
-        unknowns=(),
-        scale=scale_of(problem, layout),
-    )
-    return Skeleton(problem, layout, program, tuple(pieces), assembled, made.closing)
-
-
-def _layout(made: Equations, scheme: Coefficients, meshes: Sequence[Array]) -> Layout:
-    problem = made.problem
-    phases = len(problem.chain)
-    sizes: list[Sizes] = []
-    for number, (span, mesh) in enumerate(zip(problem.spans, meshes, strict=True)):
-        model = span.model
-        like = number % phases if number >= phases else -1
-        inputs, loops = [v.name for v in model.u], made.closing[number]
-        shared = [i for i, name in enumerate(inputs) if name in problem.shared_inputs]
-        sizes.append(
-            Sizes(
-                nx=len(model.x),
-                nz=len(model.z),
-                nu=len(inputs),
-                extra=0 if loops is None or not scheme.degree else 2 * loops.m,
-                intervals=mesh.size - 1,
-                free_time=isinstance(span.T, Free),
-                like=like,
-                shared=tuple(shared) if like >= 0 else (),
-            )
-        )
-    return lay_out(sizes, scheme.degree, len(problem.chosen), problem.kind == "worst")
-
-
-def _pieces(
-    made: Equations,
-    layout: Layout,
-    scheme: Coefficients,
-    data: Sequence[Data],
-    nodes: Sequence[Mapping[float, int]],
-) -> Iterator[Piece]:
-    """Yield the rows and costs of all phases."""
-    spans, phases = made.problem.spans, len(made.problem.chain)
-    for number, (span, equations) in enumerate(zip(spans, made.spans, strict=True)):
-        gap, loops = gaps(number, span, layout, scheme), made.closing[number]
-        if loops is not None:
-            yield from loops.pieces(layout, data[number], nodes[number], scheme.degree > 0)
-        if loops is not None and scheme.degree:
-            ends = ends_of(number, layout, scheme)
-            gap = loops.corrected(gap, ends, layout, scheme, data[number])
-        if isinstance(equations, Shot):
-            yield from pieces_of_intervals(number, equations, layout, gap, data[number])
-        else:
-            yield gap
-            yield pieces_of_points(number, equations, layout, scheme, data[number])
-        if number % phases:
-            loose = made.released[number].get(0.0, ())
-            yield from plain_links(number, spans[number - 1], span, layout, loose)
-    for condition in made.nodes:
-        number = condition.local.number
-        node = nodes[number][condition.fraction]
-        yield condition.piece(layout, scheme, data[number], node)
-    for condition in made.starts:
-        number = condition.local.number
-        if layout.spans[number].intervals > 1:
-            yield condition.piece(layout, scheme, data[number])
-    for condition in made.between:
-        yield condition.piece(layout, scheme, data)
-    yield from whole(made.problem, layout, made.released)
-
+from symfric.foundation.parameters import check_names
 
 KEPT = 4
 """Number of programs that a discretisation caches, for the most recent meshes."""
+LARGEST = "the largest cost"
 
 Key = tuple[tuple[int, ...], ...]
 
@@ -217,24 +59,20 @@ class Discretisation:
     """A problem with differentiated equations, to be put on meshes.
 
     Attributes:
-        equations: at points, at nodes and between phases.
-        made: common parts of programs, by numbers of intervals.
+        problem, scheme: the problem and its scheme.
+        spans: for each phase the equations at its collocation points, or of its intervals.
+        closing: for each phase the constraints of its mechanism; None if it has none.
+        conditions: at single nodes, at starts of intervals, and between phases.
     """
 
-    equations: Equations
-    made: dict[Key, Skeleton] = field(default_factory=dict[Key, Skeleton])
+    problem: Problem
+    scheme: Scheme
+    spans: tuple[PointEquations | Shot, ...]
+    closing: tuple[Closing | None, ...]
+    conditions: tuple[Maker, ...]
+    _made: dict[Key, Any] = field(default_factory=dict[Key, Any])
 
-    @property
-    def problem(self) -> Problem:
-        """The problem that was discretised."""
-        return self.equations.problem
-
-    @property
-    def scheme(self) -> Scheme:
-        """The scheme of the discretisation."""
-        return self.equations.scheme
-
-    def on(self, meshes: Sequence[Array]) -> Transcription:
+    def on(self, meshes: Sequence[Array]) -> "Transcription":
         """Return the program on `meshes`, one for each phase (see `make_meshes`).
 
         Meshes with the same numbers of intervals and the same nodes with conditions change only
@@ -244,14 +82,67 @@ class Discretisation:
             ValueError: invalid meshes.
         """
         problem = self.problem
-        given = check_meshes(problem, meshes)
-        nodes = [nodes_of(span, mesh) for span, mesh in zip(problem.spans, given, strict=True)]
-        key = tuple((mesh.size - 1, *at.values()) for mesh, at in zip(given, nodes, strict=True))
-        skeleton = self.made.pop(key, None) or skeleton_of(self.equations, given, nodes)
-        self.made[key] = skeleton  # the most recent one is last
-        for old in list(self.made)[:-KEPT]:
-            del self.made[old]
-        return Transcription(problem, self.scheme, given, skeleton)
+        meshes = check_meshes(problem, meshes)
+        nodes = [nodes_of(span, mesh) for span, mesh in zip(problem.spans, meshes, strict=True)]
+        key = tuple((mesh.size - 1, *at.values()) for mesh, at in zip(meshes, nodes, strict=True))
+        skeleton: Skeleton = self._made.pop(key, None) or self._skeleton(
+            [mesh.size - 1 for mesh in meshes], nodes
+        )
+        self._made[key] = skeleton  # the most recent one is last
+        for old in list(self._made)[:-KEPT]:
+            del self._made[old]
+        return Transcription(problem, self.scheme, meshes, skeleton)
+
+    def _skeleton(
+        self, intervals: Sequence[int], nodes: Sequence[Mapping[float, int]]
+    ) -> "Skeleton":
+        """Assemble the program for numbers of intervals."""
+        problem, scheme = self.problem, self.scheme.coefficients()
+        extra = [2 * part.m if part and scheme.degree else 0 for part in self.closing]
+        layout = lay_out(problem, scheme.degree, intervals, extra)
+        released = [part.released if part else {} for part in self.closing]
+        p = ca.MX.sym(
+            "p", sum(len(s.model.p) for s in problem.spans) + sum(intervals) + 2 * len(nodes)
+        )
+        grid = Grid(layout, scheme, data_of(problem, p, intervals), nodes, released)
+        w, c = ca.MX.sym("w", layout.size), np.zeros(layout.size)
+        pieces, phases = list(self._pieces(grid)), len(problem.chain)
+        scenarios = len(problem.spans) // phases
+        slots: list[Slot] = [(1.0 / scenarios if problem.kind == "mean" else 1.0, -1)]
+        if problem.kind == "worst":
+            slots = [(0.0, len(pieces) + i) for i in range(scenarios)]
+            pieces = [replace(piece, slot=piece.span // phases) for piece in pieces]
+            pieces += largest(layout, scenarios, len(problem.spans), LARGEST)
+            c[layout.largest] = 1.0
+        assembled = assemble(w, p, pieces, slots, c)
+        f, g, gradient, jacobian, hessian, rows_of = assembled
+        lower, upper = np.zeros(g.numel()), np.zeros(g.numel())
+        for piece, at in zip(pieces, rows_of, strict=True):
+            rows = piece.rows
+            lower[at], upper[at] = ((b / rows.scale)[:, None] for b in (rows.lower, rows.upper))
+        bounds, scale = bounds_of(problem, grid), scale_of(problem, layout)
+        program = Program(
+            w, p, f, g, gradient, jacobian, hessian, *bounds, lower, upper, np.zeros(0), scale
+        )  # fmt: skip
+        return Skeleton(problem, layout, program, tuple(pieces), assembled, self.closing)
+
+    def _pieces(self, grid: Grid) -> Iterator[Piece]:
+        """Yield the rows and costs of all phases."""
+        spans = self.problem.spans
+        for number, (span, equations) in enumerate(zip(spans, self.spans, strict=True)):
+            gap, loops = gaps(number, span, grid), self.closing[number]
+            if loops is not None:
+                yield from loops.pieces(grid)
+                gap = loops.corrected(gap, grid) if grid.scheme.degree else gap
+            if isinstance(equations, Shot):
+                yield from pieces_of_intervals(equations, gap, grid)
+            else:
+                yield gap
+                yield piece_of_points(equations, grid)
+            if span.phase:
+                yield from plain_links(number, spans[number - 1], span, grid)
+        yield from filter(None, (condition(grid) for condition in self.conditions))
+        yield from whole(self.problem, grid)
 
 
 def discretise(
@@ -266,15 +157,13 @@ def discretise(
             first one, with the inputs that begin there.
     """
     choices = {choice.name: choice.nominal for choice in problem.chosen}
-    phases = len(problem.chain)
     made: dict[tuple[object, ...], PointEquations | Shot] = {}
     spans: list[PointEquations | Shot] = []
     loops: list[Closing | None] = []
-    nodes: list[AtNode] = []
-    joined: list[Between] = []
+    nodes: list[Maker] = []
+    joined: list[Maker] = []
     for number, span in enumerate(problem.spans):
-        first = number - number % phases
-        earlier = tuple((i, problem.spans[i]) for i in range(first, number))
+        earlier = tuple((i, problem.spans[i]) for i in range(number - span.phase, number))
         local = Local(number, span, earlier, choices, not isinstance(scheme, Shooting))
         # scenarios differ in numbers only, which are parameters of the equations
         key = (span.phase, id(span.model), id(span.running), id(span.path))
@@ -282,20 +171,197 @@ def discretise(
             shooting = isinstance(scheme, Shooting)
             made[key] = shot(local, scheme) if shooting else point_equations(local)
         spans.append(replace(made[key], local=local))
-        ends = () if earlier else problem.periodic
-        named = problem.chain[span.phase].start
-        loops.append(closing(local, earlier[-1][1] if earlier else None, ends, named))
+        periodic, named = () if earlier else problem.periodic, problem.chain[span.phase].start
+        loops.append(closing(local, earlier[-1][1] if earlier else None, periodic, named))
         nodes += at_nodes(local)
         if earlier:
             joined += between(spans[-2].local, local)
-    held = tuple(at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows)
-    equations = Equations(
-        problem=problem,
-        scheme=scheme,
-        spans=tuple(spans),
-        closing=tuple(loops),
-        nodes=tuple(nodes),
-        between=tuple(joined),
-        starts=held,
-    )
-    return Discretisation(equations)
+    nodes += [at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows]
+    return Discretisation(problem, scheme, tuple(spans), tuple(loops), (*nodes, *joined))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The part common to programs on meshes with the same numbers of intervals.
+
+    Attributes:
+        problem: the problem.
+        layout: places of the unknowns in w.
+        program: without values of parameters and names of rows and unknowns.
+        pieces, assembled: rows and costs, and their places in the program.
+        closing: for each phase the constraints of its mechanism; None if it has none.
+    """
+
+    problem: Problem
+    layout: Layout
+    program: Program
+    pieces: tuple[Piece, ...]
+    assembled: Assembled
+    closing: tuple[Closing | None, ...]
+
+    @cached_property
+    def structure(self) -> tuple[Stages | None, str]:
+        """Stages, or None and the reason."""
+        equality = self.program.lower_g == self.program.upper_g
+        return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
+
+    @cached_property
+    def largest(self) -> list[int]:
+        """Rows that bound the costs of the scenarios, if the largest counts."""
+        pairs = zip(self.pieces, self.assembled.at, strict=True)
+        return [int(at[0, 0]) for piece, at in pairs if piece.names == (LARGEST,)]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    """A problem on meshes: the nonlinear program, and its conversion to named values.
+
+    Attributes:
+        problem, scheme: the problem and its scheme.
+        meshes: for each phase, fractions of T that bound the intervals.
+        skeleton: common part of meshes with the same numbers of intervals.
+        program: for a solver.
+    """
+
+    problem: Problem
+    scheme: Scheme
+    meshes: tuple[Array, ...]
+    skeleton: Skeleton
+
+    @cached_property
+    def program(self) -> Program:
+        """The program for a solver."""
+        return replace(
+            self.skeleton.program,
+            values=self.values(),
+            places=lambda: (self.rows, self.unknowns),
+            structure=lambda: self.skeleton.structure,
+        )
+
+    @property
+    def layout(self) -> Layout:
+        """Places of the unknowns in w."""
+        return self.skeleton.layout
+
+    def pack(self, points: Points) -> Array:
+        """Return the vector w of `points`; shared values are those of the first phase."""
+        w = np.zeros(self.layout.size)
+        for span, own in zip(points.spans[::-1], self.layout.spans[::-1], strict=True):
+            w[own.nodes], w[own.inner] = span.nodes, span.inner
+            w[own.z], w[own.u] = span.z, span.u
+            if own.T >= 0:
+                w[own.T] = span.T
+        for column, choice in zip(self.layout.chosen, self.problem.chosen, strict=True):
+            w[column] = points.chosen.get(choice.name, choice.guess)
+        w /= self.program.scale
+        if self.layout.largest >= 0:
+            g = np.asarray(self.program.jacobian(w, self.program.values)[0]).ravel()
+            w[self.layout.largest] = g[self.skeleton.largest].max()
+        return w
+
+    def unpack(self, w: ArrayLike) -> Points:
+        """Return the points of the vector `w` in SI units."""
+        values = np.asarray(w, dtype=float).ravel() * self.program.scale
+        spans = tuple(
+            SpanPoints(
+                float(values[own.T]) if own.T >= 0 else limits(span.T)[0],
+                *(values[columns] for columns in (own.nodes, own.inner, own.z, own.u)),
+            )
+            for span, own in zip(self.problem.spans, self.layout.spans, strict=True)
+        )
+        names = [choice.name for choice in self.problem.chosen]
+        return Points(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
+
+    def consistent(self, points: Points) -> Points:
+        """Return `points` with mechanisms moved onto their constraints."""
+        spans = [
+            span if loops is None else loops.consistent(span, mesh, self.inner_fractions(number))
+            for number, (span, mesh, loops) in enumerate(
+                zip(points.spans, self.meshes, self.skeleton.closing, strict=True)
+            )
+        ]
+        return replace(points, spans=tuple(spans))
+
+    def when(self, w: Array, place: Place) -> str:
+        """Return the time of a place as text, with its phase and scenario if there are several."""
+        problem, span = self.problem, self.problem.spans[place.span]
+        words: list[str] = []
+        if np.isfinite(place.fraction):
+            durations = [part.T for part in self.unpack(w).spans]
+            begin = sum(durations[place.span - span.phase : place.span])
+            words.append(f"at t = {begin + place.fraction * durations[place.span]:.4g} s")
+        if len(problem.chain) > 1:
+            words.append(f"in {span.name}")
+        if problem.scenario_names:
+            words.append(f"of scenario {problem.scenario_names[span.scenario]}")
+        return " ".join(words)
+
+    def inner_fractions(self, span: int) -> Array:
+        """Return the collocation points of a phase as fractions of T, shape (N d,)."""
+        mesh, nodes = self.meshes[span], self.scheme.coefficients().nodes[1:]
+        inner = mesh[:-1, None] + np.diff(mesh)[:, None] * nodes
+        if nodes.size and nodes[-1] == 1.0:
+            inner[:, -1] = mesh[1:]
+        return inner.ravel()
+
+    def fractions(self, span: int) -> Array:
+        """Return nodes and collocation points of a phase as increasing fractions of T."""
+        return np.unique(np.concatenate([self.meshes[span], self.inner_fractions(span)]))
+
+    def values(self, p: Mapping[str, float] | None = None) -> Array:
+        """Return the values [p, T, mesh] of each phase: those of the parameters of the program.
+
+        Args:
+            p: parameters of the models by name, in all phases that have them, instead of those of
+                the problem, also in scenarios.
+
+        Raises:
+            ValueError: an unknown name.
+        """
+        spans, given = self.problem.spans, p or {}
+        check_names("values", given, sorted({v.name for s in spans for v in s.model.p}))
+        parts: list[ArrayLike] = []
+        for span, mesh in zip(spans, self.meshes, strict=True):
+            own = [given.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
+            parts += [np.asarray(own), [1.0 if isinstance(span.T, Free) else span.T], mesh]
+        return np.concatenate([np.asarray(part, dtype=float) for part in parts])
+
+    @cached_property
+    def rows(self) -> list[Place]:
+        """Names and places of all rows of the program."""
+        places = [Place("", 0, 0.0)] * self.skeleton.program.g.numel()
+        for piece, at in zip(self.skeleton.pieces, self.skeleton.assembled.at, strict=True):
+            mesh = self.meshes[piece.span]
+            fractions = mesh[piece.interval] + np.diff(mesh)[piece.interval] * piece.offset
+            for name, scale, numbers in zip(piece.names, piece.rows.scale, at, strict=True):
+                for k, fraction in zip(numbers.tolist(), fractions.tolist(), strict=True):
+                    places[k] = Place(name, piece.span, fraction, float(scale))
+        return places
+
+    @cached_property
+    def unknowns(self) -> list[Place]:
+        """Names and places of all unknowns of the program; shared ones belong to the first span."""
+        scale = self.program.scale.tolist()
+        places = [Place(LARGEST, 0, np.nan)] * self.layout.size
+        for number, (span, own) in reversed(
+            [*enumerate(zip(self.problem.spans, self.layout.spans, strict=True))]
+        ):
+            mesh, inner = self.meshes[number], self.inner_fractions(number)
+            groups = _names(span, own.extra.shape[0]), (mesh, inner, inner, mesh[:-1], mesh[:-1])
+            for names, columns, at in zip(groups[0], own[1:], groups[1], strict=True):
+                for name, row in zip(names, columns.tolist(), strict=True):
+                    for k, fraction in zip(row, at.tolist(), strict=True):
+                        places[k] = Place(name, number, fraction, scale[k])
+            if own.T >= 0:
+                places[own.T] = Place("T", number, np.nan, scale[own.T])
+        for k, choice in zip(self.layout.chosen.tolist(), self.problem.chosen, strict=True):
+            places[k] = Place(choice.name, 0, np.nan, scale[k])
+        return places
+
+
+def _names(span: Span, extra: int) -> list[list[str]]:
+    """Return names of nodes, inner points, algebraic variables, inputs and extra unknowns."""
+    x, z, u = ([v.name for v in getattr(span.model, letter)] for letter in "xzu")
+    return [x, x, z, u, [f"correction {k + 1}" for k in range(extra)]]

@@ -3,13 +3,15 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.phase import Free, Span
+from ocp.formulation.phase import Box, Free, Span, initial
+from ocp.formulation.problem import Problem
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, select
+from ocp.transcription.schemes import Coefficients
 from symfric.foundation.variable import stacked
 
 
@@ -47,9 +49,7 @@ class Points:
     chosen: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class SpanLayout:
+class SpanLayout(NamedTuple):
     """Places of the unknowns of one phase in w; shared ones belong to another phase.
 
     Attributes:
@@ -75,16 +75,20 @@ class SpanLayout:
         """Number of collocation points of an interval."""
         return self.inner.shape[1] // self.intervals
 
-    def points_of(self, interval: int) -> Indices:
-        """Return the states that define the polynomial of an interval, shape (nx, d + 1)."""
-        d = self.degree
-        inner = self.inner[:, interval * d : (interval + 1) * d]
-        return np.column_stack([self.nodes[:, interval], inner])
+    @property
+    def carrying(self) -> Indices:
+        """Columns of the states that define the polynomial of each interval, (nx, d + 1, N)."""
+        inner = self.inner.reshape(self.inner.shape[0], self.intervals, self.degree)
+        return np.concatenate([self.nodes[:, :-1, None], inner], axis=2).transpose(0, 2, 1)
+
+    def ends(self, scheme: Coefficients) -> tuple[Indices, Array]:
+        """Return columns and weights (nx, terms, N) of the states at the ends of all intervals."""
+        kept = np.flatnonzero(scheme.ends)  # the others are zero
+        columns = self.carrying[:, kept]
+        return columns, np.broadcast_to(scheme.ends[kept, None], columns.shape)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Layout:
+class Layout(NamedTuple):
     """Order of the unknowns, by time within each phase.
 
         w = [x_0, (u_1, (x, z)_11 ... (x, z)_1d, extra_1), x_1, ..., x_N, T] for each phase,
@@ -103,231 +107,65 @@ class Layout:
     size: int
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Sizes:
-    """Numbers of unknowns of one phase: states, algebraic variables, inputs, extra per interval.
+def lay_out(
+    problem: Problem, degree: int, intervals: Sequence[int], extra: Sequence[int]
+) -> Layout:
+    """Return places of all unknowns in one vector, by phase and interval.
 
-    Attributes:
-        intervals: number of intervals N.
-        like: index of the phase with the same duration and inputs; -1 if there is none.
-        shared: rows of the inputs that are the same as in phase `like`.
+    Args:
+        problem: the problem.
+        degree: number of collocation points of an interval.
+        intervals: their number in each phase.
+        extra: number of additional unknowns of an interval of each phase.
     """
-
-    nx: int
-    nz: int
-    nu: int
-    extra: int
-    intervals: int
-    free_time: bool
-    like: int = -1
-    shared: tuple[int, ...] = ()
-
-
-def lay_out(sizes: Sequence[Sizes], degree: int, chosen: int, largest: bool) -> Layout:
-    """Return places of all unknowns in one vector, by phase and interval."""
     spans: list[SpanLayout] = []
-    first = 0
-    for s in sizes:
-        own = [i for i in range(s.nu) if i not in s.shared]
-        xz = s.nx + s.nz
-        width = len(own) + degree * xz + s.extra + s.nx
-        starts = first + s.nx + width * np.arange(s.intervals)
+    first, phases = 0, len(problem.chain)
+    for number, (span, N, more) in enumerate(zip(problem.spans, intervals, extra, strict=True)):
+        model, alike = span.model, spans[number % phases] if number >= phases else None
+        nx, nz, nu = len(model.x), len(model.z), len(model.u)
+        shared = [i for i, v in enumerate(model.u) if alike and v.name in problem.shared_inputs]
+        own = [i for i in range(nu) if i not in shared]
+        after = len(own) + degree * (nx + nz)
+        starts = first + nx + (after + more + nx) * np.arange(N)
 
         def at(offset: int, count: int, starts: Indices = starts) -> Indices:
             return offset + np.arange(count)[:, None] + starts[None, :]
 
-        points = (starts[:, None] + len(own) + xz * np.arange(degree)).ravel()
-        u = np.empty((s.nu, s.intervals), np.int64)
+        points = (starts[:, None] + len(own) + (nx + nz) * np.arange(degree)).ravel()
+        nodes = np.hstack([first + np.arange(nx)[:, None], at(after + more, nx)])
+        u = np.empty((nu, N), np.int64)
         u[own] = at(0, len(own))
-        after = len(own) + degree * xz
-        start = first + np.arange(s.nx)[:, None]
-        first += s.nx + width * s.intervals
-        duration = first if s.free_time else -1
-        if s.like >= 0:
-            u[list(s.shared)] = spans[s.like].u[list(s.shared)]
-            duration = spans[s.like].T
-        first += s.free_time and s.like < 0
-        spans.append(
-            SpanLayout(
-                duration,
-                np.hstack([start, at(after + s.extra, s.nx)]),
-                at(0, s.nx, points),
-                at(s.nx, s.nz, points),
-                u,
-                at(after, s.extra),
-            )
-        )
-    parameters = first + np.arange(chosen)
-    first += chosen
-    return Layout(tuple(spans), parameters, first if largest else -1, first + largest)
-
-
-Columns = Indices | tuple[Indices, Array]
-"""(k, places) columns, or columns and weights (k, terms, places); see `blocks.select`."""
+        first += nodes.shape[1] * nx + N * (after + more)
+        duration = first if isinstance(span.T, Free) else -1
+        if alike:
+            u[shared], duration = alike.u[shared], alike.T
+        else:
+            first += duration >= 0
+        inner, z = at(0, nx, points), at(nx, nz, points)
+        spans.append(SpanLayout(duration, nodes, inner, z, u, at(after, more)))
+    chosen = first + np.arange(len(problem.chosen))
+    first, worst = first + chosen.size, problem.kind == "worst"
+    return Layout(tuple(spans), chosen, first if worst else -1, first + worst)
 
 
 def time_scale(span: Span) -> float:
-    """Return the magnitude of a free duration [s]."""
+    """Return the magnitude of a free duration [s]; 1 for a fixed one."""
     return span.T.start if isinstance(span.T, Free) else 1.0
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Local:
-    """Local unknowns v and parameters theta of a phase at one time, as SX symbols.
-
-        v = (x, z, u, T if free, free time before, chosen p),  scaled except the time before
-        theta = (p, T, fixed time before, length h of the interval and the place as fractions of T,
-                 quadrature weight)
-
-    Attributes:
-        number: index of the phase.
-        span: the phase.
-        before: indices and phases of the same scenario before it.
-        choices: names of all chosen parameters of the problem, and their magnitudes.
-        inner: whether there are collocation points, and algebraic variables with them.
-    """
-
-    number: int
-    span: Span
-    before: tuple[tuple[int, Span], ...]
-    choices: Mapping[str, float]
-    inner: bool = True
-    x: ca.SX = field(init=False)
-    z: ca.SX = field(init=False)
-    u: ca.SX = field(init=False)
-    rest: ca.SX = field(init=False)
-    theta: ca.SX = field(init=False)
-
-    def __post_init__(self) -> None:
-        model = self.span.model
-        for letter in "xzu":
-            count = len(getattr(model, letter)) if self.inner or letter != "z" else 0
-            symbol = ca.SX.sym(letter, count)
-            object.__setattr__(self, letter, symbol)
-        rest = self.free + bool(self.free_before) + len(self.span.chosen)
-        object.__setattr__(self, "rest", ca.SX.sym("rest", rest))
-        object.__setattr__(self, "theta", ca.SX.sym("theta", len(model.p) + 5))
-
-    @property
-    def free(self) -> bool:
-        """True if the duration is free."""
-        return isinstance(self.span.T, Free)
-
-    @property
-    def free_before(self) -> list[tuple[int, Span]]:
-        """Phases before it with a free duration."""
-        return [(i, span) for i, span in self.before if isinstance(span.T, Free)]
-
-    @property
-    def v(self) -> ca.SX:
-        """All local unknowns, SX (n, 1)."""
-        return ca.vertcat(self.x, self.z, self.u, self.rest)
-
-    @property
-    def T(self) -> ca.SX:
-        """Duration [s]."""
-        return self.rest[0] * time_scale(self.span) if self.free else self.theta[-5]
-
-    @property
-    def h(self) -> ca.SX:
-        """Length of the interval [s]."""
-        return self.theta[-3] * self.T
-
-    @property
-    def weight(self) -> ca.SX:
-        """Quadrature weight of the point [s]."""
-        return self.theta[-1] * self.T
-
-    @property
-    def t(self) -> ca.SX:
-        """Time since the start of the problem [s]."""
-        t = self.theta[-4] + self.theta[-2] * self.T
-        return t + self.rest[int(self.free)] if self.free_before else t
-
-    @property
-    def p(self) -> ca.SX:
-        """Parameters of the model, (n_p, 1)."""
-        chosen = self.span.chosen
-        first = self.rest.numel() - len(chosen)
-        return stacked(
-            self.rest[first + chosen.index(v.name)] * self.choices[v.name]
-            if v.name in chosen
-            else self.theta[i]
-            for i, v in enumerate(self.span.model.p)
-        )
-
-    @cached_property
-    def values(self) -> list[ca.SX]:
-        """[t, x, z, u, p] in SI units: arguments of Functions of the model."""
-        model = self.span.model
-        x, z, u = (getattr(self, letter) for letter in "xzu")
-        x, u = x * ca.DM(model.nominal("x")), u * ca.DM(model.nominal("u"))
-        z = z * ca.DM(model.nominal("z")) if self.inner else ca.SX.zeros(len(model.z))
-        return [self.t, x, z, u, self.p]
-
-    def columns(
-        self, layout: Layout, x: Columns, z: Columns, u: Columns, places: int
-    ) -> list[Columns]:
-        """Return parts of `blocks.select` for v, with given columns of x, z and u at `places`."""
-        parts: list[Columns] = [x, z, u] if self.inner else [x, u]
-        if self.free:
-            parts.append(np.full((1, places), layout.spans[self.number].T))
-        if self.free_before:
-            shape = (1, len(self.free_before), places)
-            earlier = np.array([layout.spans[i].T for i, _ in self.free_before])
-            scales = np.array([time_scale(span) for _, span in self.free_before])
-            parts.append((_spread(earlier, shape), np.broadcast_to(scales[None, :, None], shape)))
-        if self.span.chosen:
-            names = list(self.choices)
-            rows = layout.chosen[[names.index(name) for name in self.span.chosen]]
-            parts.append(np.tile(rows[:, None], (1, places)))
-        return parts
-
-    def piece(
-        self,
-        rows: Rows,
-        made: Block,
-        parts: Sequence[Columns],
-        data: "Data",
-        at: tuple[Indices, Array],
-        order: Indices,
-        weights: Array | None = None,
-        linear: Linear | None = None,
-    ) -> Piece:
-        """Return the piece of a block of these local unknowns.
-
-        Args:
-            rows: its rows.
-            parts: columns of the local unknowns, see `columns`.
-            data: parameters of the phase.
-            at: interval and offset of each place.
-            order: of the rows.
-            weights: of a quadrature on an interval of length 1, at each place.
-            linear: part of the rows.
-        """
-        interval, offset = at
-        return Piece(
-            rows=rows,
-            order=order,
-            span=self.number,
-            interval=interval,
-            offset=offset,
-            block=made,
-            selection=select(parts, interval.size),
-            theta=data.theta(interval, offset, weights),
-            linear=linear,
-        )
+def scale_of(problem: Problem, layout: Layout) -> Array:
+    """Return SI values of the unknowns divided by w, shape (n,)."""
+    scale = np.ones(layout.size)
+    for span, own in zip(problem.spans, layout.spans, strict=True):
+        for letter, columns in (("x", own.nodes), ("x", own.inner), ("z", own.z), ("u", own.u)):
+            scale[columns] = span.model.nominal(letter)[:, None]
+        if own.T >= 0:
+            scale[own.T] = time_scale(span)
+    scale[layout.chosen] = [choice.nominal for choice in problem.chosen]
+    return scale
 
 
-def _spread(values: Indices, shape: tuple[int, int, int]) -> Indices:
-    return np.broadcast_to(values[None, :, None], shape)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Data:
+class Data(NamedTuple):
     """Parameters of the program that belong to one phase, MX.
 
     Attributes:
@@ -353,3 +191,186 @@ class Data:
         h = self.mesh[(interval + 1).tolist()].T - start
         common = ca.repmat(ca.vertcat(self.p, self.T, self.before), 1, places)
         return ca.vertcat(common, h, start + ca.DM(offset).T * h, ca.DM(weights).T * h)
+
+
+class Grid(NamedTuple):
+    """Common data of all pieces of a program.
+
+    Attributes:
+        layout: places of the unknowns.
+        scheme: coefficients on an interval.
+        data: parameters of each phase.
+        nodes: for each phase, index of the node at each fraction of T with conditions.
+        released: for each phase, fraction of T -> states that follow from others -> their range.
+    """
+
+    layout: Layout
+    scheme: Coefficients
+    data: Sequence[Data]
+    nodes: Sequence[Mapping[float, int]]
+    released: Sequence[Mapping[float, Mapping[int, Box]]]
+
+
+def data_of(problem: Problem, p: ca.MX, intervals: Sequence[int]) -> list[Data]:
+    """Return the parts of p = [p, T, mesh] of each phase that belong to it."""
+    data: list[Data] = []
+    first, before = 0, ca.MX(0)
+    for number, (span, N) in enumerate(zip(problem.spans, intervals, strict=True)):
+        n = first + len(span.model.p)
+        before = before if number % len(problem.chain) else ca.MX(0)
+        data.append(Data(p[first:n], p[n], before, p[n + 1 : n + N + 2]))
+        before = before if isinstance(span.T, Free) else before + p[n]
+        first = n + N + 2
+    return data
+
+
+Columns = Indices | tuple[Indices, Array]
+"""(k, places) columns, or columns and weights (k, terms, places); see `blocks.select`."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Local:
+    """Local unknowns v and parameters theta of a phase at one time, as SX symbols.
+
+        v = (x, z, u, T if free, free time before, chosen p),  scaled except the time before
+        theta = (p, T, fixed time before, length h of the interval and the place as fractions of T,
+                 quadrature weight)
+
+    Attributes:
+        number: index of the phase.
+        span: the phase.
+        before: indices and phases of the same scenario before it.
+        choices: names of all chosen parameters of the problem, and their magnitudes.
+        inner: whether there are collocation points, and algebraic variables with them.
+    """
+
+    number: int
+    span: Span
+    before: tuple[tuple[int, Span], ...]
+    choices: Mapping[str, float]
+    inner: bool = True
+
+    @cached_property
+    def free_before(self) -> list[tuple[int, Span]]:
+        """Phases before it with a free duration."""
+        return [(i, span) for i, span in self.before if isinstance(span.T, Free)]
+
+    @property
+    def free(self) -> bool:
+        """True if the duration is free."""
+        return isinstance(self.span.T, Free)
+
+    @cached_property
+    def symbols(self) -> dict[str, ca.SX]:
+        """x, z, u, the rest of v, and theta."""
+        model = self.span.model
+        rest = self.free + bool(self.free_before) + len(self.span.chosen)
+        sizes = {"x": len(model.x), "z": len(model.z) if self.inner else 0, "u": len(model.u)}
+        sizes |= {"rest": rest, "theta": len(model.p) + 5}
+        return {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+
+    @property
+    def theta(self) -> ca.SX:
+        """Local parameters, SX (k, 1)."""
+        return self.symbols["theta"]
+
+    @property
+    def v(self) -> ca.SX:
+        """All local unknowns, SX (n, 1)."""
+        return ca.vertcat(*(self.symbols[name] for name in ("x", "z", "u", "rest")))
+
+    @property
+    def T(self) -> ca.SX:
+        """Duration [s]."""
+        return self.symbols["rest"][0] * time_scale(self.span) if self.free else self.theta[-5]
+
+    @property
+    def h(self) -> ca.SX:
+        """Length of the interval [s]."""
+        return self.theta[-3] * self.T
+
+    @property
+    def weight(self) -> ca.SX:
+        """Quadrature weight of the point [s]."""
+        return self.theta[-1] * self.T
+
+    @cached_property
+    def values(self) -> list[ca.SX]:
+        """[t, x, z, u, p] in SI units: arguments of Functions of the model."""
+        model, chosen, symbols = self.span.model, self.span.chosen, self.symbols
+        rest, theta = symbols["rest"], symbols["theta"]
+        t = theta[-4] + theta[-2] * self.T
+        t = t + rest[int(self.free)] if self.free_before else t
+        x, u = (symbols[letter] * ca.DM(model.nominal(letter)) for letter in "xu")
+        z = symbols["z"] * ca.DM(model.nominal("z")) if self.inner else ca.SX.zeros(len(model.z))
+        first = rest.numel() - len(chosen)
+        p = stacked(
+            rest[first + chosen.index(v.name)] * self.choices[v.name]
+            if v.name in chosen
+            else theta[i]
+            for i, v in enumerate(model.p)
+        )
+        return [t, x, z, u, p]
+
+    def columns(self, layout: Layout, x: Columns, z: Columns, u: Indices) -> list[Columns]:
+        """Return parts of `blocks.select` for v, with given columns of x, z and u."""
+        places = u.shape[1]
+        parts: list[Columns] = [x, z, u] if self.inner else [x, u]
+        if self.free:
+            parts.append(np.full((1, places), layout.spans[self.number].T))
+        if self.free_before:
+            shape = (1, len(self.free_before), places)
+            earlier = np.array([layout.spans[i].T for i, _ in self.free_before])
+            scales = np.array([initial(span.T) for _, span in self.free_before])
+            parts.append(
+                (
+                    np.broadcast_to(earlier[None, :, None], shape),
+                    np.broadcast_to(scales[None, :, None], shape),
+                )
+            )
+        if self.span.chosen:
+            names = list(self.choices)
+            rows = layout.chosen[[names.index(name) for name in self.span.chosen]]
+            parts.append(np.tile(rows[:, None], (1, places)))
+        return parts
+
+    def piece(
+        self,
+        grid: Grid,
+        rows: Rows,
+        made: Block,
+        columns: tuple[Columns, Columns, Indices],
+        at: tuple[Indices, Array],
+        order: Indices,
+        *,
+        extra: Sequence[Columns] = (),
+        weights: Array | None = None,
+        linear: Linear | None = None,
+    ) -> Piece:
+        """Return the piece of a block of these local unknowns.
+
+        Args:
+            grid: of the program.
+            rows: names, sizes and ranges of its rows.
+            made: the block.
+            columns: of x, z and u at all places.
+            at: interval and offset of each place.
+            order: of the rows.
+            extra: columns of further local unknowns of the block, after v.
+            weights: of a quadrature on an interval of length 1, at each place.
+            linear: part of the rows.
+        """
+        interval, offset = at
+        parts = [*self.columns(grid.layout, *columns), *extra]
+        return Piece(
+            rows=rows,
+            order=order,
+            span=self.number,
+            interval=interval,
+            offset=offset,
+            block=made,
+            selection=select(parts, interval.size),
+            theta=grid.data[self.number].theta(interval, offset, weights),
+            linear=linear,
+        )

@@ -31,7 +31,7 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 from symfric.laws import BrownMcPhee
 from symfric.model import Model
 from symfric.scenes import Rabinowicz

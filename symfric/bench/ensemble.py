@@ -19,7 +19,7 @@ from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built
 from symfric.integrator.simulate import simulate
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model
 from symfric.scenes import FourBar, Pendulum, SliderCrank, rabinowicz

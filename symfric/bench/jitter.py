@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench.report import Found, Progress, Report, curves
-from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.blocks import corrected
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
@@ -118,7 +118,7 @@ class _Runs:
         y = step.mapaccum("run", count)(self.y0, np.full((1, count), h), d).full()
         every = max(1, round(1e-3 / h))
         samples = np.hstack([self.y0[:, None], y[:, every - 1 :: every]])
-        accelerations = refinement(self.whole).map(samples.shape[1])(samples, 0).full()
+        accelerations = corrected(self.whole).map(samples.shape[1])(samples, 0).full()
         offset = self.whole.nx - len(self.model.x) // 2
         return [variation(accelerations[offset + i]) for i in self.rows]
 
@@ -128,7 +128,7 @@ def runge_kutta_4(whole: System) -> ca.Function:
     stage.
     """
     y, h, d = ca.SX.sym("y", whole.n), ca.SX.sym("h"), ca.SX.sym("d", whole.d.numel())
-    refine, f = refinement(whole), ca.Function("f", [whole.y, whole.d], [whole.f])
+    refine, f = corrected(whole), ca.Function("f", [whole.y, whole.d], [whole.f])
     nx = whole.nx
 
     def at(k: ca.SX, part: float) -> ca.SX:

@@ -22,7 +22,7 @@ from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.engine import c_source
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.simulate import simulate
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 from symfric.laws import BrownMcPhee, Law, SelfTuning, Viscous
 from symfric.model import Model
 from symfric.model.kinds import RATE

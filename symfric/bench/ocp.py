@@ -202,7 +202,7 @@ def landed(problem: Problem, attempt: Attempt, *, exact: bool = False, rtol: flo
                 else float(np.mean(span.nodes[0.0][v.name]))
                 for v in span.model.x
             },
-            "u": {n: Hold(held_from, np.clip(u, *span.box(n))) for n, u in controls.items()},
+            "u": {n: Hold(held_from, np.clip(u, *span.boxes[n])) for n, u in controls.items()},
             "p": {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)},
             "t_eval": clock + T * np.array(times),
             "rtol": rtol,

@@ -173,7 +173,7 @@ def _collocated(
         x = o.variable(len(model.x))
         o.set_initial(x, guess(s))
         for i, v in enumerate(model.x):
-            _bound(o, x[i], *span.box(v.name))
+            _bound(o, x[i], *span.boxes[v.name])
         return x
 
     x = state(0.0)
@@ -189,7 +189,7 @@ def _collocated(
         u = o.variable(len(model.u))
         inputs.append(u)
         for i, v in enumerate(model.u):
-            _bound(o, u[i], *span.box(v.name))
+            _bound(o, u[i], *span.boxes[v.name])
         nodes = [x, *(state((k + s) / N) for s in tau[1:])]
         for j in range(1, DEGREE + 1):
             z = o.variable(len(model.z)) if model.z else ca.MX(0, 1)
@@ -226,7 +226,7 @@ def _meet(o: ca.Opti, span: Span, s: float, x: ca.MX) -> None:
     linked = {link.state for link in span.links} if s == 0.0 else set[str]()
     for i, v in enumerate(span.model.x):
         low, high = span.nodes[s][v.name]
-        if v.name not in linked and (low, high) != span.box(v.name):
+        if v.name not in linked and (low, high) != span.boxes[v.name]:
             _bound(o, x[i], low, high)
 
 
@@ -259,7 +259,7 @@ def rockit(problem: Problem, intervals: int) -> Attempt:
         stage.set_der(x, rate)
         stage.add_objective(stage.integral(running))
         for v, symbol in zip((*model.x, *model.u), ca.vertsplit(ca.vertcat(x, u)), strict=True):
-            low, high = span.box(v.name)
+            low, high = span.boxes[v.name]
             if isfinite(low) and isfinite(high):
                 stage.subject_to(low <= (symbol <= high))
         guess, at = straight(span), np.linspace(0, 1, each + 1)

@@ -202,9 +202,9 @@ def page(choice: Ranking) -> str:
 
 def body(choice: Ranking, width: int = 640) -> str:
     """Return verdict, picture and tables, for a page or a notebook."""
-    said = [*choice.verdict, *interruption(choice)]
+    sentences = [*choice.verdict, *interruption(choice)]
     parts = [
-        html.verdict("good" if choice.ranked else "bad", "", said),
+        html.verdict("good" if choice.ranked else "bad", "", sentences),
         f"<p>{_image(choice, width)}</p>",
     ]
     if choice.placed:

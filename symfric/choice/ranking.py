@@ -198,34 +198,30 @@ class Ranking:
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Recommended laws and reasons, for simulation, optimal control and a controller."""
-        return verdict(self.rows, self.needs, self.accuracy, self.control)
+        """Sentences on simulation, optimal control, a controller, and the laws left out."""
+        if not self.rows:
+            return ("Nothing was measured.",)
+        shown = " and ".join(self.needs) or "friction"
+        if ranked := self.ranked:
+            uses = _simulation(ranked, shown), _smooth(ranked), _controller(ranked, self.control)
+        else:
+            near = [row for row in self.rows if row.standing == INACCURATE]
+            best = min(near, key=lambda row: row.error, default=None)
+            nearest = f"; {best.called} comes nearest, {best.reason}" if best else ""
+            uses = (f"No law shows {shown} and keeps {self.accuracy:g}{nearest}.",)
+        standings = [row.standing for row in self.rows]
+        left = [f"{standings.count(name)} {text}" for name, text in LEFT_OUT if name in standings]
+        out = f"Left out of {len(self.rows)}: {_listed(left)}." if left else "None is left out."
+        return *uses, out
 
 
-def verdict(
-    rows: Sequence[Row], needs: Sequence[str], accuracy: float, control: float
-) -> tuple[str, ...]:
-    """Return sentences on simulation, optimal control, a controller, and the laws left out."""
-    if not rows:
-        return ("Nothing was measured.",)
-    ranked = [row for row in rows if row.ranked]
-    shown = " and ".join(needs) or "friction"
-    if ranked:
-        sentences = [_simulation(ranked, shown), _smooth(ranked), _controller(ranked, control)]
-    else:
-        near = [row for row in rows if row.standing == INACCURATE]
-        best = min(near, key=lambda row: row.error, default=None)
-        nearest = f"; {best.called} comes nearest, {best.reason}" if best else ""
-        sentences = [f"No law shows {shown} and keeps {accuracy:g}{nearest}."]
-    reasons = {
-        LACKING: "for what they show",
-        INACCURATE: "that do not keep the accuracy",
-        FAILED: "whose run fails",
-        REFUSED: "that do not fit into this machine",
-    }
-    counts = {text: sum(row.standing == name for row in rows) for name, text in reasons.items()}
-    out = _listed([f"{count} {text}" for text, count in counts.items() if count])
-    return *sentences, f"Left out of {len(rows)}: {out}." if out else "None is left out."
+LEFT_OUT = (
+    (LACKING, "for what they show"),
+    (INACCURATE, "that do not keep the accuracy"),
+    (FAILED, "whose run fails"),
+    (REFUSED, "that do not fit into this machine"),
+)
+"""Standings of laws that are not ranked, and the reason in words."""
 
 
 def _simulation(ranked: Sequence[Row], shown: str) -> str:

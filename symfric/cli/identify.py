@@ -13,14 +13,13 @@ from typing import Any
 import typer
 
 from identification.data.dataset import Dataset
-from identification.fit import Fit
+from identification.fit import Fit, findings_of
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
-from identification.starts.start import findings_of
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status

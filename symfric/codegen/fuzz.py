@@ -92,7 +92,7 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
         done = finished([target, str(steps)])
     numbers = done.output.split()
     if done.status != 0 or len(numbers) != len(COUNTS):
-        said = (done.said or f"it ended with {done.status}").strip()
+        said = (done.messages or f"it ended with {done.status}").strip()
         return Fuzzed(block.name, real, steps, report=said[:2000])
     found = dict(zip(COUNTS, map(int, numbers), strict=True))
     return Fuzzed(block.name, real, steps, **found)

@@ -252,7 +252,7 @@ class Target:
             done = finished(command, limit=PATIENCE, name=f"{core.title} under QEMU")
         except ProgramError as error:
             raise CompileError(str(error)) from None
-        lines = (done.output.decode(errors="replace") + done.said).split()
+        lines = (done.output.decode(errors="replace") + done.messages).split()
         if done.status or "end" not in lines:
             said = " ".join(lines[-8:])
             raise CompileError(f"{core.title}: QEMU ended with status {done.status}: {said}")

@@ -119,8 +119,8 @@ def compare(
     shown = [data.named(name) for name, data in able.items()]
     title = _title([named[name] for name in able], shown)
     curves = tuple(curve for one in shown for curve in one.curves)
-    said = "; ".join(text for text in (shown[0].note, note) if text)
-    return replace(shown[0], title=title, curves=curves, note=said)
+    notes = "; ".join(text for text in (shown[0].note, note) if text)
+    return replace(shown[0], title=title, curves=curves, note=notes)
 
 
 Result = TypeVar("Result")
@@ -158,8 +158,8 @@ def _reason(text: str) -> str:
 def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:
     """Return the title of the first figure with the further inputs of all laws."""
     inputs = [steady_inputs(law) for law in laws]
-    said = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
-    return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(said))
+    named = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
+    return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(named))
 
 
 def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, AnyLaw]:

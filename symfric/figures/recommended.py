@@ -271,12 +271,11 @@ class _Search:
 
     def rounded(self, s: float) -> float:
         """Return a factor at which the first parameter has two digits, on the narrow side."""
-        name = self.knob.names[0]
+        name, power = next(iter(self.knob.powers.items()))
         value = self.knob.values(s)[name]
         size = 10.0 ** (floor(log10(value)) - 1)
-        digits = value / size
-        grows = self.knob.powers[name] < 0
-        return self.knob.factor((-floor(-digits) if grows else floor(digits)) * size)
+        digits = -floor(-value / size) if power < 0 else floor(value / size)
+        return (digits * size / float(parameters(self.knob.law)[name].value)) ** (1 / power)
 
     def shown(self, s: float) -> str:
         """Return the parameters at a factor as text."""
@@ -286,7 +285,7 @@ class _Search:
         """Return error, steps and time of the runs; without a reference, against the last run."""
         if self.reference is None and self.runs:
             self.reference, self.uncertain = self.runs[-1], 0.0
-        name, law = self.knob.names[0], self.knob.law
+        name, law = next(iter(self.knob.powers)), self.knob.law
         seen = [run for run in self.runs if run is not self.reference]
         columns = {
             name: [run.values[name] for run in seen],

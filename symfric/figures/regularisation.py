@@ -70,11 +70,6 @@ class Regularisation:
     law: Law
     powers: Mapping[str, float]
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(self.powers)
-
     def values(self, s: float) -> dict[str, float]:
         """Return their values at the factor `s`."""
         known = parameters(self.law)
@@ -84,12 +79,6 @@ class Regularisation:
     def at(self, s: float) -> Law:
         """Return the law at the factor `s`."""
         return with_values(self.law, self.values(s))
-
-    def factor(self, value: float) -> float:
-        """Return the factor at which the first of the parameters has this value."""
-        first = parameters(self.law)[self.names[0]]
-        now = float(first.value)
-        return (value / now) ** (1 / self.powers[first.name])
 
 
 def regularisation(

@@ -30,8 +30,7 @@ from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.engine import search_source
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import PACES
-from symfric.integrator.step.attempt import build_fixed
-from symfric.integrator.step.layout import GROWTH_MEMORY
+from symfric.integrator.step.attempt import GROWTH_MEMORY, build_fixed
 from symfric.integrator.step.pieces import all_macros, routine
 from symfric.model import Model
 from symfric.model.start import start_function

@@ -3,20 +3,17 @@
 import csv
 import json
 import os
-import tempfile
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager, suppress
 from errno import EDQUOT, EFBIG, EIO, ENOSPC
 from pathlib import Path
-from threading import Lock
+from secrets import token_hex
 from typing import Any, cast
 
 from symfric.foundation import checks
 
 FULL = (ENOSPC, EDQUOT, EFBIG, EIO)
 """Errors of a full disk."""
-_ASKING = Lock()
-"""Lock for reading the process's file mask, which has to be changed for a moment to be read."""
 
 
 @contextmanager
@@ -44,17 +41,10 @@ def written(path: str | Path) -> Generator[Path, None, None]:
     target = check_file(path)
     with _expecting("a writable place", path):
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
-        )
-    os.close(handle)
-    temporary = Path(name)
+        temporary = target.with_name(f".{target.stem}-{token_hex(4)}{target.suffix}")
+        temporary.touch(exist_ok=False)
     try:
         yield temporary
-        with _ASKING:
-            mask = os.umask(0)
-            os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
         temporary.replace(target)
     except OSError as error:
         if error.errno not in FULL:

@@ -7,7 +7,7 @@ written with these keeps the type of its arguments.
 
 import ctypes
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import erf as erf_of_float
 from numbers import Real
 from typing import Any, TypeVar, cast
@@ -128,6 +128,12 @@ def smallest(*values: Scalar) -> Scalar:
     for value in values[1:]:
         least = ca.fmin(least, value) if is_casadi(least, value) else np.minimum(least, value)
     return least
+
+
+def total(terms: Iterable[Scalar]) -> Scalar:
+    """Return the sum of `terms`, at least one, in their order."""
+    first, *rest = terms
+    return sum(rest, start=first)
 
 
 def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:

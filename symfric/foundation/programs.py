@@ -34,12 +34,12 @@ class Finished:
     Attributes:
         status: 0 for success.
         output: its standard output.
-        said: its standard error, as text.
+        messages: its standard error, as text.
     """
 
     status: int
     output: bytes
-    said: str
+    messages: str
 
 
 def finished(
@@ -64,14 +64,12 @@ def finished(
     pipe = subprocess.PIPE
     process = started(command, stdin=pipe, stdout=pipe, stderr=pipe, variables=variables, name=name)
     try:
-        output, said = process.communicate(given, timeout=limit)
+        output, messages = process.communicate(given, timeout=limit)
     except subprocess.TimeoutExpired:
-        raise ProgramError(
-            f"{name or called(command)} came to no end within {limit:.0f} s"
-        ) from None
+        raise ProgramError(f"{name or called(command)} did not end within {limit:.0f} s") from None
     finally:
         end(process)
-    return Finished(process.returncode, output, said.decode(errors="replace"))
+    return Finished(process.returncode, output, messages.decode(errors="replace"))
 
 
 def started(
@@ -109,7 +107,7 @@ def called(command: Sequence[str]) -> str:
 def end(process: subprocess.Popen[bytes]) -> None:
     """Stop a running program and its children, also after an interrupt.
 
-    It is first asked to terminate: a compiler then removes its temporary files.
+    SIGTERM comes first, so a compiler can remove its temporary files.
     """
     if process.poll() is None:
         _signal(process, signal.SIGTERM)
@@ -170,8 +168,8 @@ class Compiler:
         except ProgramError as error:
             raise CompileError(str(error)) from None
         if done.status:
-            raise CompileError(f"{self} failed with status {done.status}:\n{done.said}")
-        return done.said
+            raise CompileError(f"{self} failed with status {done.status}:\n{done.messages}")
+        return done.messages
 
     def warnings(self, *arguments: str) -> list[str]:
         """Run it on files; return the lines with warnings.
@@ -195,8 +193,8 @@ def patience(code: str) -> float:
 
 def first_error(text: str) -> str:
     """Return the head of a compiler's messages, and its first error."""
-    head, _, said = text.partition("\n")
-    lines = said.strip().splitlines()
+    head, _, messages = text.partition("\n")
+    lines = messages.strip().splitlines()
     error = next((line for line in lines if "error" in line), "".join(lines[:1]))
     return f"{head} {error}".strip()
 
@@ -232,9 +230,9 @@ def _command(text: str) -> tuple[str, ...] | None:
 
 def missing_compiler() -> str:
     """Return the reason why `find_compiler` found none, with advice."""
-    asked = os.environ.get("CC", "").strip()
-    if asked:
-        return f"no C compiler found: $CC is {asked!r}, which does not exist; fix or unset it"
+    wanted = os.environ.get("CC", "").strip()
+    if wanted:
+        return f"no C compiler found: $CC is {wanted!r}, which does not exist; fix or unset it"
     return "no C compiler found; install gcc or clang, or set CC"
 
 

@@ -104,7 +104,11 @@ class Shown:
         parts += [f"<div>{escape(line)}</div>" for line in self.lines]
         parts += [_html_table(self.table)] if self.table.rows else []
         parts += [f"<div>{escape(line)}</div>" for line in self.after]
-        parts += [_image(picture, self.title)] if picture is not None else []
+        if picture is not None:
+            parts += [
+                f'<img alt="{escape(self.title)}" style="max-width:100%;margin-top:6px" '
+                f'src="{data_uri(picture, DOTS_PER_INCH)}">'
+            ]
         return f'<div style="{BOX}">{"".join(parts)}</div>'
 
 
@@ -185,27 +189,19 @@ def data_uri(figure: "Figure", dpi: float = 60) -> str:
     return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
 
 
-def _image(figure: "Figure", words: str) -> str:
-    """Return a figure as an embedded image."""
-    return (
-        f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
-        f'src="{data_uri(figure, DOTS_PER_INCH)}">'
-    )
-
-
 SHORT = 8
 """Largest number of values that are written out."""
 
 
 def brief(self: Any) -> str:
     """Return class and fields of a dataclass, a line each, within a screen."""
-    lines = [f"  {item.name}: {told(getattr(self, item.name))}" for item in fields(self)]
+    lines = [f"  {item.name}: {in_a_line(getattr(self, item.name))}" for item in fields(self)]
     if len(lines) > HEIGHT - 2:
         lines = [*lines[: HEIGHT - 2], f"  ... {len(lines) - HEIGHT + 2} more"]
     return "\n".join([f"<{type(self).__name__}", *(cut(line, WIDTH - 1) for line in lines)]) + ">"
 
 
-def told(value: Any) -> str:
+def in_a_line(value: Any) -> str:
     """Return a value in a line."""
     if isinstance(value, np.ndarray):
         return _array(cast(NDArray[Any], value))
@@ -213,9 +209,9 @@ def told(value: Any) -> str:
         return f"expression of shape {value.shape}"
     if isinstance(value, Mapping):
         inside = cast(Mapping[object, object], value)
-        return among(f"{name}: {told(held)}" for name, held in inside.items()) or "none"
+        return among(f"{name}: {in_a_line(held)}" for name, held in inside.items()) or "none"
     if isinstance(value, tuple | list):
-        parts = [told(one) for one in cast(tuple[object, ...], value)]
+        parts = [in_a_line(one) for one in cast(tuple[object, ...], value)]
         return f"({among(parts)})"
     if isinstance(value, float):
         return f"{value:.6g}"
@@ -224,7 +220,7 @@ def told(value: Any) -> str:
 
 def _array(value: NDArray[Any]) -> str:
     if value.size <= SHORT and value.ndim == 1:
-        return f"[{', '.join(told(x.item()) for x in value)}]"
+        return f"[{', '.join(in_a_line(x.item()) for x in value)}]"
     shape = " x ".join(map(str, value.shape))
     finite = value[np.isfinite(value)] if value.dtype.kind in "iuf" else value[:0]
     reach = f" from {finite.min():.6g} to {finite.max():.6g}" if finite.size else ""

@@ -71,6 +71,11 @@ class Status(Enum):
     )
 
     @property
+    def stopped(self) -> bool:
+        """True if the user or a time limit ended the solve."""
+        return self in (Status.INTERRUPTED, Status.TIME_LIMIT)
+
+    @property
     def ok(self) -> bool:
         """True if the result can be used."""
         return self.name in ("SUCCESS", "TERMINATED", "SOLVED", "ACCEPTABLE", "DOUBTFUL")

@@ -55,7 +55,7 @@ from symfric.integrator.many.store import Store
 from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.step.layout import State
+from symfric.integrator.step.attempt import State
 from symfric.model import Model
 from symfric.model.kinds import in_results
 from symfric.results.ensemble import Ensemble
@@ -277,7 +277,7 @@ def _check(model: Model, backend: str, executor: object, real: str) -> None:
 
 def _points(integrator: Integrator, given: MemberData) -> Points:
     """Return (y, d) at the start of the first, the middle and the last member."""
-    if not integrator.has_pivots:
+    if not integrator.system.has_pivots:
         return ()
     points = list[tuple[Array, Array]]()
     for m in sorted({0, given.count // 2, given.count - 1}):

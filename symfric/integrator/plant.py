@@ -26,13 +26,13 @@ from symfric.integrator.running.plants import (
     SEARCH,
     STORM,
     Advance,
+    InPython,
     Plants,
     compiled,
-    in_python,
     looking,
 )
 from symfric.integrator.running.run import MOST_ORDERS
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 Numbers = Mapping[str, ArrayLike]
@@ -82,7 +82,7 @@ class Plant:
         self._in_python = vm or integrator.crossings is not None
         if self._in_python:
             engine = integrator.vm if vm else integrator.compiled
-            return in_python(integrator, plants, engine, self._tolerance)
+            return InPython(integrator, plants, engine, self._tolerance)
         return (side_by_side if pays(integrator, plants) else compiled)(integrator, plants)
 
     def __repr__(self) -> str:

@@ -306,7 +306,7 @@ def simulate(
     which = seeds(model, sensitivities, x0, p, t_start) if sensitivities else None
     y0 = first_guess(integrator.system, model, model.initial_state(x0, p, t_start), t_start)
     values = model.values("p", p)
-    if integrator.has_pivots:
+    if integrator.system.has_pivots:
         at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
         integrator = integrator.suited([at_start], t_end - t_start)
     run, own, count = _solve(

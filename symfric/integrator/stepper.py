@@ -18,8 +18,7 @@ from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.plants import SAMPLES, Plants
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.step.attempt import build_fixed
-from symfric.integrator.step.layout import State
+from symfric.integrator.step.attempt import State, build_fixed
 from symfric.model import Model, check_model
 
 

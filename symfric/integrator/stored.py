@@ -251,7 +251,7 @@ class Stored:
 
     def _path(self, basis: Basis, integrator: Integrator) -> Path:
         """Return the path of the run, with pivots that are stable at its start and end."""
-        if integrator.has_pivots:
+        if integrator.system.has_pivots:
             d = [np.concatenate([self.p, self.inputs.values[:, k]]) for k in (0, -1)]
             ends = [(basis.guess, d[0]), (self.steps.y1[-1], d[1])]
             integrator = integrator.suited(ends, float(self.steps.t1[-1] - self.steps.t0[0]))

@@ -30,24 +30,24 @@ def kind_problems(model: System) -> list[str]:
 
 
 def _wrong_kinds(model: System) -> Iterator[str]:
-    yield _said(checks.line, "name", model.name)
+    yield _message(checks.line, "name", model.name)
     for name, (kind, what) in GROUPS.items():
-        yield _said(_group, name, getattr(model, name), kind, what)
+        yield _message(_group, name, getattr(model, name), kind, what)
     for name in ("ode", "alg", "xdot", "residual"):
         if name != "ode" or model.ode is not None:
-            yield _said(checks.expression, name, getattr(model, name))
-    yield _said(_results, "outputs", model.outputs)
-    yield _said(_once, "contacts", model.contacts)
+            yield _message(checks.expression, name, getattr(model, name))
+    yield _message(_results, "outputs", model.outputs)
+    yield _message(_once, "contacts", model.contacts)
     for name in ("ode", "alg", "residual"):
-        yield _said(_column, name, getattr(model, name))
+        yield _message(_column, name, getattr(model, name))
     if not (isinstance(model.t, ca.SX) and model.t.is_scalar() and model.t.is_symbolic()):  # pyright: ignore[reportUnnecessaryIsInstance]
         yield f"t: expected one SX symbol, got {checks.shown(model.t)}"
     for name in ("details", "sketch", "opening"):
         if name == "details" or getattr(model, name) is not None:
-            yield _said(checks.function, name, getattr(model, name), "a function")
+            yield _message(checks.function, name, getattr(model, name), "a function")
 
 
-def _said(check: Any, *arguments: Any) -> str:
+def _message(check: Any, *arguments: Any) -> str:
     """Return the message of a failed check, else an empty text."""
     try:
         check(*arguments)

@@ -41,7 +41,7 @@ class Held(NamedTuple):
 
     phi: ca.SX
     labels: tuple[str, ...]
-    loads: Callable[[ca.SX], Loads]
+    loads: Callable[[ca.SX], Loads] = lambda _: ()
     unit: str = ""
     problems: tuple[str, ...] = ()
 
@@ -51,13 +51,9 @@ class Held(NamedTuple):
         return (self.unit,) * len(self.labels)
 
 
-def _unloaded(_: ca.SX) -> Loads:
-    return ()
-
-
 def impossible(*problems: str) -> Held:
     """Return no equations, with the problems."""
-    return Held(ca.SX(0, 1), (), _unloaded, problems=problems)
+    return Held(ca.SX(0, 1), (), problems=problems)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Moving pictures of mechanisms."""
+"""Animations of mechanisms."""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -27,16 +27,16 @@ Array = NDArray[np.float64]
 ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
-"""Motions between BRIEF and LONG [s] are shown as fast as they are, others in SHOWN."""
+"""Motions between BRIEF and LONG [s] are shown in real time, others in SHOWN."""
 SIZE, SMALL = 6.4, 3.2
-"""Larger sides of the panels of films and of small figures [inch]."""
+"""Larger sides of the panels of animations and of small figures [inch]."""
 PATH = 1001
-"""Points of the path of a centre of mass."""
+"""Number of points of the path of a centre of mass."""
 STICKS, SLIDES = colour(1), "white"
-"""Fill of joints with friction: filled they stick, hollow they slide, which print shows, too."""
+"""Fill of joints with friction: filled if they stick, hollow if they slide."""
 GROUND = "#8c6d46"
 PASSES = 3
-"""Drawings until a layout with axes of one scale settles: the first does not know their height."""
+"""Number of drawings after which a layout with axes of one scale has settled."""
 FLATTEST = 0.4
 """Least ratio of the sides of a picture in a plane."""
 
@@ -49,7 +49,7 @@ def animate(
     speed: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Write `trajectory` as a moving picture; see `Trajectory.animate`.
+    """Write an animation of `trajectory`; see `Trajectory.animate`.
 
     Raises:
         ValueError: a model without bodies, another ending, no ffmpeg, numbers not above zero.
@@ -89,7 +89,7 @@ def animate(
 
 
 def check_format(path: str | Path) -> None:
-    """Refuse an ending for which there is no writer.
+    """Check that there is a writer for the ending of a path.
 
     Raises:
         ValueError: another ending than .gif, .html and .mp4, or .mp4 without ffmpeg.
@@ -102,12 +102,12 @@ def check_format(path: str | Path) -> None:
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
         raise ValueError(
             f"animation '{path}': expected the program ffmpeg for .mp4, got none; "
-            "write .gif or .html, which need nothing else"
+            "write .gif or .html, which need no program"
         )
 
 
 def frame_times(begin: float, end: float, fps: float, speed: float | None) -> tuple[Array, float]:
-    """Times of the pictures [s] and the speed of the motion relative to real time."""
+    """Return the times of the pictures [s] and the speed relative to real time."""
     span = end - begin
     if speed is None:
         speed = 1.0 if BRIEF <= span <= LONG else max(span, 1e-300) / SHOWN
@@ -117,7 +117,7 @@ def frame_times(begin: float, end: float, fps: float, speed: float | None) -> tu
 def picture(
     trajectory: Signals, times: Array, speed: float = 1.0
 ) -> tuple[Figure, Callable[[int], None]]:
-    """Return a figure of a mechanism, and what makes it show its pose at times[k].
+    """Return a figure of a mechanism, and a function that shows its pose at times[k].
 
     Raises:
         ValueError: a model without bodies.
@@ -181,7 +181,7 @@ def _drawn(
 
 
 def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flags]:
-    """Joint -> whether all its contacts move slower than the scale of their law."""
+    """Return joint -> True if all its contacts are slower than the scale of their law."""
     marks = [mark for mark in sketch.marks if mark.slips]
     if not marks:
         return {}
@@ -195,7 +195,7 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
 
 
 def _legend(figure: Figure) -> None:
-    """Legend of the fill of joints."""
+    """Add the legend of the fill of joints."""
     entries = [
         Line2D([], [], linestyle="", marker="o", color=EDGE, markerfacecolor=fill, label=label)
         for fill, label in ((SLIDES, "slides"), (STICKS, "sticks"))
@@ -260,7 +260,7 @@ def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]
 
 
 def _direction(axis: Array) -> str:
-    """Name of a direction: x, or its components."""
+    """Return the name of a direction: x, or its components."""
     k = int(np.argmax(np.abs(axis)))
     if abs(abs(axis[k]) - 1) < 1e-9:
         return "xyz"[k] if axis[k] > 0 else f"-{'xyz'[k]}"

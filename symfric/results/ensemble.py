@@ -1,4 +1,4 @@
-"""Result of many runs: signals of all members, what was varied, and what became of each."""
+"""Result of many runs: signals of all members, their varied inputs, and how each ended."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 PLACES = ("end", "least", "greatest")
 MOST = 5_000_000
-"""Numbers that are read without a request; of a file every page, for its last column."""
+"""Largest number of values that `shown` reads; of a memory-mapped file the last column needs every
+page."""
 
 
 @final
@@ -30,29 +31,29 @@ MOST = 5_000_000
 class Ensemble(Showing):
     """Results of many runs.
 
-    `study["x"]` is a signal of all members, `study.varied["mu_s"]` what each was given,
-    `study.extremes["v"]` how far each went.
+    `study["x"]` is a signal of all members, `study.varied["mu_s"]` the value of each, and
+    `study.extremes["v"]` its range.
 
     Attributes:
         scene: name of the model.
-        t: times [s], shape (k,); (members, 1) where each member has its own end and nothing else
-            was requested.
+        t: times [s], shape (k,); (members, 1) if each member has its own end and no
+            other times were requested.
         signals: name -> values, shape (members, k); NaN after a member ended, failed or met a
-            terminal event, and for members that were not reached. Memory-mapped where the results
-            went to a folder.
-        units: name -> unit of every signal; `unit(name)` tells that of what was varied, too.
+            terminal event, and for members that were not started. Memory-mapped if the results
+            were written to a folder.
+        units: name -> unit of every signal; `unit(name)` also knows those of varied quantities.
         attempts: attempts of each member, shape (members,).
         reached: time [s] each member reached, shape (members,): that of a terminal event or of
             its failure, else its end; NaN for members that were not started.
         failed: number of a failed member -> sentence.
         status: SUCCESS, or INTERRUPTED with the members that were finished.
-        varied: what members were given arrays of, shape (members,): parameters by name, start
+        varied: arguments that differ between members, shape (members,): parameters by name, start
             values as "x0.v", inputs as "u.force", ends as "t_end". Samples of inputs are not kept.
-        fixed: numbers that all were given, likewise.
+        fixed: arguments that all members share, likewise.
         given_units: name -> unit of `varied` and `fixed`.
         reach: state -> its least and greatest value over the start and the ends of all accepted
             steps, shape (2, members); NaN for members that were not started.
-        doubtful: number of a member that ended well -> sentence on what is doubtful of it.
+        doubtful: number of a member that ended well -> sentence about a doubt.
     """
 
     scene: str
@@ -70,7 +71,7 @@ class Ensemble(Showing):
     doubtful: dict[int, str] = field(default_factory=dict[int, str])
 
     def check_fields(self) -> None:
-        """Refuse arrays that are not those of the same members; for files."""
+        """Check that all arrays have the same members; for files."""
         n, k = self.attempts.size, self.t.shape[-1]
         agree(
             "Ensemble",
@@ -128,7 +129,7 @@ class Ensemble(Showing):
         return (f"{x:.6g}" for x in (values.min(), np.median(values), values.max()))
 
     def thumbnail(self) -> "Figure | None":
-        """Return the first signal of the first members over time, small; None for ends alone."""
+        """Return a small plot of the first signal; None if only ends are known."""
         from symfric.results.pictures import thumbnail_of_many  # noqa: PLC0415  (matplotlib is slow to import)
 
         if self.t.ndim > 1 or self.t.size < 2:
@@ -146,7 +147,7 @@ class Ensemble(Showing):
         return self.attempts.size
 
     def unit(self, name: str) -> str:
-        """Return the unit of a signal or of what was given."""
+        """Return the unit of a signal or of an argument."""
         known = self.units | self.given_units
         checks.check_names(f"ensemble of '{self.scene}'", [name], known)
         return known[name]
@@ -167,9 +168,9 @@ class Ensemble(Showing):
     def extremes(self) -> dict[str, tuple[Array, Array]]:
         """Name -> least and greatest value of each member, shape (members,) both.
 
-        Those of states are over all accepted steps, however short, and over `t`. Those of other
-        signals are over `t` alone, where short events get lost: ask for more times by `t_eval`, or
-        simulate such a member alone. NaN of members without a value.
+        Those of states are over all accepted steps and over `t`. Those of other signals are over
+        `t` only, which may miss short events: request more times by `t_eval`, or simulate such a
+        member alone. NaN for members without a value.
         """
         found: dict[str, tuple[Array, Array]] = {}
         for name, values in self.signals.items():
@@ -181,13 +182,13 @@ class Ensemble(Showing):
     def plot(
         self, *names: str, over: str = "", at: float | str = "end", path: str | Path | None = None
     ) -> "Figure":
-        """Median and bands of 50 and 90 % of the members over time; histograms of ends alone.
+        """Plot median and bands of 50 and 90 % of the members over time; of ends plot histograms.
 
         Args:
-            names: signals to show; the first six if none is given.
-            over: what was varied, to show the signals over it, a point for each member, as in
+            names: signals; by default the first six.
+            over: varied quantity on the abscissa, a point for each member, as in
                 `study.plot("v", over="mu_s", at="greatest")`.
-            at: where, then: a time of the result [s], the nearest is taken; "end", "least" or
+            at: with `over`, time [s], rounded to the nearest of the result; or "end", "least",
                 "greatest" (see `extremes`).
             path: image file, its format taken from the ending.
 
@@ -211,7 +212,7 @@ class Ensemble(Showing):
     def _at(
         self, where: str, names: Sequence[str], at: float | str
     ) -> tuple[str, dict[str, Array]]:
-        """Return the name of the place `at`, and name -> values there, shape (members,)."""
+        """Return `at` in words, and name -> values there, shape (members,)."""
         if isinstance(at, str):
             checks.choice(where, at, PLACES)
             if at == "end":
@@ -229,8 +230,8 @@ class Ensemble(Showing):
     def save(self, path: str | Path) -> None:
         """Write everything to one file, which `symfric.load_ensemble` reads to the bit.
 
-        An interrupted ensemble has its finished members there. What is too large for memory is
-        better left in the folder of `simulate_many(..., out=)`.
+        Of an interrupted ensemble it holds the finished members. For results that exceed the memory
+        use the folder of `simulate_many(..., out=)`.
 
         Raises:
             ValueError: the file cannot be written.
@@ -238,7 +239,7 @@ class Ensemble(Showing):
         ENSEMBLE.save(path, self)
 
     def to_csv(self, path: str | Path, *names: str) -> None:
-        """Write a row for each member and time: member, t, what was varied, signals, with units.
+        """Write a row for each member and time: member, t, varied quantities, signals, with units.
 
         Args:
             path: file.
@@ -251,9 +252,9 @@ class Ensemble(Showing):
         write_table(path, header, rows)
 
     def to_dataframe(self, *names: str) -> Any:
-        """Return a row for each member and time, as a pandas table with what was varied as columns.
+        """Return a pandas table with a row for each member and time, and columns of what varies.
 
-        Where only ends are known, a row for each member. Units stand in its `attrs`.
+        If only ends are known, it has a row for each member. Its `attrs` contain the units.
 
         Args:
             names: signals; all if none is given.
@@ -275,7 +276,7 @@ class Ensemble(Showing):
         return frame
 
     def to_xarray(self, *names: str) -> Any:
-        """Signals over member and t as an xarray data set, with what was varied as coordinates.
+        """Return an xarray data set over member and t, with varied quantities as coordinates.
 
         Raises:
             ImportError: no xarray.
@@ -294,12 +295,12 @@ class Ensemble(Showing):
         return xarray.Dataset(arrays, coords=coordinates, attrs=self._about)
 
     def _chosen(self, names: Sequence[str]) -> list[str]:
-        """Return the signals that are named; all if none is."""
+        """Return the given names of signals; by default all."""
         checks.check_names(f"ensemble of '{self.scene}'", names, self.signals)
         return list(names) or list(self.signals)
 
     def _columns(self, names: Sequence[str]) -> dict[str, Array]:
-        """Times, what was varied and signals, by name; shape (members, times), broadcast."""
+        """Return times, varied quantities and signals by name, broadcast to (members, times)."""
         wanted, shape = self._chosen(names), (len(self), self.t.shape[-1])
         found = {"t": np.broadcast_to(self.t, shape)}
         found |= {n: np.broadcast_to(v[:, None], shape) for n, v in self.varied.items()}
@@ -310,7 +311,7 @@ class Ensemble(Showing):
 
     @property
     def _about(self) -> dict[str, Any]:
-        """Scene, how it ended, and numbers that all members share."""
+        """Scene, status, and numbers that all members share."""
         return {"scene": self.scene, "status": self.status.name, **self.fixed}
 
 

@@ -1,4 +1,4 @@
-"""Kinds of the signals of a run, by which tables and pictures group them."""
+"""Kinds of the signals of a run, which group them in tables and plots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ SPEEDS = {"m/s", "rad/s"}
 
 
 def is_mechanism(model: Model) -> bool:
-    """True if the model is one of bodies and joints."""
+    """Return True for a model of bodies and joints."""
     return model.holonomic is not None
 
 
 def norms(model: Model) -> tuple[str, ...]:
-    """Names of the norms of constraints; none where no loop is closed."""
+    """Return the names of the norms of constraints; none without closed loops."""
     return tuple(name for name, kind in kinds(model).items() if kind == CONSTRAINTS)
 
 
 def kinds(model: Model) -> dict[str, str]:
-    """Name -> kind of the signals that have one; inputs always do.
+    """Return name -> kind of the signals that have one; inputs always do.
 
-    Multipliers, and sliding velocities, which are rates times radii, are not among them.
+    Multipliers and sliding velocities have none.
     """
     found = {v.name: v.kind for v in (*model.x, *model.z)}
     found |= {v.name: v.kind or INPUT for v in model.u}
@@ -38,10 +38,10 @@ class Group:
     """Signals that share a panel.
 
     Attributes:
-        title: what they are; empty for one signal that is called by its name.
-        unit: of all of them.
-        names: signal -> how it is called in the panel.
-        norms: whether they are norms of constraints: dots on a logarithmic axis.
+        title: common name; empty for a single signal, which is labelled by its own name.
+        unit: common unit.
+        names: signal -> name in the panel.
+        norms: True for norms of constraints, which are dots on a logarithmic axis.
     """
 
     title: str
@@ -54,12 +54,12 @@ def main(model: Model, units: dict[str, str]) -> list[Group]:
     """Return the main signals of a run: positions, friction, and energy or, without a balance,
     power.
 
-    Speeds instead of positions where no state is a position, as in a clutch. Empty where the model
-    has neither positions nor friction.
+    If no state is a position, as in a clutch, speeds take their place. Empty for a model with
+    neither positions nor friction.
 
     Args:
-        model: whose signals they are.
-        units: name -> unit of those that may be shown.
+        model: model of the signals.
+        units: name -> unit of the signals that may be shown.
     """
     kind, own = kinds(model), {v.name for c in model.contacts for v in c.states}
     rubs = {"friction" if c.bare else f"{c.name}_friction" for c in model.contacts}
@@ -81,7 +81,7 @@ def main(model: Model, units: dict[str, str]) -> list[Group]:
 
 
 def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
-    """All signals of `units`: one each where these are at most `apart`, else by kind and unit."""
+    """Return groups of all signals: one each for at most `apart` of them, else by kind and unit."""
     kind = kinds(model)
     norm = {n: n for n in units if kind.get(n) == CONSTRAINTS}
     rest = [n for n in units if n not in norm]
@@ -99,9 +99,7 @@ def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
 
 
 def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Group]:
-    """Return groups of one unit each of the names that have one; names lose the ending that all of
-    a group have in common.
-    """
+    """Return the names with a unit in groups of one unit; a common ending of a group is removed."""
     found: dict[str, list[str]] = {}
     for name in names:
         if name in units:
@@ -113,9 +111,7 @@ def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Gro
 
 
 def shortened(names: list[str]) -> list[str]:
-    """Return `names` without the last word that they share, as "_friction"; at most 28 letters
-    each.
-    """
+    """Return `names` without a shared last word, such as "_friction", cut to 28 letters each."""
     ending = f"_{names[0].rpartition('_')[2]}"
     if len(names) > 1 and all(n.endswith(ending) and n != ending for n in names):
         names = [n.removesuffix(ending) for n in names]
@@ -123,11 +119,11 @@ def shortened(names: list[str]) -> list[str]:
 
 
 def friction_laws(model: Model) -> str:
-    """Return the laws of its contacts, each once: "LuGre, Coulomb"; empty where there are none."""
+    """Return the laws of the contacts, each once: "LuGre, Coulomb"; "" without contacts."""
     return ", ".join(dict.fromkeys(_called(contact.law) for contact in model.contacts))
 
 
 def _called(law: Any) -> str:
-    """Return a law by its class, a sum by its terms."""
+    """Return the class of a law, of a sum those of its terms."""
     terms = getattr(law, "laws", ())
     return "+".join(map(_called, terms)) if terms else type(law).__name__

@@ -1,4 +1,4 @@
-"""Pictures of simulations, with units."""
+"""Plots of simulations, with units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,15 +20,14 @@ from symfric.results.kinds import Group, every, friction_laws, kinds, main
 from symfric.results.signals import Signals
 
 Array = NDArray[np.float64]
-CHOICES = ("main", "all")
 APART = 8
-"""Up to so many signals have a panel each where all are shown."""
+"""Largest number of signals that have a panel each if all are shown."""
 BLACK = COLOURS.index(EDGE)
 FLAT = 1e-6
 """Change, relative to the magnitude, below which a signal counts as constant on an axis."""
 
 PANELS, POINTS = 3, 1500
-"""Signals of the small picture, and times of each."""
+"""Numbers of signals and of times in the small figure."""
 
 
 def plot_trajectories(
@@ -38,21 +37,21 @@ def plot_trajectories(
     panels: str = "main",
     log: Sequence[str] = (),
 ) -> Figure:
-    """Signals of one or several simulations over time, those of a kind in a panel.
+    """Plot signals of one or several simulations over time, those of a kind in one panel.
 
-    Times of hours, days and years are given in these.
+    Long times are in hours, days or years.
 
     Args:
         trajectories: legend entry -> trajectory.
-        names: signals or details to show, a panel each.
+        names: signals or details, a panel each.
         path: image file.
-        panels: which are shown where none is named: "main" for positions, friction and energy (or
-            power, where the model keeps no books of its energy); "all" for every signal that all
-            trajectories share, those of a kind and unit together where they are many. A model
-            with neither positions nor friction shows all.
-        log: signals or details whose panel has a logarithmic axis, where they are above zero.
+        panels: signals if `names` is empty: "main" for positions, friction and energy (or power,
+            if the model has no energy balance); "all" for every signal that all trajectories
+            share, grouped by kind and unit if there are many. A model with neither positions nor
+            friction shows all.
+        log: signals or details with a logarithmic axis; values that are not positive are left out.
     """
-    checks.choice("plot: panels", panels, CHOICES)
+    checks.choice("plot: panels", panels, ("main", "all"))
     log = (log,) if isinstance(log, str) else tuple(log)
     first = next(iter(trajectories.values()))
     for trajectory in trajectories.values():
@@ -99,9 +98,9 @@ def _finished(
 
 
 def split(groups: Sequence[Group]) -> list[Group]:
-    """Return the groups as several simulations are compared: a panel per signal, if these are few.
+    """Return the groups for a comparison of simulations: a panel per signal if there are few.
 
-    Of energies the sum is enough.
+    Of the energies only the sum is shown.
     """
     single = [
         Group("", group.unit, {name: name}, group.norms)
@@ -114,7 +113,7 @@ def split(groups: Sequence[Group]) -> list[Group]:
 def _check_log(
     log: Sequence[str], groups: Sequence[Group], trajectories: Mapping[str, Signals]
 ) -> None:
-    """Refuse logarithmic axes of what is not shown, or never above zero."""
+    """Check that signals with a logarithmic axis are shown and positive at some time."""
     checks.check_names("plot: log", log, [name for group in groups for name in group.names])
     for name in log:
         top = max(float(run.at_looks(name).max()) for run in trajectories.values())
@@ -132,9 +131,9 @@ def _panel(
     by_t: float,
     log: bool,
 ) -> None:
-    """Return the signals of a group: a colour each, line styles for several simulations.
+    """Plot the signals of a group: a colour each, a line style for each simulation.
 
-    Where every panel of the picture holds but one, simulations differ by colour, too.
+    If every panel has one signal only, the simulations also differ in colour.
     """
     several, runs = len(group.names) > 1, len(trajectories) > 1
     values = {
@@ -166,7 +165,7 @@ def _panel(
 
 
 def level(axis: Axes, values: Sequence[Array]) -> None:
-    """Ticks that say the values as they are; a constant in the middle of an axis, not magnified."""
+    """Write ticks without offset; centre a constant on the axis instead of magnifying rounding."""
     axis.ticklabel_format(axis="y", useOffset=False)
     low = min((float(np.nanmin(v, initial=np.inf)) for v in values), default=0.0)
     high = max((float(np.nanmax(v, initial=-np.inf)) for v in values), default=0.0)
@@ -187,7 +186,7 @@ def _small(count: int, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def thumbnail(run: Signals) -> Figure:
-    """Some signals over time, small: the first position, its rate and the first friction force."""
+    """Return a small plot of the first position, its rate and the first friction force."""
     names, (by_t, unit_t) = _few(run), clock(run.span)
     figure, axes = _small(len(names), 0.5 + 1.05 * len(names))
     for axis, name in zip(axes, names, strict=True):
@@ -200,7 +199,7 @@ def thumbnail(run: Signals) -> Figure:
 
 
 def _few(run: Signals) -> list[str]:
-    """Return the signals of the small picture."""
+    """Return the names of the signals of the small plot."""
     found, kind = list(run.units), kinds(run.model)
     states = [v.name for v in run.model.x][:2]
     rubs = [n for n in found if kind.get(n) == FRICTION or n == "friction"][:1]
@@ -209,7 +208,7 @@ def _few(run: Signals) -> list[str]:
 
 
 def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
-    """Few points that keep the least and greatest value of every stretch."""
+    """Return few points that include the extremes of every interval."""
     size = -(-t.size // POINTS)
     if size < 3:
         return t, values
@@ -221,14 +220,15 @@ def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
 
 
 SHOWN, LINES, TIMES, SMALL = 6, 6, 500, 200
-"""Signals if none is named, members that are drawn one by one, times at most, and members of the
-small picture."""
+"""Largest numbers of signals shown by default, of members drawn individually, of times, and of
+members in the small plot."""
 BANDS = ((5.0, 95.0, 0.15, "90 %"), (25.0, 75.0, 0.3, "50 %"))
 """Percentiles, opacity and legend of each band."""
 SERIES, JOINED = 6, 200
-"""Values of a second parameter that are distinguished, and members of a series joined by a line."""
+"""Largest numbers of values of a second parameter that give a series each, and of members that a
+line joins."""
 DECADES = 100.0
-"""Greatest over least value from which on an axis is logarithmic."""
+"""Ratio of the greatest to the least value from which an axis is logarithmic."""
 Varied = tuple[str, str, Array]
 """Name, unit and values of the members, shape (members,)."""
 
@@ -241,14 +241,14 @@ def plot_many(
     names: Sequence[str] = (),
     path: str | Path | None = None,
 ) -> Figure:
-    """Median and the bands of 50 and 90 % of the members over time, a panel per signal.
+    """Plot the median and the bands of 50 and 90 % of the members over time, a panel per signal.
 
-    Up to six members are drawn one by one. Where only the ends are known, a histogram of them. NaN,
-    of members that have ended or failed, is left out.
+    Up to six members are drawn individually. If only the ends are known, they are shown as
+    histograms. NaN of members that have ended or failed is left out.
 
     Args:
         scene: title.
-        t: times [s], shape (k,), or (members, 1) where each member has its own end.
+        t: times [s], shape (k,), or (members, 1) if each member has its own end.
         signals: name -> values, shape (members, k).
         units: name -> unit.
         names: signals to show; the first six if none is given.
@@ -284,7 +284,7 @@ def plot_many(
 
 
 def _bands(axis: Axes, t: Array, values: Array) -> None:
-    """Members one by one where they are few, else median and bands."""
+    """Plot a few members individually, else median and bands."""
     if values.shape[0] <= LINES:
         for k, row in enumerate(values):
             axis.plot(t, row, linewidth=1.2, label=f"member {k}", **line(k))
@@ -306,16 +306,16 @@ def plot_over(
     others: Mapping[str, tuple[str, Array]],
     path: str | Path | None = None,
 ) -> Figure:
-    """Signals over what was varied, a panel each.
+    """Plot signals over a varied quantity, a panel each.
 
-    Where something else was varied, too, and has few values, a series for each of them. Members
-    that have no value there, since they failed or ended before, are counted in the title.
+    If another quantity was varied and has few values, there is a series for each of them. The title
+    counts members without a value, which failed or ended before.
 
     Args:
-        scene, said: title, and at what place the values are.
+        scene, said: title, and the time of the values in words.
         signals: name -> unit and values of the members, shape (members,).
-        over: what was varied.
-        others: name -> unit and values of what else was varied.
+        over: the varied quantity.
+        others: name -> unit and values of other varied quantities.
         path: image file.
     """
     name_x, unit, x = over
@@ -341,7 +341,7 @@ def plot_over(
 def _series(
     count: int, others: Mapping[str, tuple[str, Array]]
 ) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Legend and members of each series: one, or one for each value of what else was varied."""
+    """Return legend entry and members of each series: one for each value of the other quantity."""
     every = [("", np.ones(count, dtype=bool))]
     if len(others) != 1:
         return every
@@ -354,7 +354,7 @@ def _series(
 
 
 def _draw(axis: Axes, x: Array, y: Array, k: int, label: str) -> None:
-    """Points; joined where there is one for each value and they are not too many."""
+    """Plot points, joined by a line if they are few and their abscissas differ."""
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     if x.size <= JOINED and np.unique(x).size == x.size and x.size > 1:
@@ -366,7 +366,7 @@ def _draw(axis: Axes, x: Array, y: Array, k: int, label: str) -> None:
 
 
 def thumbnail_of_many(t: Array, values: Array, label: str) -> Figure:
-    """Return the first members over time, small."""
+    """Return a small plot of the first members over time."""
     figure, (axis,) = _small(1, 1.9)
     axis.plot(t, np.asarray(values[:SMALL]).T, linewidth=0.6, color=COLOURS[0], alpha=0.4)
     axis.set_xlabel("t [s]", fontsize=7)

@@ -1,6 +1,7 @@
-"""Extremes and integrals of signals over all accepted steps of a run, not over samples alone.
+"""Extremes and integrals of signals over all accepted steps of a run.
 
-A run may rest for years and slip for a second: its steps go there, equally spaced samples do not.
+A run may rest for years and slip for a second: steps resolve the slip, equally spaced samples do
+not.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,15 +15,16 @@ Evaluate = Callable[[Array], Mapping[str, Array]]
 Of = Callable[[ca.SX, Array], Array]
 """Values of an expression at times."""
 ROUNDS, PARTS = 2, 16
-"""How often the neighbourhood of an extreme is looked at again, and in how many parts."""
+"""Numbers of refinements of the neighbourhood of an extreme, and of its parts."""
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
-"""Of Gauss quadrature on (-1, 1): exact to degree 9, beyond any dense output."""
+"""Gauss quadrature on (-1, 1): exact up to degree 9, higher than that of any dense output."""
 EXACT, HALVINGS = 1e-12, 24
-"""Part of an integral by which two halves may differ from a whole; how often a step is halved."""
+"""Relative difference of two halves from the whole at which a step is halved, and largest number of
+halvings."""
 
 
 def looks(t: Array, steps: Array, jumps: Array) -> Array:
-    """Times that show all of a run: `t`, ends and middles of `steps`, just before `jumps` [s]."""
+    """Return times that resolve a run: `t`, ends and middles of `steps`, just before `jumps`."""
     middles = (steps[:-1] + steps[1:]) / 2
     before = np.nextafter(jumps, -np.inf)
     every = np.sort(np.concatenate([t, steps, middles, before]))
@@ -31,9 +33,9 @@ def looks(t: Array, steps: Array, jumps: Array) -> Array:
 
 
 def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> dict[str, Array]:
-    """Name -> least and greatest value, shape (2,), refined between the `times` of the `values`.
+    """Return name -> least and greatest value, shape (2,), refined between the `times`.
 
-    A signal that is NaN somewhere has NaN for both.
+    Both are NaN if the signal is NaN at any time.
     """
     names = list(values)
     best = np.array([[v.min(), v.max()] for v in values.values()])
@@ -56,7 +58,7 @@ def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> d
 def integrals(ends: Array, of: Of, expression: ca.SX, times: Array) -> Array:
     """Return integrals of the rows of a column from the start to `times`, shape (rows, times).
 
-    The steps between `ends` end at jumps of inputs and at events: the integrand is smooth in each.
+    Steps between `ends` end at jumps of inputs and at events, so the integrand is smooth in each.
     """
     k = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, ends.size - 2)
     whole = _pieces(of, expression, ends[:-1], ends[1:])
@@ -67,7 +69,7 @@ def integrals(ends: Array, of: Of, expression: ca.SX, times: Array) -> Array:
 def integral_between(ends: Array, of: Of, expression: ca.SX, a: float, b: float) -> float:
     """Return the integral of one expression from time a to b.
 
-    A step between `ends` is halved while its halves add detail.
+    A step between `ends` is halved until its halves agree with the whole.
     """
     cuts = np.unique(np.concatenate([[a], ends[(ends > a) & (ends < b)], [b]]))
     left, right, done = cuts[:-1], cuts[1:], 0.0

@@ -1,7 +1,5 @@
-"""Runs as one HTML page that needs nothing from elsewhere: what was asked, and what came out.
-
-The page is an archive: it holds the numbers, the laws with their
-equations, parameters and limits, and how to run it again.
+"""Self-contained HTML page of simulations: numbers, laws with equations, parameters and limits, and
+the command that repeats them.
 """
 
 from collections import Counter
@@ -17,6 +15,7 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parameter, parameters
+from symfric.foundation.shown import data_uri
 from symfric.foundation.style import COLOURS
 from symfric.page import html
 from symfric.page.svg import Path as Line
@@ -25,7 +24,7 @@ from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory
 
 LINES = 4
-"""Runs in one chart; a page with more has its friction in several."""
+"""Largest number of runs in one chart of friction."""
 
 
 def report(
@@ -35,19 +34,19 @@ def report(
     settings: Mapping[str, Mapping[str, Parameter]] | None = None,
     command: str = "",
 ) -> str:
-    """One page of one or several simulations of a machine.
+    """Return one HTML page of one or several simulations of a machine.
 
     Args:
         runs: a trajectory, or name, such as that of the law -> trajectory.
         path: HTML file to write.
-        settings: name -> all parameters of the machine, which a model holds as constants.
-        command: how to do it again.
+        settings: name -> all parameters of the machine, which are constants of the model.
+        command: command line that repeats the runs.
 
     Returns:
         The page as text.
 
     Raises:
-        ValueError: no run, or something else than runs.
+        ValueError: no run, or a value that is not a run.
     """
     if isinstance(runs, Trajectory):
         runs = {runs.scene: runs}
@@ -78,7 +77,7 @@ def report(
 
 
 def _verdict(runs: Mapping[str, Trajectory]) -> str:
-    """Return the ends of the runs."""
+    """Return the block that says how the runs ended."""
     ended = all(run.status.ok for run in runs.values())
     good = ended and not any(run.doubts for run in runs.values())
     messages = [f"{name}: {run.message}" for name, run in runs.items()]
@@ -87,9 +86,8 @@ def _verdict(runs: Mapping[str, Trajectory]) -> str:
 
 
 def _picture(runs: Mapping[str, Trajectory]) -> str:
-    """Return the picture that `plot` gives, inside the page."""
-    from symfric.foundation.shown import data_uri  # noqa: PLC0415  (matplotlib is slow)
-    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (likewise)
+    """Return the figure of `plot`, embedded in the page."""
+    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
     source = data_uri(plot_trajectories(runs), dpi=110)
     drawing = f'<img src="{source}" alt="signals over time" style="max-width:100%">'
@@ -97,7 +95,7 @@ def _picture(runs: Mapping[str, Trajectory]) -> str:
 
 
 def _signals(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Return a table of ranges for each run."""
+    """Yield a table of ranges and a line of events for each run."""
     for name, run in runs.items():
         rows = [
             (signal, *map(_number, (run.final[signal], *run.extremes[signal])), run.units[signal])
@@ -135,15 +133,15 @@ def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 
 def _books(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Error, constraints, energy, cost."""
+    """Yield the table of errors, constraints, energy and cost."""
     rows = [(name, *_accuracy(run)) for name, run in runs.items()]
     header = ("run", "measured error", "energy unexplained", "constraints", "steps", "rejected")
     yield html.table("Error and cost", (*header, "method", "run [ms]"), rows, (1, 2, 3, 4, 5, 7))
     yield html.paragraph(
         "Measured error: largest difference of a state from a run by another formula at a "
         "hundredth of the tolerance, over the magnitude of that state. Energy unexplained: what "
-        "energy and work of a mechanism leave open, over what moved. Constraints: largest "
-        "violation, in m.",
+        "energy and work of a mechanism do not explain, relative to the largest of them. "
+        "Constraints: largest violation, in m.",
         "soft",
     )
 
@@ -160,7 +158,7 @@ def _accuracy(run: Trajectory) -> tuple[str, ...]:
 
 
 def _laws(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Yield equation, limits and numbers of every law with other numbers, once."""
+    """Yield equation, limits and parameters of each law, once per set of parameters."""
     laws: dict[str, Any] = {}
     for run in runs.values():
         for contact in run.model.contacts:
@@ -179,7 +177,7 @@ def _laws(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 
 def _settings(settings: Mapping[str, Mapping[str, Parameter]]) -> Iterator[str]:
-    """All parameters of the machine, side by side where there are several."""
+    """Yield the table of all parameters, with a column for each machine."""
     names = dict.fromkeys(name for known in settings.values() for name in known)
     rows: list[Sequence[str]] = []
     for name in names:
@@ -188,11 +186,11 @@ def _settings(settings: Mapping[str, Mapping[str, Parameter]]) -> Iterator[str]:
         values = [_number(p.value) if p is not None else "–" for p in each]
         rows.append((name, *values, one.unit, one.doc))
     columns = range(1, 1 + len(settings))
-    yield html.table("As they were", ("name", *settings, "unit", "meaning"), rows, [*columns])
+    yield html.table("Values in the runs", ("name", *settings, "unit", "meaning"), rows, [*columns])
 
 
 def _made(command: str) -> Iterator[str]:
-    """Yield call and versions."""
+    """Yield the command and the versions."""
     yield html.code(command)
     rows = [(name, version(name)) for name in ("symfric", "casadi", "numpy")]
     rows += [("Python", python_version()), ("platform", platform())]
@@ -200,5 +198,5 @@ def _made(command: str) -> Iterator[str]:
 
 
 def _number(value: Any) -> str:
-    """Six digits; an expression unchanged."""
+    """Return a number with six digits, an expression unchanged."""
     return f"{value:.6g}" if isinstance(value, int | float | np.floating) else str(value)

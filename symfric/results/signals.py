@@ -1,4 +1,4 @@
-"""Signals of a run: at any time, their extremes, integrals and derivatives."""
+"""Signals of a simulation at any time, their extremes, integrals and derivatives."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -51,20 +51,20 @@ class Signals(Showing):
 
     @property
     def doubts(self) -> str:
-        """Errors that its tolerances do not bound, in sentences; "" where none are known."""
+        """Errors that the tolerances do not bound, in sentences; "" if none are known."""
         return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
 
     @cached_property
     def statistics(self) -> Statistics:
-        """Steps, evaluations, times."""
+        """Numbers of steps and evaluations, and times."""
         return self.count()
 
     @cached_property
     def step_times(self) -> Array:
         """Ends of the accepted steps [s], shape (steps + 1,); `at(step_times)` has the signals.
 
-        A run whose steps would take much memory has not kept them, and is run again for them, as it
-        is for values between the times `t`.
+        A run whose steps would take too much memory does not keep them; it is repeated when they,
+        or values between the times `t`, are used.
         """
         return self.ends()
 
@@ -84,7 +84,7 @@ class Signals(Showing):
         return self.evaluate(self.looks)
 
     def at_looks(self, name: str) -> Array:
-        """Return a signal or detail at `looks`: what pictures show."""
+        """Return a signal or detail at `looks`, the times of plots."""
         self.check([name])
         if name in self._looked:
             return self._looked[name]
@@ -111,7 +111,7 @@ class Signals(Showing):
 
     @cached_property
     def _further(self) -> dict[str, Array]:
-        """All details at `t`; one by one they would cost almost as much each."""
+        """All details at `t`; one alone would cost almost as much."""
         column = ca.vertcat(*(o.expression for o in self.model.further.values()), 0)
         return dict(zip(self.model.further, self.of(column), strict=False))
 
@@ -125,7 +125,7 @@ class Signals(Showing):
         return self.units[name] if name in self.units else self.details[name]
 
     def check(self, names: Iterable[str]) -> None:
-        """Refuse what is neither a signal nor a detail.
+        """Check that all names are signals or details.
 
         Raises:
             ValueError: unknown names, with the nearest known one.
@@ -135,17 +135,17 @@ class Signals(Showing):
         checks.check_names(self._where, names, known)
 
     def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
-        """Values of an expression in the symbols of the model: t, x, z, u, p.
+        """Return an expression in the symbols t, x, z, u, p of the model as numbers.
 
         Args:
             expression: SX of one element, or a column (rows, 1).
-            times: where [s], shape (n,); `t` if not given.
+            times: [s], shape (n,); default `t`.
 
         Returns:
             Shape (n,), or (rows, n) for a column.
 
         Raises:
-            ValueError: a symbol that is none of the model's, a time outside the span.
+            ValueError: a symbol that the model does not have, a time outside the span.
         """
         column, model = ca.SX(checks.expression(f"{self._where}: of", expression)), self.model
         known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -158,7 +158,7 @@ class Signals(Showing):
         return values[0] if column.is_scalar() else values
 
     def at(self, times: ArrayLike) -> dict[str, Array]:
-        """All signals at `times` [s] inside the simulated span, by dense output.
+        """Return all signals at `times` [s] inside the simulated span, by dense output.
 
         Raises:
             ValueError: a time outside the span.
@@ -184,14 +184,14 @@ class Signals(Showing):
         return {k: float(v[0]) for k, v in self.evaluate(np.array(self.span[1:])).items()}
 
     def integral(self, name: str, times: ArrayLike | None = None) -> Array:
-        """Integral of a signal or detail over time from the start, such as energy from power.
+        """Return the integral of a signal or detail over time from the start.
 
-        By Gauss quadrature over the dense output of every accepted step, which costs the
-        simulation nothing: `trajectory.integral("friction_power")` is a work [J].
+        It is found by Gauss quadrature over the dense output of every accepted step:
+        `trajectory.integral("friction_power")` is a work [J].
 
         Args:
             name: of a signal or detail.
-            times: up to where [s], shape (n,); `t` if not given.
+            times: upper limits [s], shape (n,); default `t`.
 
         Raises:
             ValueError: unknown name, a time outside the span.
@@ -201,15 +201,15 @@ class Signals(Showing):
         return integrals(self.step_times, self.of, self.model.expression(name), at)[0]
 
     def work(self, force: str, rate: str, between: tuple[float, float] | None = None) -> float:
-        """Integral of a force times a rate over time, such as the work of friction [J].
+        """Return the integral of a force times a rate over time, such as the work of friction [J].
 
-        Over the dense output, steps halved until quadrature is exact to rounding. A sum over the
-        samples at `t` is off by what happens between them.
+        Steps of the dense output are halved until the quadrature is exact up to rounding. A sum
+        over the samples at `t` misses what happens between them.
 
         Args:
             force: a signal or detail.
             rate: another one, such as a velocity.
-            between: first and last time [s]; the whole span if not given.
+            between: first and last time [s]; default the whole span.
 
         Raises:
             ValueError: unknown names, times outside the span or not in order.
@@ -219,15 +219,16 @@ class Signals(Showing):
         return self._integral_between(product, between)
 
     def area(self, y: str, x: str, between: tuple[float, float] | None = None) -> float:
-        """Integral of y dx along the run: the area below a curve, or in a loop that closes.
+        """Return the integral of y dx along the run: the area below a curve, or in a closed loop.
 
-        Positive for a loop that is run clockwise in the plane of x and y. Found as `work` is; what
-        the reset of an event does to x at once is left out.
+        A loop that is run clockwise in the plane of x and y is positive. The method is that of
+        `work`; jumps of x by the reset of an event are left out.
 
         Args:
             y: a signal or detail.
-            x: one of the states and time alone, of a model with explicit equations.
-            between: first and last time [s]; the whole span if not given.
+            x: a signal or detail that depends on the states and time only, of a model with explicit
+                equations.
+            between: first and last time [s]; default the whole span.
 
         Raises:
             ValueError: unknown names, an x whose rate the equations do not give, times outside the
@@ -257,11 +258,11 @@ class Signals(Showing):
     def sensitivities(self) -> dict[str, dict[str, Array]]:
         """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
 
-        They jump where an event moves with the name; at its time they are those behind it.
+        They jump at an event that moves with the name; at its time they are those after it.
 
         Raises:
             ValueError: none were requested, or an event has none: its expression only touches
-                zero, it comes with a jump of an input, or with an event whose order matters.
+                zero, or it coincides with a jump of an input or with an event whose order matters.
         """
         if self.differentiate is None:
             raise self._without_derivatives
@@ -271,17 +272,18 @@ class Signals(Showing):
     def event_sensitivities(self) -> dict[str, Array]:
         """Derivatives of the times of `happened`: name -> [s per unit], shape (events,).
 
-        That of a terminal event is the derivative of the end time. Refused as `sensitivities` is.
+        That of a terminal event is the derivative of the end time. Raises as `sensitivities` does.
         """
         if self.delays is None:
             raise self._without_derivatives
         return self.delays()
 
     def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
-        """Derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
+        """Return the derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
 
-        One sweep backwards over the steps, at a cost that does not grow with the number of names
-        given to `simulate`. For a cost J of the signals at `t`, the weights are dJ/ds(t_i).
+        One sweep backwards over the steps computes all of them, at a cost that does not depend on
+        the number of names given to `simulate`. For a cost J of the signals at `t`, the weights are
+        dJ/ds(t_i).
 
         Args:
             weights: signal -> a number for every time of `t`, or one for all.
@@ -308,6 +310,6 @@ class Signals(Showing):
     @property
     def _without_derivatives(self) -> ValueError:
         return ValueError(
-            f"{self._where}: expected sensitivities, got none; ask for them by "
+            f"{self._where}: expected sensitivities, got none; request them by "
             "simulate(..., sensitivities=[...])"
         )

@@ -1,7 +1,7 @@
-"""Objects in files: one file each, whole or not at all, and back to the bit; packages for tables.
+"""Files of runs, ensembles, fits and optimal motions, and packages for tables.
 
-What a file is, which format, and what it cannot be is stated here once for runs, ensembles, fits
-and optimal motions; how objects become arrays is `symfric.foundation.packed`.
+Files are written atomically and restored bit for bit. `symfric.foundation.packed` converts objects
+to arrays.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -22,11 +22,11 @@ class Format(Generic[T]):
     """Kind of file.
 
     Attributes:
-        kind: what such files call themselves.
-        number: raised whenever older programs would misread it; older ones are read.
-        reader: what reads it, as errors call it: "load_run".
-        what: it holds: "a saved run".
-        content: class of what it holds.
+        kind: name of the file type in the file.
+        number: raised whenever older programs would misread it; older formats are read.
+        reader: function that reads it, for messages: "load_run".
+        what: content in words: "a saved run".
+        content: class of the content.
     """
 
     kind: str
@@ -39,21 +39,22 @@ class Format(Generic[T]):
         """Write `thing` to a file.
 
         Raises:
-            ValueError: the file cannot be written, or something in it is what no file holds.
+            ValueError: the file cannot be written, or `thing` contains an object that a file cannot
+                hold.
         """
         with written(checks.path("output", path)) as temporary, temporary.open("wb") as file:
             packed.dump(file, thing, self.kind, self.number)
 
     def load(self, path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()) -> T:
-        """Load what `save` wrote; reading runs no code from the file.
+        """Return the object that `save` wrote; reading runs no code from the file.
 
         Args:
             path: the file.
-            own: your classes and functions in it.
+            own: the user's classes and functions in it.
 
         Raises:
-            ValueError: no such file, one that something else wrote, a damaged one, one of a newer
-                version, or classes that are not known.
+            ValueError: no such file, another or a damaged one, one of a newer version, or unknown
+                classes.
         """
         place, where = checks.path(self.reader, path), f"{self.reader} '{path}'"
         try:
@@ -69,17 +70,17 @@ class Format(Generic[T]):
 
 
 def module(where: str, name: str) -> Any:
-    """Return a package that may be missing.
+    """Import an optional package.
 
     Raises:
-        ImportError: it is, and what to do.
+        ImportError: it is not installed.
     """
     try:
         return import_module(name)
     except ImportError:
         raise ImportError(
             f"{where}: expected the package {name}, got none; install it by 'pip install {name}', "
-            "or take to_csv, which needs nothing"
+            "or use to_csv, which needs no package"
         ) from None
 
 
@@ -88,18 +89,18 @@ class Statistics:
     """Cost of a simulation.
 
     Attributes:
-        backend: what ran it.
+        backend: "vm" or "compiled".
         method: integration method.
         steps, rejections: accepted and rejected steps.
         evaluations, jacobians, factorisations: calls of the right-hand side, of its Jacobian, and
             LU factorisations.
         events: events that happened.
         smallest_step: smallest accepted step [s].
-        build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
+        build_time, compile_time, run_time: wall time [s] for making the integrator (0 if it is
             reused), compiling it, and running it.
         error: measured error relative to each state's magnitude, the largest; NaN if not requested.
         sensitivity_errors: measured error of derivatives by each requested name, relative
-            to the largest value of each state's derivative, the largest; NaN where there is none.
+            to the largest value of each state's derivative, the largest; NaN if there is none.
     """
 
     backend: str

@@ -1,4 +1,4 @@
-"""Moving sketch as lines and markers: geometry alone, so that any program may draw it."""
+"""Geometry of a moving sketch as lines and markers."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -11,13 +11,13 @@ from symfric.model.sketch import Mark, Part, Sketch
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 FLAT = 1e-6
-"""Motion out of a plane below this fraction of the motion in it is none."""
+"""Fraction of the motion in a plane below which motion out of it counts as zero."""
 SYMBOL = 0.02
 """Half the size of a joint's symbol, as a fraction of the whole machine."""
 ELEVATION, AZIMUTH = 22.0, -58.0
-"""From where a spatial motion is seen [degree]."""
+"""Direction of view of a spatial motion [degree]."""
 UPRIGHT = 0.99
-"""Component of the view along z beyond which z is no direction on the picture."""
+"""Component of the view along z beyond which z is not upward in the picture."""
 
 
 class Poses(NamedTuple):
@@ -38,12 +38,12 @@ class Stroke(NamedTuple):
     """Line or markers.
 
     Attributes:
-        role: what it stands for: body, arm (to the end of a spring), path, block, axis, guide,
-            rod, spring, damper, ground (a guide fixed to it), anchor, centre, or joint.
+        role: body, arm (to the end of a spring), path, block, axis, guide, rod, spring, damper,
+            ground (a guide fixed to it), anchor, centre, or joint.
         points: corners of the line, NaN where it is broken, shape (n, 3, pictures).
-        body: number of the body, which chooses the colour; -1 for what is no body.
+        body: number of the body, which selects the colour; -1 if it is not part of a body.
         marker: shape of a joint's marker.
-        sticks: whether the joint's contacts stick, per picture; None without friction.
+        sticks: True if the joint's contacts stick, per picture; None without friction.
     """
 
     role: str
@@ -57,9 +57,9 @@ class View(NamedTuple):
     """Direction from which a motion is seen.
 
     Attributes:
-        low, high: what the picture must show [m], shape (3,).
+        low, high: corners of the box in the picture [m], shape (3,).
         eye: direction towards the eye.
-        planar: whether all moves in a plane, `eye` being its normal.
+        planar: True if the motion is in a plane with the normal `eye`.
         size: half the size of a joint's symbol [m].
     """
 
@@ -71,14 +71,14 @@ class View(NamedTuple):
 
     @property
     def up(self) -> Array:
-        """Upwards on the picture: z, or y where that is not seen."""
+        """Upward direction in the picture: z, or y if the view is along z."""
         upwards = np.eye(3)[1 if abs(self.eye[2]) > UPRIGHT else 2]
         up = upwards - (upwards @ self.eye) * self.eye
         return np.asarray(up / np.linalg.norm(up))
 
     @property
     def right(self) -> Array:
-        """To the right on the picture."""
+        """Direction to the right in the picture."""
         return np.cross(self.up, self.eye)
 
 
@@ -102,8 +102,8 @@ def _points(places: Array) -> Array:
 def _normal(sketch: Sketch, poses: Poses) -> Array | None:
     """Return the normal of the plane in which everything moves, towards the eye; None in space.
 
-    A motion along a line, or none, is seen along its hinges; without hinges, in the plane
-    that holds all its places, or from the side if these lie on a line, too.
+    Motion along a line, or rest, is seen along the hinges; without hinges, along the normal of the
+    plane through all places, or from the side if these also lie on a line.
     """
     moved = _points(poses.at - poses.at[:, :, :1])
     hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.symbol.hinge]
@@ -127,9 +127,7 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
 
 
 def _aside(line: Array) -> Array:
-    """Return the direction from which a line is seen best: across it and level; y for one along
-    x or z.
-    """
+    """Return the horizontal direction across a line; y for one along x or z."""
     level = np.array([0.0, -1.0, 0.0]) if abs(line[1]) < UPRIGHT else np.array([1.0, 0.0, 0.0])
     across = level - (level @ line) * line
     return np.asarray(across / np.linalg.norm(across))
@@ -141,7 +139,7 @@ def strokes(
     """Yield everything that is drawn, from back to front.
 
     Args:
-        sketch, poses: what, and where.
+        sketch, poses: parts and their places.
         view: direction from which it is seen.
         sticks: joint -> True if its contacts stick, per picture.
     """
@@ -162,7 +160,7 @@ def strokes(
 
 
 def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Lines from the centre of mass to the places of a body; a block where they coincide."""
+    """Yield lines from the centre of mass to the places of a body; a block if they coincide."""
     centre = poses.at[part.centre]
     for role, places in (("arm", part.ends), ("body", part.corners)):
         arms = [poses.at[c] for c in places]
@@ -176,7 +174,7 @@ def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Itera
 
 
 def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Guides, slots, rods, springs, and where something hangs on the ground."""
+    """Yield guides, slots, rods, springs, and anchors on the ground."""
     a, b, z = poses.at[mark.a], poses.at[mark.b], poses.axes[mark.a, 2]
     if mark.symbol.guide or mark.symbol.slot:
         along = np.sum(z * (b - a), axis=0)
@@ -192,7 +190,7 @@ def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
 
 
 def _symbol(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Blocks, axes and plates of joints."""
+    """Yield blocks, axes and plates of joints."""
     a, b, size = poses.axes[mark.a], poses.at[mark.b], view.size
     if mark.symbol.guide:
         yield Stroke("block", _block(poses.axes[mark.b], b, size))

@@ -1,11 +1,11 @@
-"""Result of a simulation: named signals over time that plot, balance and save themselves."""
+"""Result of a simulation: named signals over time, with plots, energy balance and files."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, final
+from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 import numpy as np
@@ -35,17 +35,17 @@ class EnergyBalance(Showing):
 
         defect(t) = E(t) - E(0) - W(t),   W the sum of all work
 
-    W is the integral of the powers over the dense output, which error control does not see, so
-    that the defect shows the error of the simulation. It falls with the step as the method does,
-    with order 5 (rodas5p, radau5), 4 (rodas4p) or 3 (rodas3), and is up to a hundred times larger
-    inside the steps than at their ends. Energy that an event's reset takes at once is defect.
+    W is the integral of the powers over the dense output, which error control does not use, so
+    that the defect measures the error of the simulation. It has the order of the method, 5
+    (rodas5p, radau5), 4 (rodas4p) or 3 (rodas3), and is up to a hundred times larger inside the
+    steps than at their ends. Energy removed by the reset of an event belongs to the defect.
 
     Attributes:
         t: times [s], shape (n,).
         energy: kinetic and potential energy [J], without potentials that depend on time or inputs.
         work: name -> work done on the bodies [J]: by friction (negative), by each force that is
             not conservative, by prescribed motions.
-        defect: what is left [J].
+        defect: difference [J].
         scale: the largest kinetic energy, change of potential energy, or work [J].
     """
 
@@ -56,7 +56,7 @@ class EnergyBalance(Showing):
     scale: float
 
     def shown(self) -> Shown:
-        """Energy at the start and at the end, the work in between, and what is left."""
+        """Describe the energy at the start and at the end, the work in between, and the defect."""
         rows = [("energy at the start", f"{self.energy[0]:.6g}")]
         rows += [(f"work of {name}", f"{work[-1]:.6g}") for name, work in self.work.items()]
         rows += [("energy at the end", f"{self.energy[-1]:.6g}")]
@@ -67,13 +67,13 @@ class EnergyBalance(Showing):
 
     @property
     def relative(self) -> float:
-        """Largest defect over `scale`; 0 where nothing moved but rounding."""
+        """Largest defect over `scale`; 0 if nothing moved up to rounding."""
         largest = float(np.abs(self.defect).max(initial=0.0))
         moved = self.scale > 1e-16 * float(np.abs(self.energy).max(initial=0.0))
         return largest / self.scale if moved else 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Numbers at the end [J], and the largest defect."""
+        """Return the numbers at the end [J], and the largest defect."""
         return {
             "start": float(self.energy[0]),
             "end": float(self.energy[-1]),
@@ -84,19 +84,7 @@ class EnergyBalance(Showing):
 
 
 CHEAP = 200_000
-"""Steps times signals of a run whose steps are looked at without being asked: some 20 ms."""
-
-
-class Kept(Protocol):
-    """Run as data, see `symfric.integrator.stored`."""
-
-    def unpacked(self) -> "Trajectory":
-        """Return the run again."""
-        ...
-
-    def save(self, path: str | Path) -> None:
-        """Write it to a file."""
-        ...
+"""Steps times signals up to which extremes over all steps are always computed: about 20 ms."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,36 +93,36 @@ class Trajectory(packed.Portable, Signals):
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
     all signals anywhere in the span by the dense output of the method. Signals are evaluated when
-    they are first used. Further results, named in `details`, are not even written before:
-    `trajectory["hinge_Fx"]` gives a reaction, and plots and CSV files take such names, too.
+    they are first used. Further results are named in `details`: `trajectory["hinge_Fx"]` is a
+    reaction, and plots and CSV files accept such names, too.
 
     Attributes:
         scene: name of the model.
         t: times of the result [s], shape (n,).
         units: name -> unit of every signal.
-        status: how it ended; `message` says it in a sentence.
-        count: makes `statistics`: steps, evaluations, times.
+        status: how it ended; `message` explains it in a sentence.
+        count: function that returns `statistics`.
         span: first time and the last one reached [s].
-        ends: makes `step_times`.
-        states: the states alone, at any times; cheaper than all signals.
-        evaluate: all signals at any times.
-        express: an expression of the model at any times, shape (rows, n).
+        ends: function that returns `step_times`.
+        states: function of times that returns the states; cheaper than all signals.
+        evaluate: function of times that returns all signals.
+        express: function that returns an expression of the model at times, shape (rows, n).
         model: the model that was simulated.
         happened: (time [s], name) of every event.
-        differentiate: derivatives of all signals at any times, where they were requested.
-        delays: derivatives of the times of `happened`, likewise.
+        differentiate: function of times that returns derivatives of all signals, if requested.
+        delays: function that returns derivatives of the times of `happened`, likewise.
         pull_back: gradient of a weighted sum of signals at `t`, likewise.
-        keep: what a file and a pickle hold of it.
+        keep: function that returns the run as data for files and pickles.
     """
 
     hidden = Signals.hidden | {"keep"}
 
-    keep: "Callable[[Trajectory], Kept] | None" = None
+    keep: "Callable[[Trajectory], Any] | None" = None
 
     def shown(self) -> Shown:
         """Return laws, the end of the run, and the start, end and extremes of every signal.
 
-        Extremes are those over all steps where these are known or cheap, else those at `t`.
+        Extremes are those over all steps if these are known or cheap, else those at `t`.
         """
         counts, (first, last) = self.statistics, self.span
         known = "extremes" in self.__dict__ or counts.steps * len(self.units) <= CHEAP
@@ -169,13 +157,13 @@ class Trajectory(packed.Portable, Signals):
             yield (name, unit, *(f"{x:.6g}" for x in numbers))
 
     def thumbnail(self) -> "Figure":
-        """Some signals, small."""
+        """Return a small plot of some signals."""
         from symfric.results.pictures import thumbnail  # noqa: PLC0415  (matplotlib is slow to import)
 
         return thumbnail(self)
 
     def energy_balance(self) -> EnergyBalance:
-        """Return the balance of a mechanism's energy: work by cause, and the unexplained rest.
+        """Return the balance of a mechanism's energy: work by cause, and the defect.
 
         Raises:
             ValueError: a model without the detail "conserved" and powers of the kind `WORK`.
@@ -208,16 +196,16 @@ class Trajectory(packed.Portable, Signals):
         panels: str = "main",
         log: Sequence[str] = (),
     ) -> "Figure":
-        """Signals over time with units; saved to `path` if given.
+        """Plot signals over time with units; save the figure to `path` if given.
 
-        A notebook shows the figure that a cell returns; elsewhere `.show()` opens it in a window.
+        A notebook shows the figure that a cell returns; elsewhere `.show()` opens a window.
 
         Args:
-            names: signals or details to show, a panel each.
+            names: signals or details, a panel each.
             path: image file, its format taken from the ending.
             label: legend entry of this trajectory.
             panels: without names, "main" for positions, friction and energy or power, "all" for
-                every signal, those of a kind together where they are many.
+                every signal, grouped by kind if there are many.
             log: signals on logarithmic axes, as `plot("v", "x", log=["v"])`.
         """
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow to import)
@@ -232,17 +220,17 @@ class Trajectory(packed.Portable, Signals):
         speed: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        """Write a moving picture of a machine: GIF, HTML with the pictures inside, or MP4.
+        """Write an animation of a machine: GIF, HTML with embedded pictures, or MP4.
 
-        Planar machines are seen along the normal of their plane. Joints with friction are filled
-        while all their contacts move slower than the velocity scale of their law, hollow while one
-        slides.
+        Planar machines are seen along the normal of their plane. A joint with friction is filled
+        while all its contacts move slower than the velocity scale of their law, and hollow while
+        one slides.
 
         Args:
             path: file ending in .gif, .html or .mp4 (needs the program ffmpeg).
             fps: pictures per second.
-            speed: of the motion relative to real time; what lasts between 2 and 12 s is shown as
-                fast as it is, anything else in 6 s.
+            speed: of the motion relative to real time; by default 1 for runs of 2 to 12 s;
+                other runs are shown in 6 s.
             progress: called with the fraction done.
 
         Raises:
@@ -255,17 +243,18 @@ class Trajectory(packed.Portable, Signals):
     def save(self, path: str | Path) -> None:
         """Write the whole run to one file, which `symfric.load_run` reads to the bit.
 
-        It holds the model, the signals at `t` and all accepted steps, those of a long run found by
-        another one. A loaded run does all that this one does: times in between, extremes, further
-        results, pictures, films, energy, derivatives that were requested, another simulation of its
-        `model`. Functions are no data: inputs by functions are kept as expressions.
+        It holds the model, the signals at `t` and all accepted steps; a long run is repeated to
+        find its steps. A loaded run has all features of this one: times in between, extremes,
+        further results, plots, animations, energy, requested derivatives, another simulation of its
+        `model`. Inputs given by functions are stored as expressions.
 
         Raises:
-            ValueError: the file cannot be written, or a model holds what no file does.
+            ValueError: the file cannot be written, or the model contains an object that a file
+                cannot hold.
         """
         self.packed_as().save(path)
 
-    def packed_as(self) -> "Kept":
+    def packed_as(self) -> Any:
         """Return the run as data."""
         if self.keep is None:
             raise ValueError(f"{self._where}: expected one of simulate, got another")
@@ -283,9 +272,9 @@ class Trajectory(packed.Portable, Signals):
         write_table(path, header, np.column_stack([self.t, *columns.values()]).tolist())
 
     def to_dataframe(self, *names: str) -> Any:
-        """Signals or details, all signals if none is given, as a pandas table over t.
+        """Return signals or details, by default all signals, as a pandas table over t.
 
-        Units stand in its `attrs`.
+        Its `attrs` contain the units.
 
         Raises:
             ImportError: no pandas.
@@ -310,7 +299,7 @@ class Trajectory(packed.Portable, Signals):
         return xarray.Dataset(arrays, coords=times, attrs=self._about)
 
     def _columns(self, names: Sequence[str]) -> dict[str, Array]:
-        """Signals and details by name; all signals if none is named."""
+        """Return signals and details by name; by default all signals."""
         self.check(names)
         return {name: self[name] for name in names} if names else dict(self.signals)
 
@@ -319,7 +308,7 @@ class Trajectory(packed.Portable, Signals):
         return {"scene": self.scene, "status": self.status.name, "message": self.message}
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data: scene, status, statistics, units, times and signals."""
+        """Return scene, status, statistics, units, times and signals as plain data."""
         return {
             "scene": self.scene,
             "status": self.status.name,

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from phases import solve_once
 
 from examples import (
     arm_to_a_place,
@@ -15,7 +16,6 @@ from examples import (
 )
 from ocp import Problem, Solution, solve
 from ocp.friction.smooth_models import smoothed
-from ocp.solving.one_solve import solve_once
 
 
 def softly(problem: Problem, **widths: float) -> Solution:

@@ -40,8 +40,9 @@ from symfric.laws import Coulomb
 
 
 def doors_of_fits() -> Iterator[Door]:
-    data = synthetic_drive_data(speeds=(0.01, 0.05))
-    kind = InverseDynamics()
+    v = np.linspace(-0.1, 0.1, 60)
+    data = Dataset.of(v=v, F=np.sign(v) + v, points=True)
+    kind = Points()
 
     def fitted(**given: Any) -> Any:
         return Fit(**given).prepared()
@@ -51,7 +52,7 @@ def doors_of_fits() -> Iterator[Door]:
         fitted,
         {"kind": kind, "what": "coulomb+viscous", "data": data},
         {
-            "kind": [*thing(InverseDynamics), "inverse"],
+            "kind": [*thing(Points), "inverse"],
             "what": [*thing(Coulomb), "", "nonsense", "coulomb+"],
             "data": thing(Dataset, np.zeros((100, 3)), "run.csv"),
             "free": [
@@ -71,12 +72,12 @@ def doors_of_fits() -> Iterator[Door]:
                 {"x0": "estimate"},
                 {3: log(1.0, 2.0)},
             ],
-            "fixed": [*values("m")[1:], {"mu_d": -1.0}],
+            "fixed": [*values("mu_d")[1:], {"mu_d": -1.0}],
             "normal_force": number(0.0, -1.0),
-            "noise": [3, "nonsense", {"nonsense": 1.0}, *({"force": x} for x in number(0.0))],
+            "noise": [3, "nonsense", {"nonsense": 1.0}, *({"F": x} for x in number(0.0))],
             "loss": choice(),
             "starts": count(),
-            "start": [*choice()[1:], {"nonsense": 1.0}, *({"m": x} for x in number())],
+            "start": [*choice()[1:], {"nonsense": 1.0}, *({"mu_d": x} for x in number())],
             "seed": [*number(), -1, 1.5],
             "evaluations": count(1),
         },
@@ -202,9 +203,5 @@ def doors_of_identification() -> Iterator[Door]:
 
 
 test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
-    {
-        "fits": doors_of_fits,
-        "kinds": doors_of_kinds,
-        "data": doors_of_identification,
-    }
+    {"fits": doors_of_fits, "kinds": doors_of_kinds, "data": doors_of_identification}
 )

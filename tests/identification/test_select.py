@@ -27,17 +27,12 @@ def points(seed: int, noise: float = 0.05, n: int = 160) -> Dataset:
 
 @pytest.fixture(scope="module")
 def ranking() -> Ranking:
-    laws = ["coulomb", "coulomb+viscous", "stribeck", "stribek"]
-    return select(laws, points(1), Points(), starts=2)
+    laws = {name: name for name in ("coulomb", "coulomb+viscous", "stribeck")}
+    return select({**laws, "<odd>": "stribek"}, points(1), Points(), starts=2)
 
 
 def test_the_true_law_is_first_and_the_unknown_one_last(ranking: Ranking) -> None:
-    assert [row.law for row in ranking.rows] == [
-        "stribeck",
-        "coulomb+viscous",
-        "coulomb",
-        "stribek",
-    ]
+    assert [row.law for row in ranking.rows] == ["stribeck", "coulomb+viscous", "coulomb", "<odd>"]
     first = ranking.rows[0]
     assert first.status == "SOLVED"
     assert first.aicc == first.bic == 0.0
@@ -56,6 +51,9 @@ def test_ranking_prints_plots_and_is_plain_data(ranking: Ranking) -> None:
     assert rows[0]["operations"] > rows[2]["operations"]
     assert rows[-1]["validation [%]"] is None
     assert ranking.plot().axes
+    page = ranking._repr_html_()
+    assert ">stribeck<" in page and "&lt;odd&gt;" in page and "<odd>" not in page
+    assert page.count("<tr>") == 1 + 4
 
 
 def test_a_prediction_that_ran_away_is_no_number() -> None:

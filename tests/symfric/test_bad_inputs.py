@@ -1,6 +1,7 @@
 """Bad Python input: every public door refuses in one sentence, whatever it is given."""
 
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import Any
 
 import casadi as ca
@@ -12,7 +13,10 @@ from bad_values import (
     Thing,
     choice,
     count,
+    door,
+    each,
     every_door_refuses,
+    expression,
     flag,
     function,
     names,
@@ -25,9 +29,11 @@ from bad_values import (
 )
 
 import symfric as sf
-from symfric.laws import BrownMcPhee
+from symfric.figures import FIGURES, compare, figure
+from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
+from symfric.laws.catalogue import ALL_LAWS, POPULATIONS, WRAPPERS
 from symfric.model import Event, Model, Monitor, Output
-from symfric.scenes import Rabinowicz
+from symfric.scenes import ALL_SCENES, Rabinowicz
 
 QUICK = {"t_end": 0.01, "backend": "vm"}
 
@@ -58,12 +64,12 @@ def doors_of_simulation() -> Iterator[Door]:
         "event_tolerance": number(0.0, -1.0),
         "u": values("force"),
     }
-    yield Door(
+    yield door(
         "simulate",
         sf.simulate,
         QUICK | {"model": model},
-        {
-            **common,
+        **common
+        | {
             "t_eval": times([0.0, 0.02], [-1.0, 0.0]),
             "x0": values("v", {"v": [0.1, 0.2]}),
             "p": values("mu_d", {"m": 1.0}),
@@ -76,35 +82,24 @@ def doors_of_simulation() -> Iterator[Door]:
             "throw": flag(),
         },
     )
-    yield Door(
+    callables = (
+        *(lambda: 1.0, lambda t: "a", lambda t: None, lambda t: ca.vertcat(t, t), sf.Hold),
+        *(lambda t: __import__("math").sin(t), lambda t: 1.0 if t > 0 else 0.0, lambda t: NAN),
+        *(lambda t: ca.SX.sym("a"), lambda t: ca.MX.sym("a"), lambda t: [1.0, 2.0]),
+        *(lambda t: 1j, lambda t: 1 / 0),
+    )
+    yield door(
         "simulate, driven",
         sf.simulate,
         QUICK | {"model": driven},
-        {
-            "u": values(
-                "force",
-                {"force": lambda: 1.0},
-                {"force": lambda t: "a"},
-                {"force": lambda t: None},
-                {"force": lambda t: ca.vertcat(t, t)},
-                {"force": lambda t: __import__("math").sin(t)},
-                {"force": lambda t: 1.0 if t > 0 else 0.0},
-                {"force": lambda t: NAN},
-                {"force": lambda t: ca.SX.sym("a")},
-                {"force": lambda t: ca.MX.sym("a")},
-                {"force": lambda t: [1.0, 2.0]},
-                {"force": lambda t: 1j},
-                {"force": lambda t: 1 / 0},
-                {"force": sf.Hold},
-            ),
-        },
+        u=values("force", *each("force", *callables)),
     )
-    yield Door(
+    yield door(
         "simulate_many",
         sf.simulate_many,
         QUICK | {"model": model, "executor": "serial"},
-        {
-            **common,
+        **common
+        | {
             "t_end": [bad for bad in parameter(-1.0) if not isinstance(bad, list)],  # of members
             "x0": members("v"),
             "p": members("mu_d"),
@@ -117,22 +112,13 @@ def doors_of_simulation() -> Iterator[Door]:
             "progress": function(),
         },
     )
-    yield Door(
-        "flow",
-        sf.flow,
-        {"model": model},
-        {
-            "model": thing(),
-            "steps": count(),
-            "method": choice(),
-        },
-    )
+    yield door("flow", sf.flow, {"model": model}, model=thing(), steps=count(), method=choice())
     peer = sf.integrator.simulate_by_peer
-    yield Door(
+    yield door(
         "simulate_by_peer",
         peer,
         {"model": model, "t_end": 0.01, "peer": "rosenbrock"},
-        {
+        **{
             **{k: v for k, v in common.items() if k in ("model", "t_end", "t_start", "rtol")},
             "peer": [*choice(), "vm"],
             "x0": values("v"),
@@ -142,23 +128,18 @@ def doors_of_simulation() -> Iterator[Door]:
     )
     bad_rows = [3.0, None, "ab", [NAN], [INF], [[0.0]], {}, Thing(), 1j, [None], ["a"], True]
     for kind in (sf.Hold, sf.Linear):
-        yield Door(
+        yield door(
             kind.__name__,
             kind,
             {"t": [0.0], "values": [1.0]},
-            {
-                "t": [*bad_rows, [], [0.0, 1.0]],
-                # rows are of members of an ensemble
-                "values": [*(bad for bad in bad_rows if bad != [[0.0]]), [], [0.0, 1.0]],
-            },
+            t=[*bad_rows, [], [0.0, 1.0]],
+            values=[*(bad for bad in bad_rows if bad != [[0.0]]), [], [0.0, 1.0]],
         )
-        yield Door(
+        yield door(
             kind.__name__,
             kind,
             {"t": [0.0, 1.0], "values": [1.0, 2.0]},
-            {
-                "t": [[0.0, 0.0], [1.0, 0.0], [0.0, NAN]],
-            },
+            t=[[0.0, 0.0], [1.0, 0.0], [0.0, NAN]],
         )
 
 
@@ -166,174 +147,201 @@ def doors_of_a_trajectory() -> Iterator[Door]:
     run = sf.simulate(belt(), 0.01, backend="vm", samples=5, sensitivities=["mu_d"])
     unordered = ([], [0.01, 0.005], [0.0, 0.0])  # fine here
     inside = [x for x in times([0.02], [-1.0], NAN, INF)[1:] if x not in unordered]
-    yield Door("Trajectory.at", run.at, {}, {"times": inside})
-    yield Door(
+    yield door("Trajectory.at", run.at, times=inside)
+    yield door(
         "Trajectory.of",
         run.of,
         {"expression": 1.0},
-        {
-            "expression": [None, "v", Thing(), ca.SX.sym("a"), ca.MX.sym("a"), 1j, {}],
-            "times": [x for x in inside if x is not None],
-        },
+        expression=expression({}),
+        times=[x for x in inside if x is not None],
     )
-    yield Door(
+    yield door(
         "Trajectory.integral",
         run.integral,
         {"name": "v"},
-        {
-            "name": choice(),
-            "times": [x for x in inside if x is not None],
-        },
+        name=choice(),
+        times=[x for x in inside if x is not None],
     )
-    yield Door("Trajectory[]", run.__getitem__, {}, {})
-    yield Door("Trajectory[]", lambda name: run[name], {}, {"name": choice()})
-    yield Door("Trajectory.gradient", run.gradient, {}, {"weights": values("v")})
-    yield Door("Trajectory.to_csv", run.to_csv, {}, {"path": [*path(), "/dev/null", "."]})
-    yield Door("Trajectory.to_csv", lambda name: run.to_csv("a.csv", name), {}, {"name": choice()})
-    yield Door("Trajectory.to_json", run.to_json, {}, {"path": [*path(), "/dev/null", "."]})
-    yield Door("Trajectory.plot", lambda name: run.plot(name), {}, {"name": choice()})
-    yield Door("Trajectory.plot", run.plot, {}, {"path": [*path(), "a.xyz", "."]})
-    yield Door("Trajectory.animate", run.animate, {"path": "a.gif"}, {"path": path()})
-    yield Door("Trajectory.energy_balance", lambda x: run.energy_balance(), {}, {"x": [1]})
+    yield door("Trajectory[]", lambda name: run[name], name=choice())
+    yield door("Trajectory.gradient", run.gradient, weights=values("v"))
+    yield door("Trajectory.to_csv", run.to_csv, path=[*path(), "/dev/null", "."])
+    yield door("Trajectory.to_csv", lambda name: run.to_csv("a.csv", name), name=choice())
+    yield door("Trajectory.to_json", run.to_json, path=[*path(), "/dev/null", "."])
+    yield door("Trajectory.plot", lambda name: run.plot(name), name=choice())
+    yield door("Trajectory.plot", run.plot, path=[*path(), "a.xyz", "."])
+    yield door("Trajectory.animate", run.animate, {"path": "a.gif"}, path=path())
+    yield door("Trajectory.energy_balance", lambda x: run.energy_balance(), x=[1])
 
 
 def doors_of_models() -> Iterator[Door]:
     x = sf.Variable("x", "m")
-    good = {"name": "m", "x": (x,), "ode": -x.symbol}
-    yield Door(
+    good, output = {"name": "m", "x": (x,), "ode": -x.symbol}, Output(x.symbol, "m")
+    yield door(
         "Variable",
         sf.Variable,
         {"name": "x", "unit": "m"},
-        {
-            "name": [None, 3, [], {}, Thing(), "", " "],
-            "unit": [None, 3, [], Thing()],
-            "start": ["0.1", [0.1], {}, Thing(), True, 1j, NAN, None, ca.SX.sym("s", 2)],
-            "nominal": number(0.0, -1.0),
-            "lower": ["0", [0.0], Thing(), NAN, True, 1j, INF, None],
-            "upper": ["0", [0.0], NAN, True, 1j, -INF],
-            "symbol": [3, "x", None, Thing(), ca.SX.sym("a", 2), ca.MX.sym("a"), ca.SX(3)],
-        },
+        name=[None, 3, [], {}, Thing(), "", " "],
+        unit=[None, 3, [], Thing()],
+        start=["0.1", [0.1], {}, Thing(), True, 1j, NAN, None, ca.SX.sym("s", 2)],
+        nominal=number(0.0, -1.0),
+        lower=["0", [0.0], Thing(), NAN, True, 1j, INF, None],
+        upper=["0", [0.0], NAN, True, 1j, -INF],
+        symbol=[3, "x", None, Thing(), ca.SX.sym("a", 2), ca.MX.sym("a"), ca.SX(3)],
     )
-    yield Door(
+    collection = [3, "x", (3,), Thing(), (x,)]
+    yield door(
         "Model",
         Model,
         good,
-        {
-            "name": [None, 3, [], Thing()],
-            "x": [3, "x", [3], (None,), Thing(), x, (x, x), (x.symbol,)],
-            "z": [3, "x", (3,), Thing(), (x,), (sf.Variable("z", "m"),)],
-            "u": [3, "x", (3,), Thing(), (x,)],
-            "p": [3, "x", (3,), Thing(), (x,)],
-            "ode": [
-                None,
-                "x",
-                Thing(),
-                {},
-                ca.SX.sym("a"),
-                ca.SX(2, 1),
-                ca.MX.sym("a"),
-                1j,
-                lambda: 1,
-            ],
-            "alg": [None, "x", Thing(), ca.SX.sym("a"), ca.SX(2, 1), 1j],
-            "outputs": [
-                3,
-                "x",
-                [3],
-                {"y": 3},
-                {3: Output(x.symbol, "m")},
-                {"y": None},
-                Thing(),
-                {"1y": Output(x.symbol, "m")},
-                {"x": Output(x.symbol, "m")},
-            ],
-            "monitors": [3, "x", (3,), Thing(), Monitor(x.symbol, 1.0)],
-            "events": [3, "x", (3,), Thing(), Event("e", x.symbol)],
-            "t": [3, "t", None, Thing(), ca.SX.sym("t", 2), ca.MX.sym("t")],
-        },
+        name=[None, 3, [], Thing()],
+        x=[3, "x", [3], (None,), Thing(), x, (x, x), (x.symbol,)],
+        z=[*collection, (sf.Variable("z", "m"),)],
+        u=collection,
+        p=collection,
+        ode=expression({}, ca.SX(2, 1), lambda: 1),
+        alg=expression(ca.SX(2, 1))[1:],
+        outputs=[*collection[:-1], *each("y", 3, None), *({n: output} for n in (3, "1y", "x"))],
+        monitors=[*collection[:-1], Monitor(x.symbol, 1.0)],
+        events=[*collection[:-1], Event("e", x.symbol)],
+        t=[3, "t", None, Thing(), ca.SX.sym("t", 2), ca.MX.sym("t")],
     )
-    yield Door(
+    yield door(
         "Output",
         lambda **a: Model(**good, outputs={"y": Output(**a)}),
         {"expression": x.symbol, "unit": "m"},
-        {
-            "expression": [
-                None,
-                "x",
-                Thing(),
-                {},
-                1j,
-                ca.SX.sym("a"),
-                ca.SX.sym("a", 2),
-                ca.MX.sym("a"),
-                NAN,
-                True,
-            ],
-            "unit": [None, 3, Thing()],
-        },
+        expression=expression({}, ca.SX.sym("a", 2), NAN, True),
+        unit=[None, 3, Thing()],
     )
-    yield Door(
+    yield door(
         "Monitor",
         lambda **a: Model(**good, monitors=(Monitor(**a),)),
         {"expression": x.symbol, "nominal": 1.0},
-        {
-            "expression": [None, "x", Thing(), 1j, ca.SX.sym("a"), ca.MX.sym("a")],
-            "nominal": number(0.0, -1.0),
-        },
+        expression=expression(),
+        nominal=number(0.0, -1.0),
     )
-    yield Door(
+    values_of_reset = (None, "a", ca.SX.sym("q"), ca.SX(2, 1), NAN, 1j)
+    yield door(
         "Event",
         lambda **a: Model(**good, events=(Event(**a),)),
         {"name": "e", "expression": x.symbol},
-        {
-            "name": [None, 3, Thing()],
-            "expression": [
-                None,
-                "x",
-                Thing(),
-                1j,
-                ca.SX.sym("a"),
-                ca.SX.sym("a", 2),
-                ca.MX.sym("a"),
-            ],
-            "direction": [None, "1", 2, 0.5, Thing(), True, [1], NAN],
-            "terminal": flag(),
-            "reset": [
-                3,
-                "x",
-                [1],
-                {"y": 1.0},
-                {"x": None},
-                {"x": "a"},
-                {"x": ca.SX.sym("q")},
-                {"x": ca.SX(2, 1)},
-                {3: 1.0},
-                Thing(),
-                {"x": NAN},
-                {"x": 1j},
-            ],
-        },
+        name=[None, 3, Thing()],
+        expression=expression(ca.SX.sym("a", 2)),
+        direction=[None, "1", 2, 0.5, Thing(), True, [1], NAN],
+        terminal=flag(),
+        reset=[3, "x", [1], {"y": 1.0}, {3: 1.0}, Thing(), *each("x", *values_of_reset)],
     )
     model = belt()
-    yield Door("Model.function", model.function, {}, {"what": choice()})
-    yield Door("Model.expression", model.expression, {}, {"name": choice()})
-    yield Door(
-        "Model.values",
-        model.values,
-        {"letter": "p"},
-        {
-            "given": values("mu_d"),
-        },
+    yield door("Model.function", model.function, what=choice())
+    yield door("Model.expression", model.expression, name=choice())
+    yield door("Model.values", model.values, {"letter": "p"}, given=values("mu_d"))
+    yield door("Model.initial_state", model.initial_state, given=values("v"), p=values("mu_d"))
+
+
+def doors_of_laws() -> Iterator[Door]:
+    for kind in (ALL_LAWS | POPULATIONS).values():
+        bad: dict[str, list[Any]] = {}
+        for item in fields(kind):
+            if "unit" in item.metadata:
+                more = [item.metadata["lower"] - 1.0, item.metadata["upper"] + 1.0]
+                bad[item.name] = parameter(*(x for x in more if abs(x) < INF))
+            elif "choices" in item.metadata:
+                bad[item.name] = choice()
+        yield door(kind.__name__, kind, **bad)
+    yield door("Sum", sf.Sum, laws=[*thing(), (), (Coulomb(),), (Coulomb(), 3), Coulomb()])
+    yield door(
+        "Asymmetric",
+        sf.Asymmetric,
+        {"positive": Coulomb(), "negative": Coulomb()},
+        positive=thing(Coulomb, Stribeck()),
+        negative=thing(Coulomb, LuGre()),
+        v_blend=parameter(0.0, -1.0),
     )
-    yield Door(
-        "Model.initial_state",
-        model.initial_state,
-        {},
-        {
-            "given": values("v"),
-            "p": values("mu_d"),
-        },
+    for name, wrapper in WRAPPERS.items():
+        yield door(name, wrapper, {"law": Stribeck()}, law=thing(Coulomb))
+    yield door("GMS", sf.GMS, elements=[*thing(), (), (3,), (sf.Element,)])
+    yield door("MaxwellSlip", sf.MaxwellSlip, elements=[*thing(), (), (3,), (sf.Slider,)])
+    yield door(
+        "Table",
+        sf.Table,
+        {"speeds": (0.0, 1.0), "coefficients": (0.2, 0.1)},
+        speeds=[*thing(), (0.0,), (1.0, 0.0), (0.0, NAN), ("a", "b"), (-1.0, 1.0)],
+        coefficients=[*thing(), (0.0,), (1.0, -1.0), (0.0, INF), ("a", "b")],
     )
+    for kind in (sf.GenericAsperity, sf.RandomBristles):
+        bad = {"count": count(), "seed": [*number(-1), 1.5]}
+        yield door(kind.__name__, kind, **bad)
+    rows = [None, 3.0, "ab", [], [0.0], [0.0, NAN], [[0.0, 1.0]], {}, Thing(), [1j, 2], ["a", "b"]]
+    yield door(
+        "Population.force",
+        sf.RandomBristles().force,
+        {"t": [0.0, 1.0], "x": [0.0, 1.0], "N": 1.0},
+        t=[*rows, [1.0, 0.0], [0.0, 0.0]],
+        x=rows,
+        N=number(-1.0),
+    )
+    texts = ["lugre+", "nonsense", "lugre)", "lagged()", "lagged", "x" * 10000]
+    texts.append("lagged(" * 600 + "lugre" + ")" * 600)
+    yield door(
+        "law_from_text",
+        sf.law_from_text,
+        text=[None, 3, [], Thing(), "", "+", Coulomb, *texts],
+    )
+    for query in (sf.law_name, sf.parameters):
+        yield door(query.__name__, lambda x, query=query: query(x), x=thing(Coulomb))
+    yield door(
+        "with_values",
+        sf.with_values,
+        {"obj": LuGre(), "values": {}},
+        obj=thing(LuGre),
+        values=[*values("mu_s")[:8], *({"mu_s": x} for x in parameter(-1.0))],
+    )
+    yield door("symbolise", lambda name: sf.symbolise(LuGre(), name), name=choice())
+    yield door("symbolise", lambda x: sf.symbolise(x, "mu_s"), x=thing(LuGre))
+
+
+def doors_of_scenes() -> Iterator[Door]:
+    for name, kind in ALL_SCENES.items():
+        bad: dict[str, list[Any]] = {"law": thing(BrownMcPhee, "lugre", belt())}
+        for item in fields(kind):
+            if "unit" in item.metadata:
+                low = item.metadata["lower"]
+                bad[item.name] = parameter(*([low - 1.0] if low > -INF else []))
+        yield door(name, kind, {"law": BrownMcPhee()}, **bad)
+    for make in (sf.rabinowicz, sf.drive):
+        yield door(
+            make.__name__,
+            make,
+            {"law": BrownMcPhee()},
+            law=thing(BrownMcPhee, "lugre"),
+            free=names("mu_d"),
+            mu_d=parameter(-1.0),
+            nonsense=[1.0],
+        )
+    yield door("Scene.model", Rabinowicz(BrownMcPhee()).model, free=names("mu_d"))
+
+
+def doors_of_figures() -> Iterator[Door]:
+    yield door(
+        "compare",
+        compare,
+        {"laws": [Coulomb()]},
+        laws=[*thing("lugre", Coulomb()), [3], [None], ["nonsense"], {"a": 3}, [Coulomb]],
+        scenario=choice(),
+        N=number(0.0, -1.0),
+    )
+    yield door(
+        "figure",
+        figure,
+        {"law": Coulomb(), "name": "profile"},
+        law=thing(Coulomb),
+        name=choice(),
+        N=number(0.0, -1.0),
+    )
+    for name, make in FIGURES.items():
+        yield door(name, make, {"law": LuGre()}, law=thing(LuGre), N=number(0.0, -1.0))
+    data = compare([Coulomb()])
+    yield door("FigureData[]", lambda name: data[name], name=choice())
+    yield door("FigureData.plot", data.plot, path=[*path(), "a.xyz", "."])
 
 
 test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
@@ -341,5 +349,8 @@ test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
         "simulation": doors_of_simulation,
         "trajectory": doors_of_a_trajectory,
         "models": doors_of_models,
+        "laws": doors_of_laws,
+        "scenes": doors_of_scenes,
+        "figures": doors_of_figures,
     }
 )

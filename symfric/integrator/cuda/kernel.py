@@ -13,7 +13,7 @@ from symfric.integrator.compiled.columns import densified
 from symfric.integrator.equations.blocks import DONE, ROUNDS
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 from symfric.integrator.step.pieces import in_c, macros
 
 NAME = "symfric_launch"

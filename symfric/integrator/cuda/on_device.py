@@ -17,7 +17,7 @@ from symfric.integrator.many.members import Advanced, Counts, Stretch, struct
 from symfric.integrator.many.program import Program, program
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.layout import State
+from symfric.integrator.step.attempt import State
 from symfric.model import Model
 
 Array = NDArray[np.float64]

@@ -122,11 +122,6 @@ class Blocks(NamedTuple):
         """Return the factors of W = M / (gamma h) - J at a point, for `solve`."""
         return self.pack(self.slopes(y, d), h)
 
-    @property
-    def instructions(self) -> int:
-        """Instructions of the Jacobian and the factorisation."""
-        return self.slopes.n_instructions() + self.pack.n_instructions()
-
 
 @lru_cache(maxsize=2)
 def blocks(system: System, gamma: float) -> Blocks:
@@ -136,21 +131,16 @@ def blocks(system: System, gamma: float) -> Blocks:
     W = own.matrix(system.mass * reciprocal(gamma * h))
     lu = factorise(W, own.pivots, system.orders.get("step", ()))
     f = ca.Function("f", [system.y, system.d], [system.f], {"cse": True})
-    solved = _solved(lu, right + system.mass @ memory)
+    # inner equations have zero right-hand sides
+    padded = ca.vertcat(right + system.mass @ memory, ca.SX(W.size1() - system.n, 1))
     return Blocks(
         system.in_steps(f),
         own.values,
         ca.Function("pack", [own.entries, h], [lu.packed], {"cse": True}),
-        ca.Function("solve", [lu.symbols, right, memory], [solved]),
+        ca.Function("solve", [lu.symbols, right, memory], [lu.solve(padded)[: system.n]]),
         lu,
         Factors("step", own.values, (own.entries, h), W, lu.order),
     )
-
-
-def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
-    """Return the unknowns of a system whose inner equations have zero right-hand sides."""
-    n = right.numel()
-    return lu.solve(ca.vertcat(right, ca.SX(len(lu.eliminations) - n, 1)))[:n]
 
 
 @lru_cache(maxsize=2)
@@ -163,24 +153,6 @@ def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
     matrix = own.matrix(system.mass, [i for i in range(system.n) if i not in rows])
     lu = factorise(matrix, own.pivots, system.orders.get("tiny", ()))
     return lu, Factors("tiny", own.values, (own.entries, ca.SX.sym("h")), matrix, lu.order)
-
-
-@lru_cache(maxsize=2)
-def refinement(system: System) -> ca.Function:
-    """Return the Function (y, d) -> y of a mechanism on its constraints, algebraic unknowns exact.
-
-    It makes two steps of Newton's method for accelerations, multipliers and normal forces.
-    """
-    right, g = ca.SX.sym("right", system.n), _residual(system)
-    lu, factors = at_rest(system)  # use its symbols: the cache of `slopes` may be newer
-    pack = ca.Function("pack", [factors.symbols[0]], [lu.packed])
-    solve = ca.Function("solve", [lu.symbols, right], [_solved(lu, right)])
-    y, d = ca.SX(system.y), system.d
-    if system.manifold is not None:
-        y = ca.SX(system.manifold.project(y, d))
-    for _ in range(2):
-        y = y + solve(pack(factors.entries(y, d)), g(y, d))
-    return ca.Function("refine", [system.y, d], [y], {"cse": True})
 
 
 def _residual(system: System) -> ca.Function:
@@ -285,13 +257,18 @@ def following(system: System) -> Following | None:
     return Following(_round(system, parts, ca.MX) if large else inlined, contraction)
 
 
+@lru_cache(maxsize=2)
 def corrected(system: System) -> ca.Function:
-    """Return (y, d) -> y with its algebraic unknowns after the first correction of a round, in
-    SX.
+    """Return the Function (y, d) -> y with its algebraic unknowns after a step of Newton's method.
+
+    A mechanism is first projected onto its constraints, and makes two steps.
     """
-    y, d, parts = system.y, system.d, _parts(system)
-    _, change = parts.solve(parts.pack(parts.entries(y, d)), parts.residual(y, d))
-    return ca.Function("corrected", [y, d], [y + change], {"cse": True})
+    y, d, parts, manifold = system.y, system.d, _parts(system), system.manifold
+    end = y if manifold is None else ca.SX(manifold.project(y, d))
+    for _ in range(1 if manifold is None else 2):
+        _, change = parts.solve(parts.pack(parts.entries(end, d)), parts.residual(end, d))
+        end = end + change
+    return ca.Function("corrected", [y, d], [end], {"cse": True})
 
 
 class _Parts(NamedTuple):

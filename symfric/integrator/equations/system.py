@@ -220,7 +220,7 @@ class System:
         """True if the mass matrix is the identity."""
         return np.array_equal(self.M, np.eye(self.n))
 
-    @property
+    @cached_property
     def has_pivots(self) -> bool:
         """True if pivots have to be chosen by numbers. Those of differential equations alone
         (1/(gamma h) dominates for small steps) and of mechanisms (definite matrices) are stable.

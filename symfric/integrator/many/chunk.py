@@ -20,7 +20,7 @@ from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 from symfric.model import Model
 
 Array = NDArray[np.float64]

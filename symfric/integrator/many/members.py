@@ -29,7 +29,7 @@ from symfric.integrator.running.plants import (
     loaded,
 )
 from symfric.integrator.running.record import Dense, Outputs
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

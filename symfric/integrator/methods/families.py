@@ -315,8 +315,8 @@ def eliminated(system: System) -> tuple[ca.Function, ca.Function] | None:
     G = ca.sparsify(ca.jacobian(system.f[rows], z))
     if ca.depends_on(G, z):
         return None
-    lu, right = factorise(G, groups), ca.SX.sym("right", len(rows))
-    solve = ca.Function("eliminate", [lu.symbols, right], [lu.solve(right)])
+    lu = factorise(G, groups)
+    solve = lu.solver("eliminate")
     settled, rates = ca.SX(y), ca.SX(system.f)
     settled[columns] = solve(lu.packed, -ca.substitute(system.f[rows], z, ca.SX.zeros(len(rows))))
     rates[rows] = 0

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.equations.expressions import divided_once
-from symfric.integrator.step.layout import Record
+from symfric.integrator.running.record import Record
 from symfric.model import Model
 
 Array = NDArray[np.float64]

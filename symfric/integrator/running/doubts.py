@@ -209,7 +209,7 @@ class Held:
         """Return an upper bound of force over level in a run, from the extremes of each state."""
         if self.screen is None:
             return inf
-        tops = np.array([*map(run.farthest, self.rows)])
+        tops = run.farthest[self.rows]
         if self.linear:
             if (limits := self._limits.get(p.tobytes())) is None:
                 _, level, slope = self.screen(0.0, p)

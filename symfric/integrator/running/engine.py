@@ -11,7 +11,7 @@ so a call from Python passes a single address (`Work`).
 import ctypes
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Protocol, final
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -25,8 +25,8 @@ from symfric.integrator.equations.initial import FLOOR, SURE
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import LOOKS, Crossings
 from symfric.integrator.running.events import Change, Eventful, Search, Stop
-from symfric.integrator.running.record import Dense, Outputs
-from symfric.integrator.step.layout import GROWTH_MEMORY, Given, Record, State
+from symfric.integrator.running.record import Dense, Outputs, Record
+from symfric.integrator.step.attempt import GROWTH_MEMORY, Given, State
 
 Array = NDArray[np.float64]
 STOPS = tuple(Stop)
@@ -107,25 +107,6 @@ class Work:
         loop.times, loop.out = address(outputs.times), address(outputs.values)
         if events is not None:
             loop.memory, loop.jumps, loop.max_jumps = events.pointers
-
-
-class Engine(Protocol):
-    """Engine that runs attempts until the end, a full record, an attempt limit or a tiny step."""
-
-    @property
-    def name(self) -> str:
-        """Name of the engine: vm or compiled."""
-        ...
-
-    def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work` over its input intervals, and fill its outputs.
-
-        A step below `h_min`, or below the resolution of t (`FLOOR`), stops it.
-
-        Returns:
-            Records (overwritten by the next call), the attempts made and the reason to stop.
-        """
-        ...
 
 
 class _Batch:
@@ -283,14 +264,15 @@ class CompiledEngine:
         return work.rows[: loop.count], loop.made, STOPS[reason]
 
 
+Engine = VmEngine | CompiledEngine
+"""Engine that makes attempts until the end, a full record, an attempt limit, an event that needs
+the caller, or a step below `h_min` or the resolution of t (`FLOOR`).
+"""
 FOLDER = Path(__file__).parent
 
 
 def c_source(
-    step: ca.Function,
-    dense_rows: int,
-    *others: ca.Function,
-    crossings: Crossings | None = None,
+    step: ca.Function, dense_rows: int, *others: ca.Function, crossings: Crossings | None = None
 ) -> str:
     """Return the CasADi C of the step with the attempt loop that calls it until it must stop.
 

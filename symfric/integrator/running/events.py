@@ -24,8 +24,8 @@ from symfric.integrator.running.crossings import (
     Memory,
     passed,
 )
-from symfric.integrator.running.record import Jumps
-from symfric.integrator.step.layout import Given, Record, State
+from symfric.integrator.running.record import Jumps, Record
+from symfric.integrator.step.attempt import Given, State
 from symfric.model.parts import Event
 
 Array = NDArray[np.float64]

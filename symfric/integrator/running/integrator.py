@@ -15,7 +15,7 @@ from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.blocks import Following, corrected, following, refinement
+from symfric.integrator.equations.blocks import Following, corrected, following
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
@@ -167,7 +167,7 @@ class Integrator:
         if s.manifold is None:
             return signals
         t, y, d = ca.SX.sym("t"), ca.SX.sym("y", s.n), ca.SX.sym("d", s.d.numel())
-        return ca.Function("signals", [t, y, d], [signals(t, refinement(s)(y, d), d)])
+        return ca.Function("signals", [t, y, d], [signals(t, corrected(s)(y, d), d)])
 
     @cached_property
     def signal_columns(self) -> Columns:
@@ -215,11 +215,6 @@ class Integrator:
         quick = manifold is not None and not manifold.applied and bool(self.model.u)
         return consistent(self.system, where, y, d, self.follow if quick else None)
 
-    @cached_property
-    def has_pivots(self) -> bool:
-        """See `System.has_pivots`."""
-        return self.system.has_pivots
-
     def suited(self, points: Sequence[tuple[Array, Array]], span: float) -> "Integrator":
         """Return this integrator, or one of the same model with stable pivots.
 
@@ -230,7 +225,7 @@ class Integrator:
                 one are computed.
             span: duration of the run [s].
         """
-        if not self.has_pivots:
+        if not self.system.has_pivots:
             return self
         key = (*(part.tobytes() for point in points for part in point), span)
         found = self._judged.get(key)

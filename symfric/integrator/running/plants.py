@@ -20,7 +20,7 @@ from symfric.integrator.running.engine import FOLDER, Engine, Work, c_source
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -46,7 +46,7 @@ class Plants:
     """Mutable data of plants of one model; both engines work on these arrays, row by row in memory.
 
     Attributes:
-        S, R: columns of an attempt, one row per plant (`symfric.integrator.step.layout`).
+        S, R: columns of an attempt, one row per plant (`symfric.integrator.step.attempt`).
         u: inputs to hold next, shape (plants, nu); the last run data are those held now.
         begin: start times [s]; the k-th sample of a plant is at begin + k dt.
         count: k; unchanged for a plant that has not reached its sample.
@@ -156,20 +156,15 @@ def plants_source(integrator: Integrator) -> str:
     return attempts + jump + MEMBERS + plants
 
 
-def in_python(integrator: Integrator, plants: Plants, engine: Engine, tolerance: float) -> Advance:
-    """Return the loop in Python: one plant after the other.
+@final
+class InPython:
+    """Loop in Python, one plant after the other, as `Advance`.
 
     Args:
         integrator, plants: model and data.
         engine: of models with events, for which it searches (`symfric.integrator.running.events`).
         tolerance: of event times [s].
     """
-    return _InPython(integrator, plants, engine, tolerance).advance
-
-
-@final
-class _InPython:
-    """Loop in Python, with buffers for one plant."""
 
     def __init__(
         self, integrator: Integrator, plants: Plants, engine: Engine, tolerance: float
@@ -185,8 +180,8 @@ class _InPython:
         self.work.loop.h_min = plants.h_min
         self.attempt = bound(step, (self.work.S, self.work.R), (self.after,))
 
-    def advance(self, begin: int) -> int:
-        """Advance all plants, as `Advance`."""
+    def __call__(self, begin: int) -> int:
+        """Advance all plants."""
         plants, S, R = self.plants, self.work.S, self.work.R
         if begin and not np.isfinite(plants.u).all():
             return REFUSED

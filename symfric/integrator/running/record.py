@@ -13,6 +13,39 @@ from symfric.foundation.status import Status
 Array = NDArray[np.float64]
 
 
+class Record(NamedTuple):
+    """Layout of the record (t0, t1, y0, y1, D) of an accepted step.
+
+    Attributes:
+        n: number of unknowns.
+        rows: of the dense output D, each of length n.
+    """
+
+    n: int
+    rows: int
+    T0 = 0
+    T1 = 1
+
+    @property
+    def width(self) -> int:
+        """Length of a record."""
+        return 2 + (2 + self.rows) * self.n
+
+    @property
+    def y0(self) -> slice:
+        """Slice of the unknowns at the start."""
+        return self.bend(-2)
+
+    @property
+    def y1(self) -> slice:
+        """Slice of the unknowns at the end."""
+        return self.bend(-1)
+
+    def bend(self, k: int) -> slice:
+        """Return the slice of row `k` of the dense output."""
+        return slice(2 + (2 + k) * self.n, 2 + (3 + k) * self.n)
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Dense:
@@ -298,12 +331,10 @@ class Run:
         times = [self.t], *(rows[:, 1] for rows in self._rows)
         return np.concatenate(times), np.concatenate([self.y[None], *self._ends])
 
-    def farthest(self, unknown: int) -> float:
-        """Return the largest magnitude of an unknown at the start and at the ends of steps."""
-        rows, n = self._rows, self.y.size
-        first = rows[0][0, 2:] if self._before is None else self._before.reach
-        ends = first[..., unknown], *(part[:, 2 + n + unknown] for part in rows)
-        return max(float(np.abs(y).max()) for y in ends)
+    @property
+    def farthest(self) -> Array:
+        """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
+        return np.abs(self.reach).max(axis=0)
 
     def at(self, times: Array) -> Array:
         """Return unknowns at `times` [s], shape (n, times); for a long run by recomputation."""

@@ -23,7 +23,7 @@ from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
@@ -121,7 +121,7 @@ def integrate(
         # most states are not even small at the end
         if (np.abs(run.end[: nominal.size]) >= SMALL * nominal).all() or not run.status.ok:
             break
-        own = finer(scale, np.array([*map(run.farthest, range(nominal.size))]), nominal)
+        own = finer(scale, run.farthest[: nominal.size], nominal)
         if own is None:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)

@@ -15,25 +15,77 @@ middle of the dense output approximates s. A method whose steps are differentiat
 `finer`: the derivative of friction, a peak of width w, needs several stages, while the state needs
 only its integral. A model without monitors has none of this.
 
-An attempt is ONE CasADi Function, whatever the method. Its state S and its constant data R are
-columns (`layout`). `step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds
-the dense output) or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for
-derivatives and C code.
+An attempt is ONE CasADi Function, whatever the method, of two columns:
+
+    S = (t, h, h_old, growth_old, rejected, y)     changed by an attempt
+    R = (t_end, rtol, h_max, atol[nx], d)          not changed
+
+`step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds the dense output) or
+rejects (h shrinks). Columns of many members are the rows of a matrix. `fixed(y, h, d) -> y_next` is
+the bare step, for derivatives and C code.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation.numeric import reciprocal
 from symfric.integrator.equations.blocks import blocks, signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
-from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 from symfric.integrator.step.tangent import tangent
+
+Array = NDArray[np.float64]
+GROWTH_MEMORY = 2.5
+"""Largest growth of the step size that the controller stores."""
+
+
+@final
+class State:
+    """Rows of S: time, step to try, last accepted step, its growth, 1 if the last was rejected."""
+
+    T, H, H_OLD, GROWTH_OLD, REJECTED = range(5)
+    MEMORY = 5
+    Y = slice(MEMORY, None)
+
+    @staticmethod
+    def at(t: float, h: float, y: ArrayLike) -> Array:
+        """Return S at the time `t` without history, to try the step `h`; y (..., n)."""
+        return _joined([t, h, h, GROWTH_MEMORY, 0.0], np.asarray(y, dtype=float))
+
+
+@final
+class Given:
+    """Rows of R: end, relative tolerance, longest step, absolute tolerances, run data."""
+
+    T_END, RTOL, H_MAX = range(3)
+    FIXED = 3
+
+    @staticmethod
+    def of(t_end: float, rtol: float, h_max: float, atol: ArrayLike, d: ArrayLike) -> Array:
+        """Return R for run data d (..., n_d) and atol (nx,)."""
+        return _joined([t_end, rtol, h_max, *np.asarray(atol, dtype=float)], np.asarray(d))
+
+    @staticmethod
+    def atol(nx: int) -> slice:
+        """Return the slice of the absolute tolerances of `nx` states."""
+        return slice(Given.FIXED, Given.FIXED + nx)
+
+    @staticmethod
+    def d(nx: int) -> slice:
+        """Return the slice of the run data after the tolerances of `nx` states."""
+        return slice(Given.FIXED + nx, None)
+
+
+def _joined(common: list[float], own: Array) -> Array:
+    """Prepend the same first entries to every row of `own`."""
+    first = np.broadcast_to(np.array(common), (*own.shape[:-1], len(common)))
+    return np.concatenate([first, own], axis=-1)
+
 
 REACH = 4.0
 """Largest travel in units of w: the stages of such a step resolve friction that rises over w and

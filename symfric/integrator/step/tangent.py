@@ -24,7 +24,7 @@ Source: Haug, Mech. Based Des. Struct. Mach., 2016-2018 (tangent-space index-0 D
 """
 
 from functools import lru_cache
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -40,76 +40,11 @@ and from 1, and the stages of a method of order 5 need 5.
 """
 
 
-class Tangent(NamedTuple):
-    """Functions between the unknowns y of a mechanism and y_c = (w, w', other unknowns) in a chart.
-
-    Attributes:
-        reduced: the system in the chart; its run data are (d, chart).
-        open: (y, d) -> (d, chart) for the chart at y.
-        enter: (y, data) -> y_c at its origin.
-        leave: (y_c, data) -> y, on the constraints to the order of the method.
-        polish: (y, d) -> y on the constraints.
-        lift: (e_c, data) -> change of y, to first order.
-        bend: (y0, y1, h, data) -> correction of the dense output, normal to the chart: two columns,
-            of a cubic with the values and rates at both ends.
-    """
-
-    reduced: System
-    open: ca.Function
-    enter: ca.Function
-    leave: ca.Function
-    polish: ca.Function
-    lift: ca.Function
-    bend: ca.Function
-
-    def trial(self, found: Trial, y: Any, h: Any, d: Any, data: Any) -> Trial:
-        """Convert a step in the chart to the unknowns of the mechanism."""
-        free = self.leave(found.end, data)
-        end = self.polish(free, d)
-        dense = [self.lift(row, data) for row in found.dense]
-        for i, column in enumerate(self.bend(y, end, h, data)[: len(dense)]):
-            dense[i] = dense[i] + column
-        return Trial(
-            end,
-            None if found.error is None else self.lift(found.error, data),
-            tuple(dense),
-            corrections=tuple(self.lift(change, data) for change in found.corrections),
-            shift=end - free,
-        )
-
-
-@lru_cache(maxsize=2)
-def tangent(system: System) -> Tangent | None:
-    """Return the tangent-space form of a mechanism that requests it; None for any other system."""
-    manifold = system.manifold
-    if manifold is None or not manifold.charted:
-        return None
-    chart, y = _Chart(system, manifold), system.y
-    y_c, data, n, nv = chart.reduced.y, chart.reduced.d, chart.n, chart.nv
-    q, qd, others, t = chart.embedded(y_c)
-    inside = ca.vertcat(ca.SX(nv, 1), chart.V.T @ y[n : 2 * n], y[chart.others], y[chart.time, 0])
-    w, wd, own, dt = chart.parts(y_c)
-    change = ca.vertcat(chart.V @ w, chart.V @ wd, own, ca.SX.zeros(len(manifold.basis)), dt)
-    at = ca.vertcat(q, qd, others, ca.vec(chart.V), t)
-    return Tangent(
-        chart.reduced,
-        chart.open(manifold),
-        ca.Function("enter", [y, data], [inside], {"cse": True}),
-        ca.Function("leave", [y_c, data], [at], {"cse": True}),
-        manifold.polish,
-        ca.Function("lift", [y_c, data], [change]),
-        chart.bend(manifold),
-    )
-
-
-def _entries(matrix: ca.SX) -> ca.SX:
-    """Return the nonzeros as a column."""
-    return ca.vec(ca.SX(matrix.nz[:]))
-
-
 @final
-class _Chart:
-    """Chart of a system with y = (q, q', s, a, lam and normal forces, V, t), as expressions.
+class Tangent:
+    """Chart of a mechanism with y = (q, q', s, a, lam and normal forces, V, t).
+
+    Its unknowns are y_c = (w, w', other unknowns).
 
     Attributes:
         n, nv, m: numbers of coordinates, degrees of freedom and constraints.
@@ -117,14 +52,20 @@ class _Chart:
         phi: (q, t, d) -> constraints.
         rate: (q, q', t, d) -> r = phi_q q' + phi_t.
         slopes: (q, q', t, d) -> phi_q, phi_t, r_q, r_t.
-        q0, V, phi_q: symbols for point, basis, and Jacobian of the constraints there.
-        lu: factors of phi_q phi_q'.
-        reduced: the equations in the chart, with their Jacobian at its origin.
+        q0, V, phi_q, lu: symbols for point, basis, Jacobian of the constraints and its factors.
+        reduced: the system in the chart, with its Jacobian at the origin; its run data are
+            (d, chart).
+        open: (y, d) -> (d, chart) for the chart at y.
+        enter: (y, data) -> y_c at its origin.
+        leave: (y_c, data) -> y, on the constraints to the order of the method.
+        lift: (e_c, data) -> change of y, to first order.
+        bend: (y0, y1, h, data) -> correction of the dense output, normal to the chart: two columns,
+            of a cubic with the values and rates at both ends.
     """
 
     def __init__(self, system: System, manifold: Manifold) -> None:
         n, m, nx, y, d = manifold.n, manifold.m, manifold.first, system.y, system.d
-        self.system, self.n, self.nv, self.m = system, n, n - m, m
+        self.system, self.manifold, self.n, self.nv, self.m = system, manifold, n, n - m, m
         self.others = list(range(2 * n, manifold.basis.start))
         self.time = list(range(manifold.basis.stop, system.n))
         self.q, self.qd, self.own, self.t = y[:n], y[n : 2 * n], y[self.others], y[self.time, 0]
@@ -135,14 +76,37 @@ class _Chart:
         self.rate = ca.Function("rate", [q, qd, t, d], [rate], {"cse": True})
         self.slopes = ca.Function("slopes", [q, qd, t, d], slopes, {"cse": True})
         self.q0, self.V = ca.SX.sym("q0", n), ca.SX.sym("V", n, self.nv)
-        self.phi_q, r = ca.SX.sym("phi_q", slopes[0].sparsity()), ca.SX.sym("r", m)
+        self.phi_q = ca.SX.sym("phi_q", slopes[0].sparsity())
         lu = factorise(ca.sparsify(self.phi_q @ self.phi_q.T), [range(m)])
-        self.lu, self.factor = (
-            lu.symbols,
-            ca.Function("factor", [self.phi_q], [lu.packed], {"cse": True}),
-        )
-        self.solve = ca.Function("solve", [self.lu, r], [lu.solve(r)])
+        self.lu, self.solve = lu.symbols, lu.solver("solve")
+        self.factor = ca.Function("factor", [self.phi_q], [lu.packed], {"cse": True})
         self.reduced = self._reduced(nx - 2 * n)
+        y_c, data, basis = self.reduced.y, self.reduced.d, ca.SX.zeros(len(manifold.basis))
+        w, wd, own, dt = self.parts(y_c)
+        inside = ca.vertcat(ca.SX(self.nv, 1), self.V.T @ qd, self.own, t)
+        change = ca.vertcat(self.V @ w, self.V @ wd, own, basis, dt)
+        *at, after = self.embedded(y_c)
+        at = ca.vertcat(*at, ca.vec(self.V), after)
+        self.open = self._open()
+        self.enter = ca.Function("enter", [y, data], [inside], {"cse": True})
+        self.leave = ca.Function("leave", [y_c, data], [at], {"cse": True})
+        self.lift = ca.Function("lift", [y_c, data], [change])
+        self.bend = self._bend()
+
+    def trial(self, found: Trial, y: Any, h: Any, d: Any, data: Any) -> Trial:
+        """Convert a step in the chart to the unknowns of the mechanism."""
+        free = self.leave(found.end, data)
+        end = self.manifold.polish(free, d)
+        dense = [self.lift(row, data) for row in found.dense]
+        for i, column in enumerate(self.bend(y, end, h, data)[: len(dense)]):
+            dense[i] = dense[i] + column
+        return Trial(
+            end,
+            None if found.error is None else self.lift(found.error, data),
+            tuple(dense),
+            corrections=tuple(self.lift(change, data) for change in found.corrections),
+            shift=end - free,
+        )
 
     def across(self, r: ca.SX) -> ca.SX:
         """Return U B r, column by column."""
@@ -227,7 +191,7 @@ class _Chart:
         rates[nv:, first : first + n] = self.V.T
         return ca.sparsify(ca.vertcat(rates, moved, ca.SX(t.numel(), y_c.numel())))
 
-    def open(self, manifold: Manifold) -> ca.Function:
+    def _open(self) -> ca.Function:
         """Return the chart at y: its V projected onto the tangent space there and made
         orthonormal.
         """
@@ -240,19 +204,31 @@ class _Chart:
         turned = ca.Function("turned", [before, self.phi_q, self.lu], [ca.horzcat(*columns)])
         phi_q = self.slopes(self.q, self.qd, self.t, d)[0]
         lu = self.factor(phi_q)
-        basis = turned(ca.reshape(y[list(manifold.basis)], self.n, self.nv), phi_q, lu)
+        basis = turned(ca.reshape(y[list(self.manifold.basis)], self.n, self.nv), phi_q, lu)
         chart = ca.vertcat(d, self.q, ca.vec(basis), _entries(phi_q), lu)
         return ca.Function("open", [y, d], [chart], {"cse": True})
 
-    def bend(self, manifold: Manifold) -> ca.Function:
+    def _bend(self) -> ca.Function:
         """Return cubics through positions and velocities at both ends, normal to the chart."""
         n, h = self.n, ca.SX.sym("h")
         y0, y1 = self.system.y, ca.SX.sym("y1", self.system.n)
         first, second = ca.SX.zeros(self.system.n), ca.SX.zeros(self.system.n)
-        for at, slope in ((0, n), (n, manifold.first)):
+        for at, slope in ((0, n), (n, self.manifold.first)):
             rise = y1[at : at + n] - y0[at : at + n]
             one = h * y0[slope : slope + n] - rise
             two = rise - h * y1[slope : slope + n] - one
             first[at : at + n] = one - self.V @ (self.V.T @ one)
             second[at : at + n] = two - self.V @ (self.V.T @ two)
         return ca.Function("bend", [y0, y1, h, self.reduced.d], [first, second], {"cse": True})
+
+
+def _entries(matrix: ca.SX) -> ca.SX:
+    """Return the nonzeros as a column."""
+    return ca.vec(ca.SX(matrix.nz[:]))
+
+
+@lru_cache(maxsize=2)
+def tangent(system: System) -> Tangent | None:
+    """Return the tangent-space form of a mechanism that requests it; None for any other system."""
+    manifold = system.manifold
+    return Tangent(system, manifold) if manifold is not None and manifold.charted else None

@@ -23,9 +23,13 @@ class Levels(Law):
     mu_s: Scalar = fields.MU_S(0.15)
     mu_d: Scalar = fields.MU_D(0.1)
 
+    def coefficient(self, share: Scalar) -> Scalar:
+        """Return mu_d + (mu_s - mu_d) share, the coefficient at a share of the static excess."""
+        return self.mu_d + (self.mu_s - self.mu_d) * share
 
-class TwoLevels(Levels, StaticLaw):
-    """Law without states, with mu_s N at rest and mu_d N as its limit in sliding."""
+
+class TwoLevels(Levels):
+    """Law with mu_s N at rest and mu_d N as its limit in sliding."""
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the sliding force [N] at a speed >= 0 in the limit of zero widths."""

@@ -1,13 +1,12 @@
 """Sum, asymmetric and load-dependent laws, which wrap other laws."""
 
-from collections.abc import Iterable
 from dataclasses import fields as fields_of
 from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import ClassVar
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smallest
+from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smallest, total
 from symfric.foundation.parameters import (
     Parametric,
     distinct,
@@ -29,8 +28,7 @@ class Sum(Law):
     A sum of sums is flattened. Parameters and states that share a name get the number of their
     term: mu_d_1, mu_d_2, ...
     Limits: those of the terms.
-    Source: superposition, as in Coulomb +
-    viscous friction.
+    Source: superposition, as in Coulomb + viscous friction.
     """
 
     facts = Facts((), "that of its terms", "constructed")
@@ -74,19 +72,19 @@ class Sum(Law):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Return the friction force [N]."""
-        return _added(law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z))
+        return total(law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z))
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
         """Return the sum of the sliding forces [N] on one side."""
-        return _added(law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws)
+        return total(law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the sum of the static levels [N]."""
-        return _added(law.static_level(N, side, **chosen(law, inputs)) for law in self.laws)
+        return total(law.static_level(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the sum of the bounds of the terms."""
-        return _added(law.most_held(N, side, **chosen(law, inputs)) for law in self.laws)
+        return total(law.most_held(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Return the rates of all states."""
@@ -140,10 +138,8 @@ class Asymmetric(Wrapper):
 
     Every parameter that differs between `positive` and `negative` is blended: a bristle law keeps
     its one state, and equal parameters cost nothing.
-    Limits: one-sided curves beyond 3
-    v_blend; keep v_blend below the smoothing velocity of the law.
-    Source: separate parameter sets
-    per direction, usual for drives (Armstrong-Helouvry 1991).
+    Limits: one-sided curves beyond 3 v_blend; keep v_blend below the smoothing velocity of the law.
+    Source: separate parameter sets per direction, usual for drives (Armstrong-Helouvry 1991).
     """
 
     facts = Facts((), "that of its law", "constructed")
@@ -200,12 +196,10 @@ class LoadDependent(Wrapper):
         N_eff = N_0 + c max(N, 0)
 
     N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps,
-    so that there is no division by zero and no negative load at lift-off (with N_0 = 0 down to N =
-    -1e7 N_eps, where the difference of the square root rounds to zero).
-    Limits: N_0 = 0, c = 1,
-    N_eps = 0 is the law itself for N >= 0.
-    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas.
-    Control 134(5), 2012 (linear load part).
+    so that there is no division by zero and no negative load at lift-off (with N_0 = 0 down to
+    N = -1e7 N_eps, where the difference of the square root rounds to zero).
+    Limits: N_0 = 0, c = 1, N_eps = 0 is the law itself for N >= 0.
+    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
     """
 
     facts = Facts((), "that of its law", "unverified")
@@ -218,11 +212,6 @@ class LoadDependent(Wrapper):
     def load(self, N: Scalar) -> Scalar:
         """Return the effective normal force [N]."""
         return self.N_0 + self.c * smooth.positive(N, self.N_eps)
-
-
-def _added(forces: Iterable[Scalar]) -> Scalar:
-    first, *rest = forces
-    return sum(rest, start=first)
 
 
 def _structure(value: object) -> object:

@@ -31,9 +31,9 @@ class Isotropic(Parametric):
     plasticity in the plane, and LuGre, Dahl, Gonthier those of the literature. Further inputs, such
     as F_e, are vectors (d, 1). In components: vector states along x, then along y, then along z,
     then the states that are numbers.
-    Limits: slip along a line is the law itself. Equivariant under
-    rotations. Every vector state stays within the bound that it has in straight slip. v_eps is for
-    laws without states; the others have their own.
+    Limits: slip along a line is the law itself. Equivariant under rotations. Every vector state
+    stays within the bound that it has in straight slip. v_eps is for laws without states; the
+    others have their own.
 
     Raises:
         ValueError: a law that distinguishes forward from backward, has modes (they change where v
@@ -138,11 +138,6 @@ class SpatialSlip(Isotropic):
     """
 
     axes: ClassVar[str] = "xyz"
-
-
-def is_isotropic(law: Law) -> bool:
-    """Return True if a law has a form in several dimensions by isotropy alone."""
-    return not anisotropy(law)
 
 
 def anisotropy(law: Law) -> str:

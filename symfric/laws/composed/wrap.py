@@ -111,8 +111,7 @@ class Lagged(Wrapper):
     Limits: the law itself for v that changes slowly against tau_L; tau_L of bearings 1 to 50 ms.
     As C in float the force is as uncertain as w, 1e-7 of the largest velocity: use double if that
     is not small against the smoothing velocity.
-    Source: Hess and Soom, ASME J. Tribol. 112(1), 1990
-    (pure delay); first-order form constructed.
+    Source: Hess and Soom, ASME J. Tribol. 112(1), 1990 (pure delay); first-order form constructed.
     """
 
     facts = Facts(("L",), "that of its law", "constructed")
@@ -201,12 +200,11 @@ class LoadNormalised(Wrapper):
     Bristles of laws in newtons deflect with the load; if it falls they keep their force, which in
     joints with friction from reactions can leave no solution. Here the deflection does not depend
     on the load, the force follows the load at once, and N = 0 gives zero force.
-    Limits: N = N_0 is
-    the law itself, and so is any N for a law whose force is proportional to the load and without
-    states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force is scaled,
-    including viscous friction. A load that grows over a bent bristle does work.
-    Source: LuGre in
-    coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws constructed.
+    Limits: N = N_0 is the law itself, and so is any N for a law whose force is proportional to the
+    load and without states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force
+    is scaled, including viscous friction. A load that grows over a bent bristle does work.
+    Source: LuGre in coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws
+    constructed.
     """
 
     facts = Facts((), "that of its law", "constructed")

@@ -32,8 +32,8 @@ class Gonthier(Levels):
     s_dw is the memory of the dwell: after a rest of duration t, break-away takes
     N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) is x up to F_C and bends over to
     (1 + kappa) F_C. Without it the printed law creeps under any load when v_s is above the
-    creep velocity: its force there is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0 asks
-    for that original. tau changes smoothly over s_eps.
+    creep velocity: its force there is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0
+    selects that original. tau changes smoothly over s_eps.
     Limits: steady state F_C(s(v)) dir + sigma_2 v for v far above v_s; mu_s = mu_d has no dwell
     effect. Needs v_d < v_s. dz/dt does not vanish in creep (v < v_s), where only sat bounds F.
     Source: Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004, 209-233; the
@@ -75,7 +75,7 @@ class Gonthier(Levels):
         return exp(-((v / self.v_s) ** 2))
 
     def _level(self, N: Scalar, s_dw: Scalar) -> Scalar:
-        return N * (self.mu_d + (self.mu_s - self.mu_d) * s_dw)
+        return N * self.coefficient(s_dw)
 
     def _direction(self, v: Scalar) -> Scalar:
         u = smooth.clip(v / self.v_d, -1.0, 1.0)
@@ -202,7 +202,7 @@ class Armstrong(Law):
         )
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Spring at its level, filter at v, dwell in balance of growth and loss."""
+        """Return the spring at its level, the filter at v and the dwell at which growth is loss."""
         q = self._balance(v)
         return column(self._yielded(v, N, v, q), v, q)
 

@@ -70,11 +70,6 @@ class Elements(Law):
         count = range(1, len(self.elements) + 1)
         return tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
 
-    def total(self, parts: Iterable[Scalar]) -> Scalar:
-        """Return the sum over all elements, in their order."""
-        first, *rest = parts
-        return sum(rest, start=first)
-
     def springs(self, z: Scalar) -> list[Scalar]:
         """Return the spring forces [N]."""
         return [z[i] for i in range(len(self.elements))]

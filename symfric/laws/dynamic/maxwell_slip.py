@@ -1,6 +1,6 @@
 """Laws of parallel elements: Maxwell-slip, and Leuven and GMS with a Stribeck effect and lag."""
 
-from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number
+from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number, total
 from symfric.foundation.parameters import Parametric, option, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, State, Switch
@@ -76,11 +76,11 @@ class MaxwellSlip(Elements):
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the steady sliding force [N] at a speed >= 0."""
-        return N * self.total(e.mu for e in self.elements)
+        return N * total(e.mu for e in self.elements)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
-        return self.total(self.springs(z))
+        return total(self.springs(z))
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the rates of the spring forces [N/s] and, zero, of the modes."""
@@ -182,14 +182,14 @@ class Leuven(StribeckLevel, Elements):
 
     def stretching(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
         """Return dz/dt [m/s] of the hysteretic deflection."""
-        share = self.total(self.springs(z)) / self.level(v, N)
+        share = total(self.springs(z)) / self.level(v, N)
         spent = smooth.signed_power(share, self.delta_l, self.r_eps)
         return v - smooth.magnitude(v, self.v_eps) * spent
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
         damping = self.sigma_1 * self.stretching(v, N, z)
-        return self.total(self.springs(z)) + damping + self.sigma_2 * v
+        return total(self.springs(z)) + damping + self.sigma_2 * v
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the rates of the element forces [N/s]."""
@@ -197,9 +197,9 @@ class Leuven(StribeckLevel, Elements):
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return one of the states with the sum g sign(v): all elements at the same load share."""
-        total = self.total(e.mu for e in self.elements)
+        whole = total(e.mu for e in self.elements)
         level = self.level(v, N) * smooth.sign(v, self.v_eps)
-        return column(*(e.mu / total * level for e in self.elements))
+        return column(*(e.mu / whole * level for e in self.elements))
 
 
 @parametric
@@ -271,8 +271,8 @@ class GMS(StribeckLevel, Elements):
 
     def shares(self) -> list[Scalar]:
         """Return all alpha_i, divided by their sum."""
-        total = self.total(e.alpha for e in self.elements)
-        return [e.alpha / total for e in self.elements]
+        whole = total(e.alpha for e in self.elements)
+        return [e.alpha / whole for e in self.elements]
 
     def _direction(self, v: Scalar) -> Scalar:
         return smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
@@ -282,7 +282,7 @@ class GMS(StribeckLevel, Elements):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
-        return self.total((self.sigma_2 * v, *self.springs(z)))
+        return total((self.sigma_2 * v, *self.springs(z)))
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the rates of the spring forces [N/s] and of the modes [1/s]."""
@@ -316,7 +316,7 @@ class GMS(StribeckLevel, Elements):
         count, g, held = len(self.elements), self.level(v, N), Held.over(v, h)
         x = -self.C * h / g
         left, left_in_mean = 1 + expm1(x), smooth.phi1(x)
-        share = g / self.total(e.alpha for e in self.elements)
+        share = g / total(e.alpha for e in self.elements)
         parts: list[tuple[Scalar, Scalar, Scalar]] = []
         for i, e in enumerate(self.elements):
             F, p, limit = z[i], z[count + i], e.alpha * share

@@ -5,7 +5,7 @@ from math import inf
 from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.families import Levels, Sticking, carried
+from symfric.laws.base.families import Levels, Sticking, TwoLevels, carried
 from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import Held, deflection, yielding
 
@@ -51,17 +51,18 @@ class ExactCoulomb(Sticking):
         return self.v_s if self.form == "stribeck" else inf
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0."""
-        mu = self.mu_d
-        if self.form == "stribeck":
-            mu = mu + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 2.0)
-        return mu * N + self.sigma_2 * speed
+        """Return the sliding force [N] at a speed >= 0."""
+        return self._coefficient(smooth.fall(speed, self.v_s, 2.0)) * N + self.sigma_2 * speed
+
+    def _coefficient(self, falling: Scalar) -> Scalar:
+        """Return mu by the Stribeck weight `falling`."""
+        if self.form == "jump":
+            return self.mu_d
+        return self.mu_d + (self.mu_s - self.mu_d) * falling
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Return the friction force [N]."""
-        mu = self.mu_d
-        if self.form == "stribeck":
-            mu = mu + (self.mu_s - self.mu_d) * smooth.stribeck(v, self.v_s, 2.0, 0.0)
+        mu = self._coefficient(smooth.stribeck(v, self.v_s, 2.0, 0.0))
         return carried(z[0], F_e, mu * N * z[0] + self.sigma_2 * v)
 
 
@@ -146,7 +147,7 @@ class StickSlip(Levels):
 
 
 @parametric
-class HaessigFriedland(Levels):
+class HaessigFriedland(TwoLevels):
     """Reset-integrator friction (one state, with a mode in the event form).
 
         r     = sigma_0 z / (mu_d N)
@@ -198,14 +199,6 @@ class HaessigFriedland(Levels):
         if self.form == "event":
             return column((1 - z[1]) * v, 0.0 * v)
         return column(yielding(v, self._share(N, z), self.n, self.v_eps, self.r_eps))
-
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the steady sliding force [N] at a speed >= 0."""
-        return self.mu_d * N
-
-    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the force [N] of break-away, mu_s N."""
-        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
@@ -286,8 +279,7 @@ class Bristle2D(Levels):
         return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"),)
 
     def _level(self, v: Scalar, N: Scalar) -> Scalar:
-        falling = exp(-((v / self.v_s) ** 2))
-        return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
+        return N * self.coefficient(exp(-((v / self.v_s) ** 2)))
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the steady sliding force [N] at a speed >= 0."""

@@ -148,14 +148,14 @@ class Awrejcewicz(Levels, StaticLaw):
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the sliding force [N] at a speed >= 0 for zero widths."""
-        return N * (self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 2.0))
+        return N * self.coefficient(smooth.fall(speed, self.v_s, 2.0))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Return the friction force [N]."""
         soft = self.form == "smooth"
         speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
         beyond = smooth.positive(speed - self.epsilon, 0.0) / self.v_s
-        slip = N * (self.mu_d + (self.mu_s - self.mu_d) * exp(-beyond * beyond))
+        slip = N * self.coefficient(exp(-beyond * beyond))
         A = (smooth.step5 if soft else smooth.step3)(speed / self.epsilon)
         stick = smooth.hold(F_e, static, self.F_eps if soft else 0.0)
         return (1 - A) * stick + A * slip * smooth.sign(v, 0.0)

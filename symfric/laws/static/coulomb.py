@@ -88,7 +88,7 @@ class Viscous(StaticLaw):
     sigma_2: Scalar = fields.SIGMA_2(0.4)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Sliding force [N] at a speed >= 0; none at rest."""
+        """Return the sliding force [N] at a speed >= 0; none at rest."""
         return self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:

@@ -32,8 +32,7 @@ class Stribeck(Levels, Curve):
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Return the friction force [N] in the direction `s`."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, self.delta)
-        return mu * N * s + self.sigma_2 * v
+        return self.coefficient(fall(v, self.v_s, self.delta)) * N * s + self.sigma_2 * v
 
 
 @parametric
@@ -57,8 +56,7 @@ class Tustin(Levels, Curve):
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Return the friction force [N] in the direction `s`."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, 1.0)
-        return mu * N * s + self.sigma_2 * v
+        return self.coefficient(fall(v, self.v_s, 1.0)) * N * s + self.sigma_2 * v
 
 
 @parametric
@@ -80,8 +78,7 @@ class Benson(Levels, Curve):
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Return the friction force [N] in the direction `s`."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, 1 / self.d_c, 1.0)
-        return mu * N * s
+        return self.coefficient(fall(v, 1 / self.d_c, 1.0)) * N * s
 
 
 @parametric
@@ -104,8 +101,7 @@ class Berger(Levels, Curve):
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Return the friction force [N] in the direction `s`."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, 1.0)
-        return mu * N * s
+        return self.coefficient(fall(v, self.v_s, 1.0)) * N * s
 
 
 @parametric
@@ -128,8 +124,7 @@ class DuanSingh(Levels, Curve):
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Return the friction force [N] in the direction `s`."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, 1 / self.c, 1.0)
-        return mu * N * s
+        return self.coefficient(fall(v, 1 / self.c, 1.0)) * N * s
 
 
 @parametric
@@ -154,8 +149,7 @@ class Andersson(Levels, Curve):
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Return the friction force [N] in the direction `s`."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall(v, self.v_s, self.p)
-        return mu * N * s + self.sigma_2 * v
+        return self.coefficient(fall(v, self.v_s, self.p)) * N * s + self.sigma_2 * v
 
 
 @parametric

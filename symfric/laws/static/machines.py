@@ -215,8 +215,8 @@ class QuarterCarGeneral(StaticLaw):
     Limits: holds |f_sd| <= F_brk - F_eps at rest; within v_eps friction may drive, F v >= -0.274
     F_brk v_eps (as printed at any speed); mu = 0 leaves the simple law beyond v_eps;
     x_rel < L_d / (2 sin(theta)).
-    Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
-    Checked: the paper, corrected as said.
+    Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as described.
+    Checked: the paper, corrected as described.
     """
 
     facts = Facts(
@@ -300,7 +300,7 @@ class QuarterCarSimple(Curve):
     Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
     mu = 0 holds at rest.
     Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.
-    Checked: the paper, corrected as said.
+    Checked: the paper, corrected as described.
     """
 
     facts = Facts(("S", "St", "V"), "C∞", "one source", load="independent")

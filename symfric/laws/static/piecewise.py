@@ -126,20 +126,18 @@ class BengisuAkay(Levels, StaticLaw):
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the sliding force [N] at a speed >= 0 for zero widths."""
         whole = 2.0 if self.form == "smooth" else 1.0
-        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(self.xi * speed, 1.0, whole)
-        return mu * N
+        return self.coefficient(smooth.fall(self.xi * speed, 1.0, whole)) * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
         u = smooth.clip(v / self.v_0, -1.0, 1.0)
         beyond = self.xi * smooth.positive(smooth.magnitude(v, 0.0) - self.v_0, 0.0)
         fall = exp(-beyond * beyond) if self.form == "smooth" else exp(-beyond)
-        mu = self.mu_d + (self.mu_s - self.mu_d) * fall
-        return mu * N * (u * (2 - smooth.magnitude(u, 0.0)))
+        return self.coefficient(fall) * N * (u * (2 - smooth.magnitude(u, 0.0)))
 
 
 @parametric
-class VelocityBased(TwoLevels):
+class VelocityBased(TwoLevels, StaticLaw):
     """Velocity-based friction of MSC ADAMS: a step up to the static level, a step down.
 
         F = N [2 S((v + v_s) / (2 v_s)) - 1] [mu_s - (mu_s - mu_d) S((|v| - v_s) / (v_d - v_s))]
@@ -210,7 +208,7 @@ class Ambrosio(StaticLaw):
 
 
 @parametric
-class Hollars(TwoLevels):
+class Hollars(TwoLevels, StaticLaw):
     """Hollars friction, of Simbody.
 
         u = |v| / v_t
@@ -243,7 +241,7 @@ class Hollars(TwoLevels):
 
 
 @parametric
-class Exudyn(TwoLevels):
+class Exudyn(TwoLevels, StaticLaw):
     """Regularised friction of Exudyn: a ramp up to the static level, an exponential fall.
 
         F = N mu_s u                                                u = v/v_reg, for |u| <= 1
@@ -270,8 +268,8 @@ class Exudyn(TwoLevels):
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the sliding force [N] at a speed >= 0 for zero widths."""
-        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_exp, 1.0)
-        return N * (mu + self.mu_v * speed)
+        falling = smooth.fall(speed, self.v_exp, 1.0)
+        return N * (self.coefficient(falling) + self.mu_v * speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
@@ -279,12 +277,11 @@ class Exudyn(TwoLevels):
         ramp = smooth.hold(u, 1.0, self.u_eps)
         beyond = self.v_reg * (u - ramp)
         falling = exp(-smooth.magnitude(beyond, 0.0) / self.v_exp)
-        mu = self.mu_d + (self.mu_s - self.mu_d) * falling
-        return N * (ramp * mu + self.mu_v * beyond)
+        return N * (ramp * self.coefficient(falling) + self.mu_v * beyond)
 
 
 @parametric
-class Step5(TwoLevels):
+class Step5(TwoLevels, StaticLaw):
     """Quintic-step Stribeck friction, of Simbody and of the early Drake.
 
         u = |v| / v_t,   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1

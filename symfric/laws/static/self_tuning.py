@@ -46,7 +46,7 @@ class RuiWang(StaticLaw):
 
 
 @parametric
-class SelfTuning(TwoLevels):
+class SelfTuning(TwoLevels, StaticLaw):
     """Self-tuning friction (Pacejka-like), reconstructed.
 
         y = B v,   phi = (1 - E) y + E atan(y)
@@ -101,7 +101,7 @@ class SelfTuning(TwoLevels):
 
 
 @parametric
-class BrittleSelfTuning(TwoLevels):
+class BrittleSelfTuning(TwoLevels, StaticLaw):
     """Self-tuning friction whose stiffness factor follows from load and brittleness.
 
         B = B_0 + (B_max - B_0) [1 - exp(-(mu_s - mu_d)/difference_ref N/N_ref)]

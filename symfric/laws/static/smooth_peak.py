@@ -10,7 +10,7 @@ from symfric.laws.base.law import Facts, StaticLaw
 
 
 @parametric
-class BrownMcPhee(TwoLevels):
+class BrownMcPhee(TwoLevels, StaticLaw):
     """Brown-McPhee friction.
 
         x = v / v_t
@@ -46,7 +46,7 @@ class BrownMcPhee(TwoLevels):
 
 
 @parametric
-class SimscapeBreakaway(TwoLevels):
+class SimscapeBreakaway(TwoLevels, StaticLaw):
     """Breakaway friction of Simscape's translational and rotational friction blocks.
 
         u = v / (sqrt(2) v_brk)
@@ -81,7 +81,7 @@ class SimscapeBreakaway(TwoLevels):
 
 
 @parametric
-class Specker(TwoLevels):
+class Specker(TwoLevels, StaticLaw):
     """Specker-Buchholz-Dietmayer friction.
 
         F_p = N [mu_s - mu_d tanh(v_sp / v_t)] - sigma_2 v_sp

@@ -1,4 +1,3 @@
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -46,12 +45,6 @@ def test_a_file_written_is_the_record_again(tmp_path: Path, stage_data: Dataset)
     turns = Dataset.of(t=T, x=T, force=T, spring_2=T, units="deg, N mm")
     again = Dataset.read(turns.to_csv(tmp_path / "c.csv"))
     assert again.rotary and "spring_2" in again[0]
-
-
-def test_records_survive_pickling(stage_data: Dataset) -> None:
-    again = pickle.loads(pickle.dumps(stage_data))
-    np.testing.assert_array_equal(again[0]["x"], stage_data[0]["x"])
-    assert again[0].loop is not None
 
 
 def test_records_cannot_be_changed() -> None:

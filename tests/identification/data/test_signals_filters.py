@@ -3,7 +3,6 @@ import pytest
 
 from identification.data.filters import (
     Decimation,
-    Filter,
     bandwidth,
     central_difference,
     choose_filter,
@@ -50,21 +49,6 @@ def test_central_difference_is_of_second_order() -> None:
 
     errors = np.array([error(n) for n in (101, 201, 401)])
     np.testing.assert_allclose(errors[:-1] / errors[1:], 4.0, rtol=0.02)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"cutoff": 0.0}, "cutoff: expected a number > 0"),
-        ({"cutoff": float("nan")}, "cutoff: expected a number > 0"),
-        ({"cutoff": 10.0, "decimation": 0}, "decimation: expected a whole number >= 1, got 0"),
-        ({"cutoff": 10.0, "order": 2.5}, r"order: expected a whole number >= 1, got 2\.5"),
-        ({"cutoff": 10.0, "v_min": -1.0}, r"v_min: expected a number >= 0 \[m/s\], got -1"),
-    ],
-)
-def test_bad_filters_are_refused(arguments: dict[str, float], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Filter(**arguments)  # type: ignore[arg-type]
 
 
 def test_decimation_keeps_lines_and_their_times() -> None:

@@ -1,6 +1,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from fits import evaluated
 
 from identification.data.dataset import Dataset
 from identification.residuals.points import Points
@@ -36,8 +37,7 @@ def error(law: Law, t: np.ndarray = T, v: np.ndarray = V) -> float:
     data = Dataset.of(t=t, v=v, F=np.zeros(t.size), units={"v": "m/s", "F": "N"})
     rows = Points().prepare(one, data)
     known = parameters(one.law) if one.law is not None else {}
-    found = rows.at(np.array([float(known[n].value) for n in one.names]))
-    assert not isinstance(found, str)
+    found = evaluated(rows, np.array([float(known[n].value) for n in one.names]))
     numeric = one.law
     assert isinstance(numeric, Law)
     F = simulate(under(numeric), t[-1], u={"v": Linear(t, v)}, t_eval=t, rtol=1e-9)["F"]
@@ -74,9 +74,8 @@ def test_the_step_is_of_second_order_in_the_sample_time() -> None:
         zero = Dataset.of(t=t, v=velocity(t), F=0 * t, units={"v": "m/s", "F": "N"})
         rows = Points().prepare(one, zero)
         known = parameters(SOFT)
-        found = rows.at(np.array([float(known[n].value) for n in one.names]))
-        assert not isinstance(found, str)
-        return found.r[:: (n - 1) // 50]
+        values = np.array([float(known[n].value) for n in one.names])
+        return evaluated(rows, values).r[:: (n - 1) // 50]
 
     finest = force(6401)
     errors = np.array([np.abs(force(n) - finest).max() for n in (101, 201, 401)])
@@ -97,8 +96,7 @@ def test_compiled_code_and_virtual_machine_give_the_same_bits(
     found: list[bytes] = []
     for compiler in ("", "no-such-compiler"):
         monkeypatch.setenv("CC", compiler)
-        end = Points().prepare(one, data).at(values)
-        assert not isinstance(end, str)
+        end = evaluated(Points().prepare(one, data), values)
         found.append(end.r.tobytes() + end.J.tobytes())
     assert found[0] == found[1]
 
@@ -108,6 +106,5 @@ def test_a_record_that_begins_in_motion_begins_in_steady_sliding() -> None:
     v = np.full(50, 0.05)
     data = Dataset.of(t=T[:50], v=v, F=0 * v, units={"v": "m/s", "F": "N"})
     values = np.array([float(parameters(SOFT)[n].value) for n in one.names])
-    found = Points().prepare(one, data).at(values)
-    assert not isinstance(found, str)
+    found = evaluated(Points().prepare(one, data), values)
     np.testing.assert_allclose(found.r, steady_force(SOFT, v, 1.0), rtol=1e-9)

@@ -1,10 +1,17 @@
-"""Start values from samples: exact for cubics, honest about noise, and whose rate is what."""
+"""Windows of records, the choice of their length, and start values from samples."""
+
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
 
-from identification.residuals.initial import Sensed, local, noise_of, rates
-from symfric import LuGre
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.initial import Sensed, cut, local, noise_of, rates
+from identification.residuals.shooting import Shooting, choose
+from identification.unknowns.subject import subject
+from symfric import LuGre, Model
+from symfric.foundation.parameters import Variable
 from symfric.scenes import Drive, SliderCrank
 
 T = np.linspace(0.0, 2.0, 401)
@@ -46,3 +53,58 @@ def test_bristles_start_steadily_where_a_window_starts_fast() -> None:
     assert sensed.at(0)["z"].value == 0.0
     assert sensed.at(300)["z"].value is None  # cos(3) m/s: as the model says
     assert sensed.at(157)["z"].value == 0.0  # it turns round there
+
+
+LONG = np.linspace(0.0, 10.0, 1001)
+
+
+@pytest.mark.parametrize(("length", "count"), [(None, 1), (20.0, 1), (10.0, 1), (2.5, 4), (3.0, 3)])
+def test_windows_follow_each_other(length: float | None, count: int) -> None:
+    windows = cut(LONG, length)
+    assert len(windows) == count
+    assert [w.start for w in windows[1:]] == [w.stop for w in windows[:-1]]
+    assert (windows[0].start, windows[-1].stop) == (0, LONG.size)
+
+
+def test_cuts_move_to_where_the_motion_is_fast() -> None:
+    speed = np.abs(np.sin(np.pi * LONG / 2.5))  # slowest where equal windows end
+    for window in cut(LONG, 2.5, speed)[1:]:
+        assert speed[window.start] > 0.5
+
+
+def test_windows_of_few_samples_are_refused() -> None:
+    with pytest.raises(ValueError, match="at least 8 samples"):
+        cut(LONG, 0.05)
+
+
+X, RATE = Variable("x", "m", start=1.0), Variable("rate", "1/s", start=1.0, lower=0.1)
+DECAY = Model("decay", x=(X,), p=(RATE,), ode=-RATE.symbol * X.symbol)
+TIMES = np.linspace(0.0, 4.0, 401)
+DATA = Dataset.of(t=TIMES, x=np.exp(-0.7 * TIMES), units={"x": "m"})
+
+
+@pytest.mark.parametrize("right", [None, 1.0])
+def test_the_length_whose_fits_predict_is_taken(right: float | None) -> None:
+    asked, tried = list[float](), list[object]()
+
+    def solve(kind: Shooting, data: Dataset) -> Mapping[str, float]:
+        tried.append(kind.windows)
+        asked.append(sum(r.size for r in data))
+        return {"rate": 0.7 if kind.windows == right else 0.9}
+
+    found = choose(Shooting(windows="choose"), subject(DECAY), DATA, solve)
+    assert found.windows == right
+    assert len(asked) == 4 * 5
+    assert list(dict.fromkeys(tried)) == [None, 2.0, 1.0, 0.5, 0.25]
+    assert set(asked) <= {300, 301}  # three quarters
+
+
+def test_no_length_is_a_sentence() -> None:
+    with pytest.raises(ValueError, match="better start values"):
+        choose(Shooting(windows="choose"), subject(DECAY), DATA, lambda kind, data: None)
+
+
+@pytest.mark.slow
+def test_a_fit_chooses_for_itself() -> None:
+    fit = Fit(Shooting(windows="choose"), DECAY, DATA, starts=1).solve(throw=False)
+    assert fit.values["rate"] == pytest.approx(0.7, rel=1e-6)

@@ -2,11 +2,11 @@ import pickle
 
 import numpy as np
 import pytest
+from fits import check_slopes, evaluated
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.filters import Filter
-from identification.residuals.evaluation import Evaluation, Residuals
 from identification.residuals.inverse import ENOUGH, InverseDynamics
 from identification.unknowns.subject import Subject, subject
 from symfric import LuGre, Stribeck, rabinowicz, simulate
@@ -20,26 +20,9 @@ PLAIN = Filter(60.0, 4)
 T = np.linspace(0.0, 3.0, 3001)
 
 
-def evaluated(rows: Residuals, values: Array) -> Evaluation:
-    found = rows.at(values)
-    assert not isinstance(found, str), found
-    return found
-
-
 def starts(one: Subject) -> Array:
     known = {v.name: float(v.start) for v in one.model.p}
     return np.array([known[n] for n in one.names])
-
-
-def check_slopes(rows: Residuals, values: Array, rtol: float = 1e-5) -> None:
-    J = evaluated(rows, values).J
-    for k, x in enumerate(values):
-        d = 1e-5 * max(abs(x), 1e-4)
-        up, down = values.copy(), values.copy()
-        up[k] += d
-        down[k] -= d
-        expected = (evaluated(rows, up).r - evaluated(rows, down).r) / (2 * d)
-        np.testing.assert_allclose(J[:, k], expected, atol=rtol * max(np.abs(J[:, k]).max(), 1e-3))
 
 
 def moved(drive: Drive, t: Array = T, turning: bool = False) -> Dataset:
@@ -198,19 +181,6 @@ def test_missing_channels_are_named() -> None:
 def test_records_too_short_for_the_filter_are_refused() -> None:
     with pytest.raises(ValueError, match=r"equations of (force|all signals) after the filter"):
         InverseDynamics(filter=Filter(60.0, 300)).prepare(subject(DRIVE), moved(DRIVE))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"force": 3}, "InverseDynamics: force: expected"),
-        ({"filter": 10.0}, "InverseDynamics: filter: expected a filter"),
-        ({"dead_time": (0.1, 0.0)}, "dead_time: expected bounds in order"),
-    ],
-)
-def test_bad_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        InverseDynamics(**arguments)  # type: ignore[arg-type]
 
 
 def test_every_record_has_its_dead_time() -> None:

@@ -1,16 +1,22 @@
-import pickle
+"""The sampled engine against closed forms, differences and adaptive simulations."""
+
 from collections.abc import Callable
 from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 import pytest
+from fits import evaluated
 
+from identification.data.dataset import Dataset
 from identification.residuals import stepper
-from identification.residuals.shots import sampled_motion
+from identification.residuals.shooting import Shooting
+from identification.residuals.shots import means, sampled_motion
 from identification.residuals.stepper import why_not_sampled
+from identification.unknowns.subject import Subject, subject
 from symfric import (
     Coulomb,
+    Dahl,
     Linear,
     LuGre,
     Stribeck,
@@ -26,6 +32,7 @@ from symfric import (
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import find_compiler
 from symfric.model import Model
+from symfric.scenes import Drive
 
 STEP = 1e-3
 
@@ -144,16 +151,6 @@ def test_virtual_machine_and_compiler_give_the_same_bits(monkeypatch: pytest.Mon
     np.testing.assert_array_equal(compiled.slopes, again.slopes)
 
 
-def test_a_chain_survives_pickling() -> None:
-    model, force, p = stick_slip()
-    run(model, force[:5], p, [0.0, 0.0])
-    (chain,) = (value for key, value in model.memory.items() if "sampled" in key)
-    again = pickle.loads(pickle.dumps(chain))
-    rows, slopes = np.array([[STEP, 4.0]]), np.zeros((2, len(p) + 2))
-    one, two = (c(rows, np.array(p), np.zeros(2), slopes).states for c in (chain, again))
-    np.testing.assert_array_equal(one, two)
-
-
 def test_a_pendulum_is_one_mass_too() -> None:
     x, v = Variable("phi", "rad"), Variable("omega", "rad/s")
     wave = Variable("w", "1/s^2")
@@ -204,3 +201,68 @@ def test_friction_that_jumps_down_with_speed_is_not_stepped_in_silence() -> None
     said = sampled_motion(model, t, force, np.zeros(0), np.zeros(2))
     assert isinstance(said, str)
     assert "steps did not converge" in said
+
+
+NOISE = 1e-3 * np.random.default_rng(2).standard_normal(801)
+
+
+@pytest.fixture(scope="module")
+def machine() -> Subject:
+    law = Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.1, v_eps=1e-2, sigma_2=1.0)
+    return subject(Drive(law, m=1.5, N=1.0), free=["m", "mu_s", "mu_d", "sigma_2"], fixed="others")
+
+
+@pytest.fixture(scope="module")
+def data(machine: Subject) -> Dataset:
+    t = np.arange(801) * 2e-3
+    force = 5 * np.sin(2 * np.pi * t) + 2 * np.sin(2 * np.pi * 2.3 * t)
+    x = simulate(machine.model, 1.6, u={"force": Linear(t, force)}, rtol=1e-9, t_eval=t)["x"]
+    x = x + 1e-5 * np.random.default_rng(1).standard_normal(t.size)
+    return Dataset.of(t=t, x=x, force=force, units={"x": "m", "force": "N"}, name="made")
+
+
+@pytest.mark.parametrize(
+    "how", [{}, {"windows": 0.4, "every": 3}, {"interpolation": "hold"}, {"dead_time": (0.0, 0.01)}]
+)
+def test_the_sampled_engine_agrees_with_simulate(
+    machine: Subject, data: Dataset, how: dict[str, object]
+) -> None:
+    kind = Shooting(rtol=1e-9, engine="simulate", **how)  # type: ignore[arg-type]
+    exact = kind.prepare(machine, data, {})
+    fast = replace(kind, engine="sampled", rtol=None).prepare(machine, data, {})
+    assert fast.substeps > 0 and exact.substeps == 0
+    assert fast.names == exact.names
+    values = np.array([v.start for v in machine.model.p] + [u.start for u in exact.own])
+    one, two = evaluated(exact, values), evaluated(fast, values)
+    assert np.abs(one.r - two.r).max() < 2e-5
+    for i in range(values.size):
+        size = np.abs(one.J[:, i]).max()
+        assert np.abs(one.J - two.J)[:, i].max() < 5e-2 * size, exact.names[i]
+
+
+def test_auto_takes_it_for_static_laws_alone(machine: Subject, data: Dataset) -> None:
+    noisy = data.each(lambda r: replace(r, signals={**r.signals, "x": r["x"] + NOISE}))
+    assert Shooting().prepare(machine, noisy, {}).substeps > 1
+    assert Shooting(engine="simulate").prepare(machine, data, {}).substeps == 0
+    bristle = subject(Drive(Dahl(sigma_0=1e4, mu_d=2.0), m=1.5, N=1.0))
+    with pytest.raises(ValueError, match="a friction law without states"):
+        Shooting(engine="sampled").prepare(bristle, data, {})
+
+
+def test_coarse_samples_are_left_to_simulate(data: Dataset) -> None:
+    """A mass that comes to rest within a sample: friction over it is not resolved."""
+    quick = subject(Drive(Coulomb(2.0), m=1.5, N=1.0))
+    noiseless = Dataset.of(
+        t=np.arange(40) * 0.05, x=np.zeros(40), force=3 * (-1.0) ** np.arange(40),
+        units={"x": "m", "force": "N"}, name="coarse",
+    )  # fmt: skip
+    assert Shooting().prepare(quick, noiseless, {}).substeps == 0
+
+
+def test_means_of_inputs_are_exact() -> None:
+    t, u = np.array([0.0, 1.0, 3.0]), np.array([1.0, 3.0, -1.0])
+    at = np.array([-1.0, 0.0, 0.5, 2.0, 3.0, 4.0])
+    # linear: 1 | 1.5 | (2.5 * .5 + 2 * 1) / 1.5 | 0 | -1
+    np.testing.assert_allclose(means(t, u, at, False), [1.0, 1.5, 3.25 / 1.5, 0.0, -1.0])
+    # held: 1 | 1 | (1 * .5 + 3 * 1) / 1.5 | 3 | -1
+    np.testing.assert_allclose(means(t, u, at, True), [1.0, 1.0, 3.5 / 1.5, 3.0, -1.0])

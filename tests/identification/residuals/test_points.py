@@ -2,9 +2,9 @@ import pickle
 
 import numpy as np
 import pytest
+from fits import check_slopes, evaluated
 
 from identification.data.dataset import Dataset
-from identification.residuals.evaluation import Evaluation, Residuals
 from identification.residuals.points import Points
 from identification.unknowns.subject import subject
 from symfric import Asymmetric, LuGre, Stribeck, law_from_text
@@ -17,24 +17,6 @@ V = np.array([-0.2, -0.03, -0.004, 0.002, 0.02, 0.1])
 
 def points(F: np.ndarray, v: np.ndarray = V) -> Dataset:
     return Dataset.of(v=v, F=F, points=True, units={"v": "m/s", "F": "N"})
-
-
-def evaluated(rows: Residuals, values: np.ndarray) -> Evaluation:
-    found = rows.at(values)
-    assert not isinstance(found, str), found
-    return found
-
-
-def check_slopes(rows: Residuals, values: np.ndarray, rtol: float = 1e-5) -> None:
-    """J against central differences, column by column."""
-    J = evaluated(rows, values).J
-    for k, x in enumerate(values):
-        d = 1e-6 * max(abs(x), 1e-3)
-        up, down = values.copy(), values.copy()
-        up[k] += d
-        down[k] -= d
-        expected = (evaluated(rows, up).r - evaluated(rows, down).r) / (2 * d)
-        np.testing.assert_allclose(J[:, k], expected, atol=rtol * max(np.abs(J[:, k]).max(), 1e-3))
 
 
 def start(law: Law, names: tuple[str, ...]) -> np.ndarray:
@@ -104,19 +86,6 @@ def test_channels_and_pickle() -> None:
     values = start(one.law, one.names)
     again = pickle.loads(pickle.dumps(rows))
     np.testing.assert_array_equal(evaluated(again, values).r, evaluated(rows, values).r)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"v": ""}, "Points: v: expected"),
-        ({"N": -1.0}, "Points: N: expected a number >= 0"),
-        ({"states": "both"}, "Points: states: expected"),
-    ],
-)
-def test_bad_points_are_refused(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Points(**arguments)  # type: ignore[arg-type]
 
 
 def test_what_the_data_do_not_hold_is_refused() -> None:

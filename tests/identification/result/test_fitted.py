@@ -1,6 +1,5 @@
 """What a fit says of itself: numbers, text, errors, other data."""
 
-import pickle
 from math import isnan
 
 import numpy as np
@@ -56,13 +55,6 @@ def test_what_is_held_says_why_and_what_belongs_to_records_is_apart(good: Fitted
 def test_coefficients_under_one_newton_are_forces(good: Fitted) -> None:
     units = {n: e.unit for n, e in good.parameters.items()}
     assert (units["mu_s"], units["delta"], units["sigma_2"]) == ("N", "1", "N s/m")
-
-
-def test_a_pickle_holds_all_but_what_lives(good: Fitted) -> None:
-    copy = pickle.loads(pickle.dumps(good))
-    assert (str(copy), copy.values, copy.live) == (str(good), good.values, None)
-    with pytest.raises(ValueError, match="fit again"):
-        copy.profile("mu_s")
 
 
 def test_law_and_model_hold_the_numbers(good: Fitted) -> None:

@@ -17,7 +17,7 @@ from symfric.foundation.status import Status
 
 @pytest.fixture(scope="module")
 def data() -> Dataset:
-    return synthetic_drive_data()
+    return synthetic_drive_data(speeds=(0.01, 0.05))
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +74,12 @@ def test_a_table_of_parameters(fit: Fitted) -> None:
     assert frame.loc["mu_s", "value"] == fit.values["mu_s"]
     assert frame.loc["m", "unit"] == "kg"
     assert frame.attrs["status"] == fit.status.name in Status.__members__
+
+
+def test_a_notebook_shows_verdict_intervals_and_picture(fit: Fitted) -> None:
+    page = fit._repr_html_()
+    assert page.count("data:image/png;base64,") == 1
+    assert fit.status.name in page
+    for name in fit.names:
+        assert f">{name}<" in page
+        assert f">{fit.parameters[name].low:.6g}<" in page

@@ -1,10 +1,19 @@
-"""Starts around a centre: inside the box, in every stratum, the same for the same seed."""
+"""Starts around a centre, and distant starts that first solve easier problems."""
 
+import casadi as ca
 import numpy as np
+import pytest
 
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.shooting import Shooting
+from identification.solving.descent import descend_easier_first
 from identification.solving.many_starts import REACH, scattered
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns, unknowns_of
+from symfric import Model, simulate
+from symfric.foundation.parameters import Variable
+from symfric.foundation.status import Status
 
 UNKNOWNS = [
     Unknown("k", "N/m", 1e5, 1e-12, logarithmic=True, scale=1e5),
@@ -44,3 +53,35 @@ def test_the_same_seed_gives_the_same_starts() -> None:
     one, same, other = (scattered(at, at.start, 5, seed=s) for s in (1, 1, 2))
     assert all((a == b).all() for a, b in zip(one, same, strict=True))
     assert any((a != b).any() for a, b in zip(one, other, strict=True))
+
+
+Y, V = Variable("y", "m", start=1.0), Variable("v", "m/s")
+W, D = (Variable(name, "1/s", start=x, lower=0.0) for name, x in (("w", 9.0), ("d", 0.2)))
+SWING = Model(
+    "swing",
+    x=(Y, V),
+    p=(W, D),
+    ode=ca.vertcat(V.symbol, -(W.symbol**2) * Y.symbol - D.symbol * V.symbol),
+)
+T = np.linspace(0.0, 10.0, 501)
+TRUTH = {"w": 9.0, "d": 0.02}
+
+
+def asked() -> Fit:
+    """Fourteen periods, from a frequency that is off by a quarter: many minima lie between."""
+    y = simulate(SWING, 10.0, p=TRUTH, t_eval=T, rtol=1e-9)["y"]
+    y = y + 1e-3 * np.random.default_rng(0).standard_normal(T.size)
+    data = Dataset.of(t=T, y=y, units={"y": "m"})
+    return Fit(Shooting(), SWING, data, start={"w": 7.0, "d": 0.01}, starts=2)
+
+
+def test_a_start_far_off_needs_the_windows() -> None:
+    prepared = asked().prepared()
+    task, first = prepared.task, prepared.centre
+    (easier,) = task.easier
+    assert len(easier.unknowns.fitted) > len(task.unknowns.fitted)
+    straight = descend_easier_first(task, first, 0, 200)
+    around = descend_easier_first(task, first, 1, 200)
+    assert around.status is Status.SOLVED
+    assert task.unknowns.named(around.w)["w"] == pytest.approx(9.0, rel=1e-3)
+    assert straight.objective > around.objective + 1000

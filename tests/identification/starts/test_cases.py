@@ -8,21 +8,9 @@ import pytest
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
-from symfric import Dahl, Stribeck
+from symfric import Dahl
 from symfric.bench.identification_measured import FRANKA, franka
 from symfric.bench.identification_memory import gms
-from symfric.laws.composed.populations import steady_force
-
-
-def test_points_take_three_lines_of_a_user() -> None:
-    v = np.linspace(-0.1, 0.1, 60)
-    F = steady_force(Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.02, v_eps=1e-6, sigma_2=5.0), v, 1.0)
-
-    data = Dataset.of(v=v, F=F, points=True, units={"v": "m/s", "F": "N"})
-    fit = Fit(Points(), "stribeck", data, fixed={"v_eps": 1e-6}).solve()
-
-    truth = {"mu_s": 3.0, "mu_d": 2.0, "v_s": 0.02, "sigma_2": 5.0}
-    assert all(abs(fit.parameters[n].value / x - 1) < 1e-4 for n, x in truth.items())
 
 
 def test_a_raw_file_of_points_takes_three_lines(tmp_path: Path) -> None:

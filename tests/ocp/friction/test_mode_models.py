@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from rigs import blocks
 
 from ocp.friction.mode_models import mode_model, restless
-from ocp.friction.smooth_models import WIDTH, jumps, smooth_model, widths
+from ocp.friction.smooth_models import WIDTH, smooth_model, sticking, widths
 from symfric import (
     BrownMcPhee,
     Contact,
@@ -60,7 +60,7 @@ def test_sliding_under_reactions_is_the_sharp_law_beyond_its_layer() -> None:
                 assert_allclose(slides[name][-1], sharp[name][-1], rtol=1e-5, atol=1e-6 * scale)
 
 
-def test_a_contact_at_rest_holds_what_it_must() -> None:
+def test_contact_at_rest_holds_its_load() -> None:
     """The pendulum stands: R times its reaction is the weight's moment, and the grip tells."""
     model = Pendulum(SHARP, phi_0=0.004).model()
     run = simulate(mode_model(model, {"phi": 0}), 1.0, rtol=1e-9)
@@ -71,7 +71,7 @@ def test_a_contact_at_rest_holds_what_it_must() -> None:
     assert_allclose(down - run["phi_N"] * 0.3, run["phi_reaction"], rtol=1e-9)
 
 
-def test_a_belt_carries_a_block_at_rest_on_it() -> None:
+def test_belt_carries_a_block_at_rest_on_it() -> None:
     model = Rabinowicz(ExactCoulomb()).model()
     run = simulate(mode_model(model, {"belt": 0}), 2.0, x0={"v": 0.1}, rtol=1e-9)
     assert [v.name for v in mode_model(model, {"belt": 0}).x] == ["x", "v"]
@@ -90,7 +90,7 @@ def test_two_contacts_have_their_own_modes() -> None:
     assert_allclose(both["one_reaction"], 3.0)
 
 
-def test_curves_and_sides_of_a_law_stay() -> None:
+def test_curves_and_sides_of_a_law_are_kept() -> None:
     falling = drive(Stribeck(v_s=0.5, mu_s=0.3, mu_d=0.1), m=1.0, N=10.0)
     run = simulate(mode_model(falling, {"guide": 1}), 0.01, u={"force": 5.0}, rtol=1e-9)
     assert run["friction"][0] == pytest.approx(3.0)
@@ -101,7 +101,7 @@ def test_curves_and_sides_of_a_law_stay() -> None:
     assert rest["guide_grip_down"][-1] == pytest.approx(1 - np.exp(-0.2) + 0.1)
 
 
-def test_names_stay_but_for_the_states_of_laws() -> None:
+def test_names_remain_except_for_states_of_laws() -> None:
     model = PendulumBox(LuGre()).model()
     for made in (mode_model(model, {"x": 1, "phi": 0}), smooth_model(model)):
         assert [v.name for v in made.x] == [v.name for v in model.x[:4]]
@@ -119,7 +119,7 @@ def test_the_same_modes_give_the_same_object() -> None:
 
 
 @pytest.mark.parametrize("law", [SHARP, SelfTuning(), Sum((Coulomb(), Viscous())), Stribeck()])
-def test_a_smooth_model_is_the_model_at_the_numbers_of_its_widths(law: Law) -> None:
+def test_smooth_model_at_its_own_widths_is_the_model(law: Law) -> None:
     model = PendulumBox(law).model()
     smooth = smooth_model(model)
     rng = np.random.default_rng(0)
@@ -130,7 +130,7 @@ def test_a_smooth_model_is_the_model_at_the_numbers_of_its_widths(law: Law) -> N
         assert_allclose(made(0.0, x, z, [], p).full(), own(0.0, x, z, [], []).full(), rtol=1e-12)
 
 
-def test_widths_are_told_with_exponent_and_layer() -> None:
+def test_widths_have_exponents_and_layers() -> None:
     model = PendulumBox(SelfTuning(B=500.0), hinge=BrownMcPhee(v_t=1e-2)).model()
     found = {w.parameter: w for w in widths(model)}
     assert set(found) == {"x_B", "phi_v_t", "x_eps", "phi_eps"}
@@ -147,7 +147,7 @@ def test_widths_are_told_with_exponent_and_layer() -> None:
 
 
 @pytest.mark.parametrize("law", [LuGre(mu_s=0.3), ExactCoulomb(mu_s=0.3), Coulomb(v_eps=0.0)])
-def test_stand_in_has_the_sliding_force_and_the_static_level_of_its_law(law: Law) -> None:
+def test_stand_in_has_the_sliding_force_and_static_level_of_its_law(law: Law) -> None:
     model = drive(law, N=10.0)
     smooth = smooth_model(model)
     (width,) = smooth.p
@@ -163,7 +163,7 @@ def test_stand_in_has_the_sliding_force_and_the_static_level_of_its_law(law: Law
     assert_allclose(F[fast], wanted, rtol=1e-6)
 
 
-def test_smooth_runs_tend_to_slip_and_stick_as_the_width_vanishes() -> None:
+def test_smooth_runs_converge_to_slip_and_stick_at_first_order() -> None:
     """First order: a tenth of the width, a tenth of the distance."""
     model = blocks(BrownMcPhee(mu_s=0.2, mu_d=0.2))
     limit = simulate(mode_model(model, {"one": 1, "two": 0}), 0.1, u={"force": 9.0}, rtol=1e-11)
@@ -190,7 +190,7 @@ def driven_twice() -> Model:
                  ode=ca.vertcat(v.symbol, u.symbol - arm.force - slide.force))  # fmt: skip
 
 
-def test_a_loop_at_rest_shares_what_holds_it_by_what_each_can_hold() -> None:
+def test_loop_at_rest_shares_its_load_in_proportion_to_the_levels() -> None:
     """The virtual work of the reactions is that of the weights, and shares of the levels agree."""
     bar = FourBar(BrownMcPhee(mu_s=9.0, mu_d=8.0), R=0.1, omega=0.0).model()
     names = [c.name for c in bar.contacts]
@@ -209,7 +209,7 @@ def test_a_loop_at_rest_shares_what_holds_it_by_what_each_can_hold() -> None:
     assert float(lifted - here) == pytest.approx(-0.1 * turns @ reactions, rel=1e-3)
 
 
-def test_what_cannot_be_is_refused_by_name() -> None:
+def test_impossible_modes_are_refused() -> None:
     model = PendulumBox(SHARP).model()
     cases: list[tuple[Any, str]] = [
         (lambda: mode_model(model, {"x": 1}), "expected 1, 0 or -1 for each contact, got none for"),
@@ -232,7 +232,7 @@ def test_what_cannot_be_is_refused_by_name() -> None:
     assert mode_model(drive(Viscous()), {}).z == ()
 
 
-def test_a_contact_that_nothing_presses_holds_nothing() -> None:
+def test_unloaded_contacts_do_not_stick() -> None:
     """Its law would: it is left out of what is sharpened, and the rest is solved as it is."""
     loose, pressed = (drive(BrownMcPhee(), N=N) for N in (0.0, 1.0))
-    assert [jumps(m, c) for m in (loose, pressed) for c in m.contacts] == [False, True]
+    assert [len(sticking(model)) for model in (loose, pressed)] == [0, 1]

@@ -26,7 +26,7 @@ def upright(model: Model) -> Problem:
     return Problem(Phase(model, T=0.8), cost, bounds=bounds, p={"goal": 0.0})
 
 
-@pytest.mark.heavy
+@pytest.mark.slow
 def test_pendulum_stands_on_a_cart_with_sharper_friction() -> None:
     made = controller_of(upright(cart(2e-2)), 0.02, steps=4)
     found = made.simulate(cart(1e-4), 3.0, {"goal": 0.3}, x0={"theta": np.pi - 0.3}, check=False)

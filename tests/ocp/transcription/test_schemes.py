@@ -1,5 +1,11 @@
+"""Coefficients and order of the schemes, and meshes."""
+
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
+from discretised import EFFORT, largest_of_scenarios, mean_of_scenarios, stage
 from numpy.polynomial import Polynomial
 
 from ocp.formulation.expressions import at_end
@@ -33,17 +39,17 @@ def test_radau_meets_the_end_of_its_interval_exactly() -> None:
     assert not Legendre(3).coefficients().meets_end
 
 
-@pytest.mark.parametrize("make", [Radau, Legendre])
-@pytest.mark.parametrize("degree", [0, 10, 2.5, True, "3"])
-def test_impossible_degrees_are_refused(make: type, degree: object) -> None:
-    with pytest.raises(ValueError, match=f"{make.__name__}: degree"):
-        make(degree)
-
-
-@pytest.mark.parametrize(("method", "steps"), [("rodas", 2), ("rodas5p", 0)])
-def test_impossible_shooting_is_refused(method: str, steps: int) -> None:
-    with pytest.raises(ValueError, match="Shooting: "):
-        Shooting(method, steps)
+@pytest.mark.parametrize(
+    "make",
+    [
+        *(lambda d=d, kind=kind: kind(d) for kind in (Radau, Legendre) for d in (0, 10, 2.5, "3")),
+        lambda: Shooting("rodas", 2),
+        lambda: Shooting("rodas5p", 0),
+    ],
+)
+def test_impossible_schemes_are_refused(make: Callable[[], Scheme]) -> None:
+    with pytest.raises(ValueError, match=r"(Radau|Legendre): degree|Shooting: (method|steps)"):
+        make()
 
 
 def error(scheme: Scheme, intervals: int) -> float:
@@ -69,3 +75,51 @@ def error(scheme: Scheme, intervals: int) -> float:
 def test_order_at_the_nodes(scheme: Radau | Legendre, intervals: int) -> None:
     rate = np.log2(error(scheme, intervals) / error(scheme, 2 * intervals))
     assert rate == pytest.approx(scheme.order, abs=0.25)
+
+
+ONE = Problem(Phase(stage(), 1.0, via={0.5: {"x": 0.5}, 0.3: {"x": 0.2}}), EFFORT)
+TWO = Problem(Phase(stage(), 1.0, end={"x": 1.0}) >> Phase(stage(), 1.0), EFFORT)
+
+
+@pytest.mark.parametrize(
+    ("intervals", "sizes"),
+    [(3, [4, 4]), ([3, 5], [4, 6]), ([0, 0.2, 1], [3, 3]), ([[0, 0.2, 1], 4], [3, 5])],
+)
+def test_meshes_are_numbers_or_fractions_for_all_phases_or_each(
+    intervals: Any, sizes: list[int]
+) -> None:
+    assert [mesh.size for mesh in make_meshes(TWO, intervals)] == sizes
+
+
+def test_via_points_become_nodes_and_scenarios_have_meshes() -> None:
+    np.testing.assert_allclose(make_meshes(ONE, 4)[0], [0, 0.25, 0.3, 0.5, 0.75, 1])
+    np.testing.assert_allclose(make_meshes(ONE, [0, 0.4, 1])[0], [0, 0.3, 0.4, 0.5, 1])
+    assert len(make_meshes(mean_of_scenarios(), 3)) == 4
+
+
+@pytest.mark.parametrize(
+    "intervals", [0, -3, 2.5, True, "3", [0.0], [0, 0.5], [0.1, 1.0], [0, 0.6, 0.5, 1], [[0, 1]]]
+)
+def test_impossible_meshes_are_refused(intervals: Any) -> None:
+    with pytest.raises(ValueError, match="intervals: expected"):
+        make_meshes(TWO, intervals)
+
+
+@pytest.mark.parametrize(
+    ("problem", "meshes", "text"),
+    [
+        (ONE, [[0.0, 0.5, 1.0]], r"expected a node at 0\.3"),
+        (TWO, [[0.0, 1.0]] * 3, r"meshes: expected 2, one for each phase, .* got 3"),
+        (ONE, [[0.0, 0.6, 0.5, 1.0]], "increasing fractions"),
+        (ONE, [[0.0, 0.9]], "got 2 numbers from 0 to 0.9"),
+        (ONE, [[]], "got none"),
+        (
+            largest_of_scenarios(),
+            [[0.0, 0.5, 1.0], [0.0, 0.4, 1.0]],
+            "expected the same in all scenarios",
+        ),
+    ],
+)
+def test_meshes_fit_the_phases(problem: Problem, meshes: list[list[float]], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        discretise(problem, Radau(2)).on([np.array(mesh) for mesh in meshes])

@@ -15,7 +15,7 @@ from symfric.bench.ivp_problems import Problem, hires
 from symfric.bench.mechanisms import CHAINS, chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row
-from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.blocks import corrected
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.scenes import Rabinowicz, SliderCrank
@@ -336,7 +336,7 @@ def test_classical_runge_kutta_has_order_4_on_the_constraints() -> None:
     errors: list[float] = []
     for steps in (50, 100):
         y = np.concatenate([model.initial_state(), np.zeros(whole.n - whole.nx)])
-        y = refinement(whole)(y, 0).full()
+        y = corrected(whole)(y, 0).full()
         for _ in range(steps):
             y = step(y, 0.05 / steps, 0).full()
         errors.append(abs(float(y[0, 0]) - exact["crank"][0]))

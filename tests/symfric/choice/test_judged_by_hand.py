@@ -1,6 +1,6 @@
 """Rungs, standings, order and verdict of rows that are written down, not measured."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import nan
 
@@ -11,7 +11,16 @@ from symfric.choice import Friction
 from symfric.choice.friction import alike
 from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsage]
 from symfric.choice.nature import needed, otherwise
-from symfric.choice.ranking import INACCURATE, RANKED, REFUSED, Row, number, ordered, short, verdict
+from symfric.choice.ranking import (
+    INACCURATE,
+    RANKED,
+    REFUSED,
+    Ranking,
+    Row,
+    number,
+    ordered,
+    short,
+)  # fmt: skip
 from symfric.choice.smoothing import (
     MOST,
     NARROW,
@@ -28,6 +37,11 @@ ROW = Row(
     "a", RANKED, error=1e-5, method="Rodas5P", attempts=10, instructions=100, time_s=1e-3,
     steepness=5.0, smoothness="C∞", c_operations=100, fixed_step=0.01,
 )  # fmt: skip
+
+
+def verdict(rows: Sequence[Row]) -> tuple[str, ...]:
+    choice = Ranking("m", ("stiction",), 1e-4, "", "", 0.0, 0.05, 1.0, tuple(rows), 0.0)
+    return choice.verdict
 
 
 def test_two_runs_in_a_row_must_keep_the_error() -> None:
@@ -199,16 +213,16 @@ def test_the_verdict_names_the_least_work_the_flattest_and_the_cheapest() -> Non
         replace(ROW, law="alike", attempts=11, steepness=2.0),
         replace(ROW, law="later", attempts=20, time_s=5e-4, fixed_step=0.05, c_operations=200),
     ])  # fmt: skip
-    fast, smooth, fixed, others = verdict(rows, ["stiction"], 1e-4, 0.05)
+    fast, smooth, fixed, others = verdict(rows)
     assert fast.startswith("Simulation: take a, ")
     assert fast.endswith("; alike is as good. By the clock later is faster, 0.5 ms.")
     assert smooth.startswith("Optimal control: take alike ")
     assert fixed.startswith("Controller: take later: ")  # 4000 operations a second, not 10000
     assert others == "None is left out."
     near = ordered([ROW, replace(ROW, law="alike", attempts=11, time_s=1e-4)])
-    assert verdict(near, ["stiction"], 1e-4, 0.05)[0].endswith("; alike is as good.")
+    assert verdict(near)[0].endswith("; alike is as good.")
     counted = [replace(row, core=core) for row, core in zip(rows, (20, 300, 600), strict=True)]
-    assert "take a: its C takes 20 instructions on a Cortex-M4F" in verdict(counted, [], 1, 1)[2]
+    assert "take a: its C takes 20 instructions on a Cortex-M4F" in verdict(counted)[2]
 
 
 def test_numbers_of_the_table_are_short() -> None:

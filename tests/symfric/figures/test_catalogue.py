@@ -1,13 +1,31 @@
-"""Every figure of every law is drawn from finite numbers, or refused in a sentence."""
+"""Figures by name: of every law finite or refused in a sentence, of several laws, of a scene."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
 
-from symfric import ALL_LAWS, Coulomb, LuGre, figure, law_from_text
-from symfric.figures import FIGURES, phenomena
+import symfric
+import symfric.laws
+from symfric import (
+    ALL_LAWS,
+    GMS,
+    Coulomb,
+    LuGre,
+    QuarterCarGeneral,
+    Viscous,
+    figure,
+    law_from_text,
+    rabinowicz,
+    simulate,
+    with_values,
+)
+from symfric.figures import FIGURES, FigureData, compare, phenomena
+from symfric.figures.catalogue import in_scene, scene_figure
+from symfric.figures.data import require
 from symfric.laws import GenericAsperity, RandomBristles
+from symfric.scenes import Pendulum
 
 pytestmark = pytest.mark.heavy
 
@@ -32,12 +50,9 @@ OTHER_INPUTS = {"quarter_car_general", "bam"}
 """Laws that need more than a pushed block offers."""
 
 
-SLOW = ("break_away", "drift")
+SLOW = ("break_away", "drift", "dwell")
 """Figures of a second for some laws."""
-LED = {
-    *("coulomb", "stribeck", "karnopp", "dahl", "lugre", "gms", "bristle_2d", "exact_coulomb"),
-    *OTHER_INPUTS, "wojewoda",
-}  # fmt: skip
+LED = {"coulomb", "karnopp", "dahl", *OTHER_INPUTS, "wojewoda"}
 """Laws without and with states and events, and those that are refused: drawn in every suite."""
 
 
@@ -76,15 +91,13 @@ def every_figure_is_finite_or_refused(law: str, names: Iterable[str]) -> None:
 
 
 REFERENCES = {"generic_asperity": GenericAsperity(count=12), "random_bristles": RandomBristles()}
-
-
-LONG = {("generic_asperity", name) for name in ("break_away", "drift", "dwell", "stiction")}
+SHORT = {(law, "hysteresis") for law in REFERENCES} | {("random_bristles", "stiction")}
 
 
 @pytest.mark.parametrize(
     ("law", "name"),
     [
-        pytest.param(law, name, marks=pytest.mark.slow if (law, name) in LONG else ())
+        pytest.param(law, name, marks=() if (law, name) in SHORT else pytest.mark.slow)
         for law in REFERENCES
         for name in FIGURES
         if not name.startswith("sweep")
@@ -121,3 +134,129 @@ def test_a_class_and_a_symbol_are_refused() -> None:
 def test_a_normal_force_that_does_not_press_is_refused(N: float) -> None:
     with pytest.raises(ValueError, match="figure: N: expected"):
         figure(LuGre(), "hysteresis", N)
+
+
+def test_a_composed_law_shows_what_its_parts_show_in_the_order_of_the_list() -> None:
+    assert phenomena(law_from_text("maxwell_slip+viscous")) == ["D", "V", "P", "M", "N"]
+
+
+def test_one_of_the_phenomena_is_enough() -> None:
+    require("drift", law_from_text("dahl"), "S", "P")
+    with pytest.raises(ValueError, match=r"static friction .* or pre-sliding displacement, got"):
+        require("drift", law_from_text("coulomb+viscous"), "S", "P")
+
+
+def test_arguments_of_a_figure_that_changed_places_are_named() -> None:
+    cases: tuple[tuple[Any, Any, str], ...] = (
+        ("hysteresis", LuGre(), r"write figure\(law, 'hysteresis'\)"),
+        ("lugre", "hysteresis", r"figure: expected a law .*use law_from_text\('lugre'\)"),
+        (LuGre, "hysteresis", r"write LuGre\(\) with parentheses"),
+        (LuGre(), 3, "figure: name: expected a text, got 3"),
+        (LuGre(), "hysterese", "did you mean hysteresis"),
+    )
+    for law, name, said in cases:
+        with pytest.raises(ValueError, match=said):
+            figure(law, name)
+
+
+def test_a_law_that_needs_more_than_a_block_has_is_told_so() -> None:
+    with pytest.raises(
+        ValueError, match=r"drift of quarter_car_general: .* x_rel, v_rel; a figure of"
+    ):
+        figure(QuarterCarGeneral(), "drift")
+    assert figure(QuarterCarGeneral(), "profile").curves
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in arcsin")
+@pytest.mark.parametrize("name", ["profile", "steady_state"])
+def test_a_force_that_is_no_number_anywhere_is_refused(name: str) -> None:
+    """A strut of 4 mm does not reach where the figure slides it to."""
+    with pytest.raises(ValueError, match=f"{name} of quarter_car_general: .* is none anywhere"):
+        figure(QuarterCarGeneral(L_d=0.004, k_s=2.89e6), name, 10.0)
+
+
+def test_all_laws_get_the_motion_of_the_first() -> None:
+    data = compare(["lugre", "maxwell_slip"], "hysteresis")
+    assert [curve.label for curve in data.curves] == [
+        f"{law}, {speed}x" for law in ("lugre", "maxwell_slip") for speed in (1, 5, 20)
+    ]
+    one, other = data["lugre, 5x"], data["maxwell_slip, 5x"]
+    assert other["x"] == pytest.approx(one["x"], abs=1e-10)
+    assert one["x"].max() == pytest.approx(2 * 0.15 * 7.848 / 1e5, rel=1e-6)
+
+
+def test_laws_of_one_kind_are_numbered_and_a_mapping_names_them() -> None:
+    strong = with_values(LuGre(), {"mu_s": 0.2})
+    assert [c.law for c in compare([LuGre(), strong]).curves] == ["lugre_1", "lugre_2"]
+    assert [c.law for c in compare({"weak": LuGre(), "strong": strong}).curves] == [
+        "weak", "strong",
+    ]  # fmt: skip
+
+
+def test_a_scene_shows_the_signals_that_the_laws_share() -> None:
+    data = compare([LuGre(), "brown_mcphee"], "rabinowicz")
+    assert [curve.law for curve in data.curves] == ["lugre", "brown_mcphee"]
+    assert {"t", "x", "v", "friction"} <= set(data.units)
+    assert "z" not in data.units  # a state of LuGre alone
+    assert data["lugre"]["x"].max() == pytest.approx(0.5705, rel=0.02)
+    assert data["brown_mcphee"]["x"].max() == pytest.approx(0.5705, rel=0.02)
+
+
+def test_a_law_that_cannot_show_it_is_left_out_and_the_note_says_why() -> None:
+    data = compare([LuGre(), Coulomb()], "hysteresis")
+    assert {curve.law for curve in data.curves} == {"lugre"}
+    assert data.note == "without coulomb: expected a law that shows pre-sliding displacement"
+    assert data.to_dict()["note"] == data.note
+
+
+def test_where_no_law_can_show_it_the_first_is_named() -> None:
+    with pytest.raises(ValueError, match="hysteresis of viscous"):
+        compare([Viscous(), Coulomb()], "hysteresis")
+
+
+def test_unknown_scenario_is_refused_with_a_hint() -> None:
+    with pytest.raises(ValueError, match=r"compare: scenario: .* did you mean rabinowicz"):
+        compare(["lugre"], "rabinovicz")
+
+
+def test_no_law_and_no_law_at_all_are_refused() -> None:
+    with pytest.raises(ValueError, match="at least one law"):
+        compare([])
+    with pytest.raises(ValueError, match="compare: expected a law such as"):
+        compare([3.0])  # pyright: ignore[reportArgumentType]
+
+
+def test_it_is_reached_from_the_front() -> None:
+    assert symfric.compare is compare
+    assert isinstance(symfric.compare(["coulomb"]), FigureData)
+
+
+def test_a_population_is_compared_by_name_and_as_an_instance() -> None:
+    data = compare(["dahl", RandomBristles(seed=3), "random_bristles"], "hysteresis")
+    assert {c.law for c in data.curves} == {"dahl", "random_bristles_2", "random_bristles_3"}
+
+
+def test_a_population_is_left_out_of_a_scene() -> None:
+    data = compare(["coulomb", "generic_asperity"], "rabinowicz")
+    assert {curve.law for curve in data.curves} == {"coulomb"}
+    assert data.note == "without generic_asperity: expected a law with equations"
+    with pytest.raises(ValueError, match="expected a law with equations, got a population"):
+        compare(["generic_asperity"], "rabinowicz")
+
+
+def test_the_title_says_the_inputs_of_all_laws() -> None:
+    title = compare(["coulomb", "karnopp", "awrejcewicz", "bam"], "profile").title
+    assert title.endswith("N = 7.848 N, F_e = 1 N, tau_m = 1 N m, tau_e = 0.5 N m")
+    assert compare(["karnopp", "lugre"], "rabinowicz").title == "rabinowicz"
+
+
+def test_a_mechanism_is_drawn_by_position_friction_and_energy() -> None:
+    data = scene_figure("pendulum", {"LuGre": in_scene(LuGre(), "pendulum")})
+    assert data.panels == (("t", "phi"), ("t", "phi_friction"), ("t", "energy"))
+    assert data["LuGre"]["t"][-1] == Pendulum.t_end
+
+
+def test_a_law_of_many_states_does_not_push_its_friction_out() -> None:
+    data = scene_figure("rabinowicz", {"gms": simulate(rabinowicz(GMS()), 0.1)})
+    assert data.panels == (("t", "x"), ("t", "friction"), ("t", "power"))
+    assert {"F_1", "F_4"} <= set(data["gms"].columns)

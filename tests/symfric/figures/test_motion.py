@@ -1,11 +1,54 @@
-"""Prescribed motions go where they are told, at the pace they are told."""
+"""Magnitudes of laws, and motions that they scale."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import LuGre, simulate
-from symfric.figures.motion import fine, prescribed, pushed, slides, through
-from symfric.laws import Karnopp
+from symfric import LuGre, law_from_text, simulate, symbolise, with_values
+from symfric.figures import hysteresis, scales
+from symfric.figures.motion import fine, prescribed, pushed, shoved, slid, slides, through
+from symfric.integrator import Linear
+from symfric.laws import GenericAsperity, Karnopp, RandomBristles
+
+
+def test_excitation_follows_the_parameters_of_the_law() -> None:
+    stiff = with_values(LuGre(), {"sigma_0": 1e6})
+    x, other = (hysteresis(law, speeds=(1.0,))["1x"]["x"] for law in (LuGre(), stiff))
+    assert x.max() == pytest.approx(10 * other.max(), rel=1e-6)
+    assert x.max() == pytest.approx(2 * 0.15 * 7.848 / 1e5, rel=1e-6)
+
+
+def test_magnitudes_of_lugre_are_its_levels_stiffness_and_stribeck_velocity() -> None:
+    found = scales(LuGre(), 2.0)
+    assert (found.static, found.kinetic) == pytest.approx((0.3, 0.2), rel=1e-3)
+    assert found.stretch == pytest.approx(0.3 / 1e5)
+    assert (found.velocity, found.mass) == (1e-3, 0.8)
+
+
+def test_without_v_s_the_velocity_is_where_the_force_has_fallen_half_the_way() -> None:
+    law = law_from_text("bengisu_akay")
+    V = scales(law, 1.0).velocity
+    assert law.force(V, 1.0) == pytest.approx(0.125, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "stiffness"), [("maxwell_slip", 1e5), ("gms", 1e5), ("dahl", 1e5)]
+)
+def test_stretch_is_the_static_level_over_the_stiffness_at_rest(
+    name: str, stiffness: float
+) -> None:
+    found = scales(law_from_text(name))
+    assert found.stretch == pytest.approx(found.static / stiffness)
+
+
+def test_a_strong_contact_gets_a_heavier_block() -> None:
+    assert scales(law_from_text("quarter_car_simple")).mass > 50.0
+
+
+def test_symbols_are_refused() -> None:
+    law, _ = symbolise(LuGre(), "mu_s")
+    with pytest.raises(ValueError, match="figure: mu_s: expected a finite number"):
+        scales(law)
 
 
 @pytest.mark.parametrize("pace", [1.0, 5.0])
@@ -38,3 +81,44 @@ def test_times_between_the_steps_hold_the_ends_of_the_steps() -> None:
     times = fine(run, 4)
     assert times[::4] == pytest.approx(run.step_times)
     assert (np.diff(times) > 0).all()
+
+
+N = 10.0
+SPRING = RandomBristles(delta_s=1.0)
+
+
+def test_way_and_velocity_are_those_of_the_given_motion() -> None:
+    t = np.linspace(0.0, 0.2, 101)
+    found = slid(GenericAsperity(count=20), N, lambda s, p: 1e-3 * p * ca.sin(20 * p * s), t, 2.0)
+    assert found["v"] == pytest.approx(2e-3 * np.sin(40 * t))
+    assert found["x"] == pytest.approx(5e-5 * (1 - np.cos(40 * t)), abs=1e-10)
+
+
+def test_bristles_that_hold_are_a_spring_along_the_way() -> None:
+    t = np.linspace(0.0, 1.0, 11)
+    found = slid(SPRING, N, lambda s, p: 1e-6 + 0 * s, t, 1.0)
+    assert found["F"] - found["F"][0] == pytest.approx(0.1 * t, rel=1e-6)
+
+
+def test_a_pushed_block_on_a_spring_swings_with_its_frequency() -> None:
+    start = float(SPRING.begin().z.mean()) * 1e5
+    run = shoved(SPRING, N, 0.8, start + 1.0, 0.05, None)
+    w = np.sqrt(1e5 / 0.8)
+    expected = 1e-5 * (1 - np.cos(w * run.step_times))
+    assert run.columns["x"] == pytest.approx(expected, abs=3e-6)
+
+
+def test_the_run_ends_where_the_velocity_is_reached() -> None:
+    law = GenericAsperity(count=50, mu_0=0.0, mu_inf=0.0)
+    run = shoved(law, N, 2.0, Linear([0.0, 1.0], [0.0, 4.0]), 1.0, 0.25)
+    assert run.step_times[-1] == pytest.approx(0.5, abs=2e-3)  # v = t^2 without friction
+    assert run.at(0.25)["force"] == pytest.approx(1.0)
+    assert run.at([0.25])["v"] == pytest.approx(0.0625, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_a_weak_push_is_held_and_a_strong_one_is_not() -> None:
+    law = GenericAsperity(count=100, tau_c=1e-6)
+    ends = [shoved(law, N, 0.8, lambda t, F=F: F + 0 * t, 0.3, None) for F in (0.5, 4.0)]
+    assert abs(ends[0].columns["x"][-1]) < 2e-6
+    assert ends[1].columns["x"][-1] == pytest.approx((4.0 - 2.0) / 0.8 * 0.045, rel=0.1)

@@ -79,8 +79,6 @@ def test_bristles_get_stiffer_and_keep_their_part_of_critical_damping() -> None:
     s = 1e5 / stiff.values["sigma_0"]
     assert s < 1.0
     assert stiff.values["sigma_1"] == pytest.approx(parameters(LuGre())["sigma_1"].value / s**0.5)
-    alone = recommended(LuGre(), rabinowicz, 0.1, t_end=20.0, parameter="sigma_0")
-    assert set(alone.values) == {"sigma_0"}
 
 
 def test_numbers_of_a_cycle_need_less_than_the_whole_way(found: Recommendation) -> None:

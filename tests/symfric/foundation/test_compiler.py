@@ -91,7 +91,7 @@ def test_one_that_hangs_is_stopped_with_what_it_started(
     """4f644ad waited for ever, as it did for a child that kept its output open."""
     monkeypatch.setattr(module, "PATIENCE", 2.0)  # in which a busy machine has started the child
     hanging = script(tmp_path / "hanging", f"sleep 60 & echo $! > {tmp_path / 'child'}; wait")
-    with pytest.raises(CompileError, match="hanging came to no end within 2 s"):
+    with pytest.raises(CompileError, match="hanging did not end within 2 s"):
         hanging.run()
     state = Path(f"/proc/{int((tmp_path / 'child').read_text())}/stat")
     for _ in range(100):  # a signal is sent at once and carried out soon

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from base64 import b64decode
 from io import BytesIO
 from pathlib import Path
 
@@ -10,12 +9,9 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
 from symfric.foundation.panels import Picture, blank, grid, panels, save
-from symfric.foundation.shown import data_uri
-from symfric.foundation.style import COLOURS
 
 
 def test_figures_are_unknown_to_pyplot_and_change_no_settings() -> None:
@@ -39,13 +35,6 @@ def test_drawing_does_not_even_import_pyplot() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_curves_take_the_colours_of_the_cycle() -> None:
-    _, (axis,) = panels(1)
-    for _ in COLOURS:
-        axis.plot([0, 1], [0, 1])
-    assert [to_hex(line.get_color()) for line in axis.lines] == list(COLOURS)
-
-
 def test_a_notebook_shows_a_figure_once() -> None:
     figure, (axis,) = panels(1)
     axis.plot([0, 1], [0, 1])
@@ -56,12 +45,6 @@ def test_a_notebook_shows_a_figure_once() -> None:
     assert shown.shape[:2] == (round(100 * height), round(100 * width))
     others = ("_repr_html_", "_repr_svg_", "_repr_jpeg_", "_repr_mimebundle_")
     assert not any(getattr(figure, name, lambda: None)() for name in others)
-
-
-def test_a_data_uri_holds_the_picture_and_needs_no_file() -> None:
-    kind, inside = data_uri(blank(4.0, 2.0), dpi=80).split(",")
-    assert kind == "data:image/png;base64"
-    assert imread(BytesIO(b64decode(inside)), format="png").shape[:2] == (160, 320)
 
 
 def test_a_window_is_refused_where_there_is_none() -> None:

@@ -17,7 +17,7 @@ from symfric.foundation.shown import (
     brief,
     counted,
     cut,
-    told,
+    in_a_line,
     valued,
 )
 from symfric.integrator import Hold, Linear, simulate
@@ -120,10 +120,10 @@ def test_arrays_are_told_by_size_and_range() -> None:
     lines = repr(Many(np.linspace(0, 5, 2001), {"a": np.zeros((3, 4)), "b": 1.0})).splitlines()
     assert lines[:2] == ["<Many", "  array: 2001 values from 0 to 5"]
     assert lines[2] == "  mapping: a: 3 x 4 values from 0 to 0, b: 1>"
-    assert told(np.array([1.0, 2.5])) == "[1, 2.5]"
-    assert told(np.full(20, np.nan)) == "20 values"
-    assert told(ca.SX.sym("x", 3)) == "expression of shape (3, 1)"
-    assert told(({}, (1, "a"), None)) == "(none, (1, 'a'), None)"
+    assert in_a_line(np.array([1.0, 2.5])) == "[1, 2.5]"
+    assert in_a_line(np.full(20, np.nan)) == "20 values"
+    assert in_a_line(ca.SX.sym("x", 3)) == "expression of shape (3, 1)"
+    assert in_a_line(({}, (1, "a"), None)) == "(none, (1, 'a'), None)"
 
 
 def test_a_screen_is_enough_for_anything() -> None:

@@ -227,7 +227,7 @@ def test_difference_quotients_approach_the_gradient_with_order_two() -> None:
 
 
 def test_all_number_types_give_the_same() -> None:
-    for name, v in product(CASES, (0.0, 3e-4, -0.2)):
+    for name, v in product(CASES, (0.0, 3e-4)):
         law, N, w = CASES[name], 5.0, given_inputs(CASES[name])
         z = stretched(law, N, [0.7]).ravel()
         F, rate = float(law.force(v, N, z, **w)), np.asarray(law.rate(v, N, z, **w))

@@ -85,12 +85,8 @@ def test_modes_of_ones_own_model_stick_and_slip() -> None:
 
 
 @pytest.mark.parametrize("scene", ALL_SCENES)
-@pytest.mark.parametrize("law", ["brown_mcphee", "stribeck"])
-def test_closing_an_open_model_by_the_same_law_gives_the_same_equations(
-    scene: str, law: str
-) -> None:
-    made = BrownMcPhee() if law == "brown_mcphee" else Stribeck(sigma_2=0.2)
-    model = ALL_SCENES[scene](made).model()
+def test_closing_an_open_model_by_the_same_law_gives_the_same_equations(scene: str) -> None:
+    model = ALL_SCENES[scene](Stribeck(sigma_2=0.2)).model()
     again = model.with_forces({c.name: c.friction for c in model.contacts})
     rng = np.random.default_rng(2)
     for letter in "xzup":

@@ -95,8 +95,9 @@ def test_smooth_laws_tend_to_dry_friction_with_their_width(law: Callable[[float]
 
 
 ELEVEN = (
-    *(Threlfall(), BengisuAkay(), Karnopp(), VelocityBased(), Awrejcewicz(), Ambrosio()),
-    *(Dahl(), LuGre(), ElastoPlastic(), StickSlip(), Gonthier()),
+    *(Threlfall(), Karnopp(), LuGre(), Gonthier()),
+    *map(often, (BengisuAkay(), VelocityBased(), Awrejcewicz(), Ambrosio())),
+    *map(often, (Dahl(), ElastoPlastic(), StickSlip())),
 )
 
 
@@ -132,7 +133,7 @@ def belt(
 
 def test_leine_switch_runs_the_published_cycle_as_a_mechanism() -> None:
     model = belt([LeineSwitch(mu_s=1.0, delta=3.0, form="event")], [1.0], [], 0.2)
-    run = solve(model, 40.0, rtol=1e-9)
+    run = solve(model, 35.0, rtol=1e-9)
     slips = [t for t, name in run.happened if name == "s0_slip"]
     sticks = [t for t, name in run.happened if name == "s0_stick"]
     assert np.diff(slips) == pytest.approx(12.001031, abs=2e-6)

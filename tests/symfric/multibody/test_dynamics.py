@@ -55,6 +55,7 @@ def test_mass_matrix_is_symmetric_and_positive(reverse: bool) -> None:
     assert np.linalg.eigvalsh(M).min() > 0
 
 
+@cache
 def loaded(formulation: str) -> Prepared:
     """The chain with every kind of force."""
     m = chain()

@@ -87,15 +87,6 @@ def test_an_open_loop_is_refused_and_the_nearest_closed_one_offered() -> None:
     assert (x, z) == pytest.approx(np.array([0.9, 0.6]) / np.hypot(0.9, 0.6), abs=1e-12)
 
 
-def test_velocities_against_a_rod_are_refused_and_others_offered() -> None:
-    """A rate that is given stays, the other one follows: at (0.8, 0.6) z' = -0.8/0.6 x'."""
-    with pytest.raises(ValueError, match="expected velocities that satisfy rod_lambda") as e:
-        slider_on_a_rod(rate=1.0).build()
-    assert "x_rate = 1, z_rate = -1.333333333" in str(e.value)
-    assembled = slider_on_a_rod(rate=1.0).assembled().build()
-    assert assembled.initial_state()[2:] == pytest.approx([1.0, -0.8 / 0.6])
-
-
 def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
     J, still = np.array([[0.8, 0.6]]), np.zeros(1)
     assert following(J, np.array([1.0, 1.0]), still) == pytest.approx([0.6 * -0.2, 0.8 * 0.2])

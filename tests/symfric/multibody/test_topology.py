@@ -1,7 +1,5 @@
 """The spanning tree keeps the joints with most constraints and cuts the others."""
 
-import pytest
-
 from symfric.multibody import (
     GROUND,
     Body,
@@ -64,12 +62,3 @@ def test_absolute_coordinates_cut_every_joint() -> None:
     assert topology.n == 14
     assert [j.name for j in topology.loops] == ["1", "2"]
     assert [link.rows for link in topology.links] == [slice(0, 7), slice(7, 14)]
-
-
-@pytest.mark.parametrize("n", [1, 5])
-def test_coordinates_are_numbered_along_the_tree(n: int) -> None:
-    bodies = {GROUND: BODIES[GROUND]} | {f"b{i}": BODIES["a"] for i in range(n)}
-    names = list(bodies)
-    joints = [Cylindrical(f"j{i}", names[i], names[i + 1]) for i in range(n)]
-    topology = spanning_tree(bodies, joints)
-    assert [link.first for link in topology.links] == list(range(0, 2 * n, 2))

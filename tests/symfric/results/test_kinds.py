@@ -1,7 +1,7 @@
 """Signals of mechanisms are sorted by what they are."""
 
 from symfric import BrownMcPhee, LuGre, rabinowicz
-from symfric.results.kinds import is_mechanism, kinds, norms
+from symfric.results.kinds import friction_laws, is_mechanism, kinds, norms
 from symfric.scenes import FourMass, Pendulum
 
 
@@ -25,6 +25,7 @@ def test_every_kind_of_a_mechanism_with_loops_and_bristles() -> None:
 def test_without_loops_there_are_no_norms_of_constraints() -> None:
     model = Pendulum(BrownMcPhee()).model()
     assert norms(model) == ()
+    assert friction_laws(model) == "BrownMcPhee"
     assert kinds(model)["phi"] == "position"
 
 

@@ -14,9 +14,9 @@ from matplotlib.image import imread
 
 from symfric import BrownMcPhee, LuGre, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.foundation.style import line
-from symfric.results.kinds import friction_laws, shortened
+from symfric.results.kinds import shortened
 from symfric.results.pictures import level, plot_trajectories
-from symfric.scenes import Arm, CoupledBlocks, Drive, FourMass, QuarterCar, Scene
+from symfric.scenes import CoupledBlocks, Drive, FourMass, QuarterCar, Scene
 
 
 @pytest.fixture(scope="module")
@@ -56,9 +56,11 @@ def test_all_signals_have_a_panel_each_where_they_are_few(runs: dict[str, Trajec
                               "power [mW]"]  # fmt: skip
 
 
-def test_other_choices_are_refused(runs: dict[str, Trajectory]) -> None:
+def test_other_choices_and_signals_are_refused(runs: dict[str, Trajectory]) -> None:
     with pytest.raises(ValueError, match=r"plot: panels: expected one of main, all, got some"):
         runs["lugre"].plot(panels="some")
+    with pytest.raises(ValueError, match=r"got frction; did you mean friction"):
+        runs["lugre"].plot("frction")
 
 
 def test_chosen_signals_in_the_chosen_order(runs: dict[str, Trajectory]) -> None:
@@ -99,15 +101,6 @@ def test_mechanisms_share_panels_by_kind_and_constraints_are_left_to_all(
     assert [axis.get_yscale() for axis in everything.axes] == 6 * ["linear"] + ["log"]
 
 
-def test_a_legend_of_signals_stands_beside_its_panel(four_mass: Trajectory) -> None:
-    figure = four_mass.plot()
-    figure.draw_without_rendering()
-    for axis in figure.axes:
-        legend = axis.get_legend()
-        assert legend is not None
-        assert legend.get_window_extent().x0 >= axis.get_window_extent().x1
-
-
 def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None:
     run = simulate(QuarterCar(LuGre()).model(), 0.1, samples=5)
     assert labels(plot_trajectories({"a": run, "b": run})) == [
@@ -118,14 +111,6 @@ def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None
     first, second = both.axes[0].lines[:2]
     assert first.get_color() == second.get_color()
     assert (first.is_dashed(), second.is_dashed()) == (False, True)
-
-
-@pytest.mark.slow
-def test_six_joints_are_three_panels() -> None:
-    run = simulate(Arm(BrownMcPhee()).model(), 0.01, samples=3)
-    figure = run.plot()
-    assert labels(figure) == ["position [rad]", "friction [N]", "energy [J]"]
-    assert names(figure.axes[1]) == [f"q{k}" for k in range(1, 7)]
 
 
 def test_a_model_of_its_own_kind_shows_all_of_it() -> None:
@@ -165,10 +150,6 @@ def test_names_lose_the_ending_that_all_share_and_stay_short() -> None:
     assert (len(long), long[:3], long[-3:]) == (28, "aaa", "bbb")
 
 
-def test_the_laws_of_a_model_are_told_once() -> None:
-    assert friction_laws(FourMass(BrownMcPhee()).model()) == "BrownMcPhee"
-
-
 def test_picture_is_written_and_pyplot_keeps_none(
     runs: dict[str, Trajectory], tmp_path: Path
 ) -> None:
@@ -176,20 +157,6 @@ def test_picture_is_written_and_pyplot_keeps_none(
     assert imread(tmp_path / "new" / "x.png").shape[2] == 4
     assert plt.get_fignums() == []
     assert [p.name for p in (tmp_path / "new").iterdir()] == ["x.png"]
-
-
-@pytest.mark.parametrize("ending", ["svg", "pdf"])
-def test_format_follows_the_ending(
-    runs: dict[str, Trajectory], tmp_path: Path, ending: str
-) -> None:
-    target = tmp_path / f"x.{ending}"
-    runs["lugre"].plot("x", path=target)
-    assert target.read_bytes()[:5] in (b"<?xml", b"%PDF-")
-
-
-def test_unknown_signal_is_refused_with_a_hint(runs: dict[str, Trajectory]) -> None:
-    with pytest.raises(ValueError, match=r"got frction; did you mean friction"):
-        runs["lugre"].plot("frction")
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def _places(cells: list[str], name: str) -> list[int]:
 
 def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) -> None:
     scenes = {"LuGre": Rabinowicz(LuGre()), "<b>": Rabinowicz(BrownMcPhee(mu_s=0.17))}
-    runs = {n: simulate(s.model(), 8.0, measure_error=True) for n, s in scenes.items()}
+    runs = {n: simulate(s.model(), 2.0, measure_error=True) for n, s in scenes.items()}
     text = report(runs, tmp_path / "p.html", settings={n: parameters(s) for n, s in scenes.items()})
     assert (tmp_path / "p.html").read_text("utf-8") == text
     page = Page(text)

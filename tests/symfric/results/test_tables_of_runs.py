@@ -52,9 +52,3 @@ def test_without_the_packages_there_is_a_sentence(
         run.to_dataframe()
     with pytest.raises(ImportError, match="pip install xarray"):
         run.to_xarray()
-
-
-def test_unknown_names_are_refused(run: Trajectory) -> None:
-    pytest.importorskip("pandas", reason="needs the package pandas")
-    with pytest.raises(ValueError, match="did you mean phi"):
-        run.to_dataframe("phy")

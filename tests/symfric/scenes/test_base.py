@@ -11,6 +11,7 @@ from symfric import (
     ALL_LAWS,
     BrownMcPhee,
     Coulomb,
+    Law,
     LuGre,
     Stribeck,
     Sum,
@@ -18,7 +19,9 @@ from symfric import (
     drive,
     parameters,
     rabinowicz,
+    simulate,
 )
+from symfric.laws.catalogue import DYNAMIC_LAWS
 from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene
 from symfric.scenes.rigs import ANY
 
@@ -44,10 +47,14 @@ OFFERED = {name: {"F_e"} for name in STATES} | {
 }
 
 
+SOME = ("coulomb", "lugre", "gms", "karnopp, event", "wojewoda", "bam", "quarter_car_general")
+"""Laws without and with states, modes and inputs: tried in every scene, the others in one."""
+
+
 @pytest.mark.parametrize("scene", SINGLE)
 def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: str) -> None:
     refused = 0
-    for law in CASES.values():
+    for law in CASES.values() if scene == "drive" else map(CASES.__getitem__, SOME):
         if not {i.name for i in law.inputs} <= OFFERED[scene]:
             refused += 1
             said = r"law (that needs no more than v, N, .*F_e|of motion and load, got .* the force)"
@@ -58,7 +65,7 @@ def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: st
         assert len(model.x) == STATES[scene] + len(model.contacts) * len(law.states)
         assert model.initial_state().shape == (len(model.x),)
         assert model.p == ()
-    assert 0 < refused < len(CASES) / 4
+    assert refused
 
 
 @each_scene
@@ -170,5 +177,42 @@ def test_no_load_runs_or_is_refused_where_the_law_divides_by_it() -> None:
         for v in (0.0, 1e-9, -0.1):
             x[1] = v
             assert ode(0.0, x, [], u, []).is_regular(), (name, v)
-        Drive(law, N=0.0).model(free=tuple(parameters(law)))
+        if law.states:
+            Drive(law, N=0.0).model(free=tuple(parameters(law)))
     assert refused == 7
+
+
+IDEAL, WITHOUT_STICTION = 0.5705, 0.4354
+
+REACH: dict[str, tuple[float, float]] = {
+    "dahl": (0.4352, 1e-3),
+    "bliman_sorine": (0.508, 5e-3),
+    "haessig_friedland": (0.547, 5e-3),
+    "lugre": (0.5667, 5e-4),
+    "lugre_normalised": (0.5667, 5e-4),
+    "lugre_passive": (0.5670, 1e-3),
+    "elasto_plastic": (0.5670, 5e-4),
+    "leuven": (IDEAL, 5e-3),
+    "maxwell_slip": (WITHOUT_STICTION, 1e-3),
+    "gms": (IDEAL, 0.015),
+    "stick_slip": (IDEAL, 0.01),
+    "gonthier": (0.5745, 2e-3),
+    "bristle_2d": (IDEAL, 5e-3),
+    "bouc_wen": (WITHOUT_STICTION, 1e-3),
+    "rate_and_state": (0.53836, 1e-4),  # SciPy's Radau at 1e-9
+    "armstrong": (0.523, 5e-3),
+    "exact_coulomb": (IDEAL, 5e-5),
+}
+"""Largest elongation [m] and how far off it may be: published (0.4352, 0.5667, 0.5670, 0.5745),
+the closed forms with and without stiction, or, where the law has no such counterpart (a peak, a
+dwell or a logarithm that depends on the time), what was computed here."""
+
+
+@pytest.mark.parametrize("name", DYNAMIC_LAWS)
+def test_block_is_carried_as_far_as_stated(name: str) -> None:
+    law: Law = DYNAMIC_LAWS[name]()
+    # unloaded at first, as the published runs were
+    start = {"z": 0.0, "s_dw": 0.0} if name == "gonthier" else {}
+    run = simulate(rabinowicz(law), 20.0, x0=start, rtol=1e-6, samples=8001)
+    reach, error = REACH[name]
+    assert run["x"].max() == pytest.approx(reach, abs=error)

@@ -1,5 +1,6 @@
 """Laws of other places than the scene's own: each rubs where it is said to, and nowhere else."""
 
+import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, Coulomb, LuGre, Viscous, parameters, simulate
@@ -32,7 +33,10 @@ def test_every_place_is_tested() -> None:
         assert all(kind.places().values())
 
 
-@pytest.mark.parametrize(("name", "place"), RUBS)
+ONE_OF_THE_ARM = [at for at in RUBS if at[0] != "arm" or at[1] == "q4"]
+
+
+@pytest.mark.parametrize(("name", "place"), ONE_OF_THE_ARM)
 def test_a_law_of_a_place_rubs_there_and_nowhere_else(name: str, place: str) -> None:
     scene = MECHANISMS[name](Viscous(sigma_2=0.0), **{place: Coulomb(mu_d=0.3, v_eps=0.01)})
     run = simulate(scene.model(), 0.01, samples=11)
@@ -48,8 +52,11 @@ def test_without_laws_of_their_own_places_have_that_of_the_scene(
     laws = {place: law for place in kind.places() if place not in WITHOUT}
     given, own = kind(law, **laws).model(), kind(law).model()
     assert [v.name for v in given.x] == [v.name for v in own.x]
-    last = [simulate(model, 0.05, samples=2).final for model in (given, own)]
-    assert last[0] == last[1]
+    rates = [
+        model.function("ode")(0.0, model.initial_state(), np.zeros(len(model.z)), [], []).full()
+        for model in (given, own)
+    ]
+    np.testing.assert_array_equal(*rates)
 
 
 def test_parameters_of_places_have_endings_where_they_share_a_name() -> None:

@@ -27,6 +27,8 @@ from symfric.laws import (
     SelfTuning,
 )
 
+z2 = ca.SX.sym("z", 2)
+
 
 def names_of(law, **options):
     return [p.name for p in law_block(law, **options).parameters]
@@ -94,8 +96,8 @@ def test_names_and_texts_are_those_of_the_law_and_its_parts():
     assert block.doc.startswith("Law with different parameters")
     static = law_block(Stribeck(sigma_2=0.4))
     assert static.is_function
-    F = float(static.step([], starts(static), [3e-4, LOAD])[1])
-    assert pytest.approx(float(Stribeck(sigma_2=0.4).force(3e-4, LOAD)), rel=1e-14) == F
+    F = float(static.step([], [float(p.start) for p in static.parameters], [3e-4, 8.0])[1])
+    assert pytest.approx(float(Stribeck(sigma_2=0.4).force(3e-4, 8.0)), rel=1e-14) == F
 
 
 def test_contacts_in_a_loop_are_the_population_of_numpy():

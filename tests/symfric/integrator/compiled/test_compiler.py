@@ -299,7 +299,7 @@ BROKEN = {
     "refusing": ("echo 'licence expired' >&2; exit 1", "failed with status 1: licence expired"),
     "silent": ("exit 0", "expected a folder to store and load compiled code"),
     "absent": ("", "expected a C compiler"),
-    "hanging": ("sleep 60", "hanging came to no end within"),
+    "hanging": ("sleep 60", "hanging did not end within"),
 }
 
 

@@ -17,8 +17,8 @@ from symfric.integrator.equations.blocks import (
     Following,
     at_rest,
     blocks,
+    corrected,
     following,
-    refinement,
     signs,
     slopes,
 )
@@ -58,7 +58,7 @@ def test_factors_that_are_kept_longer_than_their_slopes_still_fit() -> None:
     at_rest(first)
     for other in (rabinowicz(LuGre()), smooth_dae().model, rabinowicz(BrownMcPhee())):
         slopes(assemble(other))
-    assert refinement(first).n_instructions() > 0
+    assert corrected(first).n_instructions() > 0
     y = np.zeros(first.n)
     assert len(signs(first, 0.25)(y, 0.1, np.zeros(first.d.numel()))) == 3
 

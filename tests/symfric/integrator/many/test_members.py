@@ -21,7 +21,7 @@ from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.engine import VmEngine
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 
 def compiled(integrator: Integrator) -> Members:

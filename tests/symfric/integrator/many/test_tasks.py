@@ -24,7 +24,7 @@ from symfric.integrator.many.chunk import Chunk, Job, digest
 from symfric.integrator.many.program import program
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 
 def task(

@@ -18,7 +18,7 @@ from symfric.integrator.many.members import CompiledMembers, Stretch, many_sourc
 from symfric.integrator.many.vectors import lanes_header, vector_source
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.layout import Given, State
+from symfric.integrator.step.attempt import Given, State
 
 LOOP = """
 void apply(const double *x, const double *y, double *out, long long n)

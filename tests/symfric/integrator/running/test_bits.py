@@ -1,18 +1,22 @@
-"""The same call gives the same bits: by both engines, in every process, at whatever moment."""
+"""Equal calls give equal bits: by both engines, in every process, at any moment."""
 
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from hashlib import sha256
 from typing import Any
 
 import casadi as ca
+import numpy as np
 import pytest
 from backends import needs_compiler
 from hybrid import ball
+from numpy.typing import NDArray
 
+import symfric.integrator.running.engine as loop
 import symfric.integrator.running.integrator as module
+import symfric.integrator.running.run as running
 from symfric import (
     BrownMcPhee,
     Event,
@@ -28,7 +32,6 @@ from symfric import (
     drive,
     rabinowicz,
     simulate,
-    simulate_many,
 )
 from symfric.integrator.running import run
 from symfric.integrator.running.integrator import Integrator
@@ -127,21 +130,6 @@ def test_engines_may_change_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @needs_compiler
-def test_members_are_the_same_by_both_engines_but_for_functions_that_vectors_need() -> None:
-    """Lanes have an exponential and a power of their own: last digits differ, steps do not."""
-    for u, t_eval in ((SAMPLED, [0.3, 0.4, 1.0]), (FORCE, [1.0])):
-        vm, compiled = (
-            simulate_many(
-                drive(LuGre()), 1.0, u=u, x0={"v": [-0.1, 0.2]}, t_eval=t_eval, backend=backend
-            )
-            for backend in ("vm", "compiled")
-        )
-        for name in vm.signals:
-            assert vm[name] == pytest.approx(compiled[name], rel=1e-7, abs=1e-9)
-        assert vm.attempts == pytest.approx(compiled.attempts, rel=0.02)
-
-
-@needs_compiler
 def test_derivatives_have_the_same_bits_by_both_engines() -> None:
     vm, compiled = (
         simulate(
@@ -157,7 +145,7 @@ def test_derivatives_have_the_same_bits_by_both_engines() -> None:
 
 def test_every_process_gives_the_same_bits() -> None:
     """Names of expressions hash otherwise in each of them."""
-    names = ["events", "normal force", "loop"]
+    names = ["loop"]
     script = (
         f"import sys; sys.path[:0] = {sys.path!r}; import warnings\n"
         f"warnings.simplefilter('ignore')\n"
@@ -205,3 +193,72 @@ def test_only_a_far_jump_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> Non
     _, t_end, arguments = CASES["held cubic"]
     simulate(cubic(), t_end, backend="compiled", **arguments)
     assert searched == [1.0]
+
+
+Array = NDArray[np.float64]
+RUNS = 150
+
+
+def driven_cubic(*events: Event) -> Model:
+    """z + z^3 = x + u."""
+    alg = Z.symbol + Z.symbol**3 - X.symbol - U.symbol
+    ode = ca.sin(3 * X.symbol) - Z.symbol + 0.5 * U.symbol
+    return Model("cubic", x=(X,), z=(Z,), u=(U,), ode=ode, alg=alg, events=events)
+
+
+X, Z, U = Variable("v", "1", start=0.3), Variable("z", "1"), Variable("force", "1")
+HIT = Event("hit", X.symbol - 0.5, 1, reset={"v": -X.symbol})
+MODELS = [
+    *(drive(law) for law in (BrownMcPhee(), LuGre(), ExactCoulomb())),
+    driven_cubic(),
+    driven_cubic(HIT, Event("low", X.symbol + 1, -1)),
+]
+
+
+def numbers(run: Trajectory) -> Iterator[bytes]:
+    """Every bit of a run."""
+    counts = run.statistics.steps, run.statistics.rejections, run.statistics.smallest_step
+    yield f"{run.message} {run.happened} {counts}".encode()
+    between = run.at(np.linspace(*run.span, 23))
+    for values in (run.t, run.step_times, *(run[n] for n in run.units), *between.values()):
+        yield values.tobytes()
+
+
+def drawn(rng: np.random.Generator) -> tuple[float, dict[str, Any]]:
+    """End time [s] and arguments of a run."""
+    t_end, count = rng.uniform(0.2, 3.0), int(rng.integers(2, 40))
+    at, values = np.sort(rng.uniform(-0.1, 1.1 * t_end, count)), rng.uniform(-25.0, 25.0, count)
+    size = rng.uniform(5.0, 20.0)
+    inputs = [Hold(at, values), Linear(at, values), size, lambda t: size * ca.sin(7 * t)]
+    inner = at[(at >= 0) & (at <= t_end)]
+    further: dict[str, Any] = {
+        "max_steps": int(rng.integers(1, 200)),
+        "times": np.sort(rng.uniform(0.0, t_end, 3)),
+        "max_step": rng.uniform(1e-3, 0.1),
+        "method": "radau5",
+    }
+    return t_end, {
+        "u": {"force": inputs[rng.integers(4)]},
+        "t_eval": np.unique([*rng.uniform(0.0, t_end, 9), *inner[:2], *[t_end][: rng.integers(2)]]),
+        "rtol": 10.0 ** rng.uniform(-8, -5),
+        "x0": {"v": rng.choice([0.0, 0.3, -0.2])},
+        **{name: value for name, value in further.items() if rng.random() < 0.3},
+    }
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_random_runs_have_the_same_bits_by_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many attempts, rows and bytes they may take before somebody looks."""
+    rng = np.random.default_rng(10)
+    for case in range(RUNS):
+        model, (t_end, arguments) = MODELS[case % len(MODELS)], drawn(rng)
+        found: list[list[bytes]] = []
+        for backend, most in (("vm", 2**26), ("compiled", int(rng.choice([500, 2**26])))):
+            attempts = dict.fromkeys(("vm", "compiled"), int(rng.choice([5, 100, 50_000])))
+            monkeypatch.setattr(running, "ATTEMPTS", attempts)
+            monkeypatch.setattr(running, "MOST_BYTES", most)
+            monkeypatch.setattr(loop, "MOST_ROWS", int(rng.choice([64, 2048])))
+            run = simulate(model, t_end, backend=backend, throw=False, **arguments)
+            found.append(list(numbers(run)))
+        assert found[0] == found[1], (case, arguments)

@@ -10,7 +10,7 @@ from backends import each_backend
 from hybrid import ball, coulomb_on_a_belt
 from oracles import rabinowicz_coulomb
 
-from symfric import Event, Hold, Linear, Model, Output, SolveError, Status, Variable, simulate
+from symfric import Event, Hold, Linear, Model, SolveError, Status, Variable, simulate
 from symfric.integrator.equations.inputs import Input
 
 G = 9.81
@@ -43,13 +43,6 @@ def test_bouncing_ball_hits_the_ground_at_the_times_of_the_closed_form(
     assert [time for time, _ in run.happened] == pytest.approx(expected, abs=1e-9)
     assert run.statistics.events == 6
     assert run.status is Status.SUCCESS
-
-
-def test_an_expression_that_dips_below_zero_within_one_long_step_is_seen() -> None:
-    """x' = 1 takes steps of most of the span; both ends lie above zero, a quarter below."""
-    dip = Event("dip", (X - 0.5) ** 2 - 0.04)
-    run = simulate(clock(dip), 1.0, rtol=1e-6)
-    assert [time for time, _ in run.happened] == pytest.approx([0.3, 0.7], abs=1e-9)
 
 
 def test_the_step_that_an_event_cuts_keeps_its_polynomial() -> None:
@@ -150,62 +143,48 @@ def test_terminal_event_ends_the_run_at_its_time(backend: str) -> None:
     assert run.final["x"] == pytest.approx(0.7, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("direction", "times"),
-    [(1, [pi / 6, 13 * pi / 6]), (-1, [5 * pi / 6]), (0, [pi / 6, 5 * pi / 6, 13 * pi / 6])],
-)
-def test_direction_is_respected(direction: int, times: list[float]) -> None:
-    sine = Variable("x", "1", start=0.0)
-    cosine = Variable("y", "1", start=1.0)
-    model = Model(
-        "swing", x=(sine, cosine), ode=ca.vertcat(cosine.symbol, -sine.symbol),
-        events=(Event("half", sine.symbol - 0.5, direction),),
-    )  # fmt: skip
-    run = simulate(model, 7.0, rtol=1e-10)
-    assert [time for time, _ in run.happened] == pytest.approx(times, abs=1e-8)
+HALF = ca.sin(t) - 0.5
+UP, DOWN = [pi / 6, 13 * pi / 6], [5 * pi / 6]
+Clock = tuple[list[Event], float, list[tuple[str, float]], dict[str, float]]
+CLOCKS: dict[str, Clock] = {
+    "no reset": ([Event("pass", X - 1, 1)], 2.0, [("pass", 1.0)], {"x": 2.0, "y": 2.0}),
+    "at the very end": ([Event("end", X - 1, 1)], 1.0, [("end", 1.0)], {}),
+    "sawtooth": (
+        [Event("tooth", X - 1, 1, reset={"x": 0.0})], 10.5,
+        [("tooth", k) for k in range(1, 11)], {"x": 0.5},
+    ),
+    "all values are read before a reset": (
+        [Event("swap", X - 1, 1, reset={"x": Y - 5, "y": X})], 1.5,
+        [("swap", 1.0)], {"x": -2.5, "y": 1.0},
+    ),
+    "two half a tolerance apart read the values before both": (
+        [Event("one", X - 1, 1, reset={"x": Y}), Event("two", X - 1 - 5e-11, 0, reset={"y": X})],
+        1.5, [("one", 1.0), ("two", 1.0)], {"x": 2.5, "y": 1.0},
+    ),
+    "a mode triggers another at once": (
+        [Event("first", X - 1, 1, reset={"y": -1.0}), Event("second", -Y, 1, reset={"x": 10.0})],
+        2.0, [("first", 1.0), ("second", 1.0)], {"x": 11.0},
+    ),
+    "quick succession": (
+        [Event(f"e{k}", X - (1 + 1e-6 * k), 1) for k in range(5)], 2.0,
+        [(f"e{k}", 1 + 1e-6 * k) for k in range(5)], {},
+    ),
+    "time alone, rising": (
+        [Event("half", HALF, 1, reset={"x": 0.0})], 8.0,
+        [("half", at) for at in UP], {"x": 8.0 - UP[1]},
+    ),
+    "falling": ([Event("half", HALF, -1)], 7.0, [("half", at) for at in DOWN], {}),
+    "both": ([Event("half", HALF)], 7.0, [("half", at) for at in sorted(UP + DOWN)], {}),
+}  # fmt: skip
 
 
-def test_event_without_reset_leaves_the_solution_alone() -> None:
-    quiet, watched = (simulate(clock(*e), 2.0) for e in ((), (Event("pass", X - 1, 1),)))
-    assert watched.final["x"] == pytest.approx(quiet.final["x"], rel=1e-12)
-    assert len(watched.happened) == 1
-
-
-def test_events_at_one_time_happen_together_and_read_the_values_before() -> None:
-    """Two resets that swap x and y, half a tolerance apart."""
-    swap = (Event("one", X - 1, 1, reset={"x": Y}), Event("two", X - 1 - 5e-11, 0, reset={"y": X}))
-    run = simulate(clock(*swap), 1.5)
-    assert [name for _, name in run.happened] == ["one", "two"]
-    assert run.happened[0][0] == run.happened[1][0] == pytest.approx(1.0, abs=1e-9)
-    assert run.final["y"] == pytest.approx(1.0, abs=1e-9)
-    assert run.final["x"] == pytest.approx(2.5, abs=1e-9)
-
-
-def test_reset_reads_all_values_before_its_own_event() -> None:
-    swap = Event("swap", X - 1, 1, reset={"x": Y - 5, "y": X})
-    run = simulate(clock(swap), 1.5)
-    assert run.final["y"] == pytest.approx(1.0, abs=1e-9)
-    assert run.final["x"] == pytest.approx(-2.5, abs=1e-9)
-
-
-def test_events_in_quick_succession_are_kept_apart() -> None:
-    events = tuple(Event(f"e{k}", X - (1 + 1e-6 * k), 1) for k in range(5))
-    run = simulate(clock(*events), 2.0, rtol=1e-9)
-    assert [name for _, name in run.happened] == ["e0", "e1", "e2", "e3", "e4"]
-    assert [time for time, _ in run.happened] == pytest.approx(
-        [1 + 1e-6 * k for k in range(5)], abs=1e-9
-    )
-
-
-def test_sawtooth_starts_again_after_each_reset() -> None:
-    run = simulate(clock(Event("tooth", X - 1, 1, reset={"x": 0.0})), 10.5)
-    assert [time for time, _ in run.happened] == pytest.approx(range(1, 11), abs=1e-8)
-    assert run.final["x"] == pytest.approx(0.5, abs=1e-8)
-
-
-def test_event_at_the_very_end_is_seen() -> None:
-    run = simulate(clock(Event("end", X - 1, 1)), 1.0)
-    assert [time for time, _ in run.happened] == pytest.approx([1.0], abs=1e-9)
+@pytest.mark.parametrize("case", CLOCKS)
+def test_events_of_a_clock(case: str) -> None:
+    events, span, happened, final = CLOCKS[case]
+    run = simulate(clock(*events), span, rtol=1e-9)
+    assert [name for _, name in run.happened] == [name for name, _ in happened]
+    assert [at for at, _ in run.happened] == pytest.approx([at for _, at in happened], abs=2e-9)
+    assert {name: run.final[name] for name in final} == pytest.approx(final, abs=1e-8)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
@@ -214,13 +193,6 @@ def test_event_is_located_to_the_tolerance_on_the_side_after_it(tolerance: float
     run = simulate(clock(found), 2.0, event_tolerance=tolerance)
     late = run.happened[0][0] - 2 ** (1 / 3)
     assert -1e-15 <= late <= tolerance
-
-
-def test_event_may_depend_on_time_alone() -> None:
-    """In a model whose equations do not."""
-    run = simulate(clock(Event("alarm", ca.sin(t) - 0.5, 1, reset={"x": 0.0})), 8.0)
-    assert [time for time, _ in run.happened] == pytest.approx([pi / 6, 13 * pi / 6], abs=1e-8)
-    assert run.final["x"] == pytest.approx(8.0 - 13 * pi / 6, abs=1e-8)
 
 
 u = Variable("u", "N")
@@ -271,38 +243,6 @@ def test_terminal_event_at_a_jump_of_an_input_ends_there_exactly() -> None:
     run = simulate(model, 3.0, u={"u": Hold([0, 1.25], [1, 0])})
     assert run.happened == ((1.25, "off"),)
     assert run.final["x"] == pytest.approx(1.25)
-
-
-def test_reset_of_a_mode_may_trigger_another_event_at_once() -> None:
-    """Its expression jumps through zero, at the instant of the first."""
-    first = Event("first", X - 1, 1, reset={"y": -1.0})
-    second = Event("second", -Y, 1, reset={"x": 10.0})
-    run = simulate(clock(first, second), 2.0)
-    assert [name for _, name in run.happened] == ["first", "second"]
-    assert run.happened[1][0] == pytest.approx(1.0, abs=1e-8)
-    assert run.final["x"] == pytest.approx(11.0, abs=1e-8)
-
-
-def test_algebraic_variables_follow_a_reset() -> None:
-    z = Variable("z", "1", start=0.0)
-    model = Model(
-        "dae", x=(x,), z=(z,), ode=ca.SX(1.0), alg=z.symbol + z.symbol**3 - X,
-        events=(Event("jump", X - 2, 1, reset={"x": 10.0}),),
-        outputs={"twice": Output(2 * z.symbol, "1")},
-    )  # fmt: skip
-    run = simulate(model, 3.0, rtol=1e-9)
-    hit = run.happened[0][0]
-    before, after = run.at([hit - 1e-7, hit])["z"]
-    assert (before, after) == pytest.approx((1.0, 2.0), abs=1e-6)
-
-
-def test_event_may_depend_on_an_algebraic_variable() -> None:
-    z = Variable("z", "1")
-    model = Model(
-        "dae", x=(x,), z=(z,), ode=ca.SX(1.0), alg=z.symbol - X**2,
-        events=(Event("two", z.symbol - 2, 1),),
-    )  # fmt: skip
-    assert simulate(model, 3.0, rtol=1e-9).happened[0][0] == pytest.approx(sqrt(2), abs=1e-7)
 
 
 def test_reset_without_consistent_algebraic_values_is_a_failure_with_what_was_reached() -> None:

@@ -209,7 +209,7 @@ def test_machines_next_to_a_limit_have_the_events_of_exact_runs() -> None:
     """Belt, two blocks, pendulum and drive with parameters a share of 1e-5 to 1e-2 from where their
     events change; the references are runs at rtol = 1e-11 in short steps.
     """
-    assert wrong(2, near_limits(2, 20)) == []
+    assert wrong(2, near_limits(2, 5)) == []
 
 
 @pytest.mark.slow

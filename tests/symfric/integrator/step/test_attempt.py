@@ -1,5 +1,6 @@
-"""One attempt of the adaptive step: accept, reject, end time, NaN, controller."""
+"""Attempts of a step: acceptance, end time, NaN, controller, form."""
 
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -8,11 +9,23 @@ import pytest
 from closed_forms import ClosedForm, assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
+import symfric.integrator.step.attempt as module
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
-from symfric.integrator.equations.system import System
-from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
-from symfric.integrator.step.attempt import GROW, SHRINK, build_fixed, build_step
-from symfric.integrator.step.layout import Given, State
+from symfric.bench.mechanisms import chain
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RODAS5P
+from symfric.integrator.step.attempt import (
+    GROW,
+    SHRINK,
+    Given,
+    State,
+    build_fixed,
+    build_step,
+    instructions,
+    least,
+    written,
+)
 from symfric.model import Monitor
 
 Array = NDArray[np.float64]
@@ -32,43 +45,35 @@ def data(system: System, t_end: float = 10.0, rtol: float = 1e-6) -> Array:
 def attempt(
     case: ClosedForm | Model, S: Array, kind: Any = ca.SX, method: str = "rodas5p", **run: float
 ) -> Array:
-    system = assemble(case.model if isinstance(case, ClosedForm) else case)
-    step = build_step(system, ADAPTIVE[method], kind)
-    return step(S, data(system, **run))[0].full().ravel()
+    model = case.model if isinstance(case, ClosedForm) else case
+    return step_of(model, kind, method)(S, data(assemble(model), **run))[0].full().ravel()
+
+
+@cache
+def step_of(model: Model, kind: Any, method: str) -> ca.Function:
+    return build_step(assemble(model), ADAPTIVE[method], kind)
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
-@pytest.mark.parametrize("h", [1e-7, 1e-3, 0.3])
 @pytest.mark.parametrize(
     "model",
-    [
-        rabinowicz(BrownMcPhee()),
-        rabinowicz(LuGre()),
-        smooth_dae().model,
-        timed_ode().model,
-    ],
+    [rabinowicz(LuGre()), smooth_dae().model, timed_ode().model],
     ids=lambda m: m.name,
 )
-def test_graph_of_blocks_computes_what_the_flat_expression_does(
-    model: Model, h: float, method: str
-) -> None:
+def test_graph_of_blocks_computes_what_the_flat_expression_does(model: Model, method: str) -> None:
     """The former is compiled, the latter runs in the virtual machine."""
     if model.z and not ADAPTIVE[method].dae:
         pytest.skip("an explicit method")
     system = assemble(model)
     rng = np.random.default_rng(0)
-    y = (
-        0.05
-        * rng.random(system.n)
-        * [1.0 if n != "z" or system.nx < 3 else 1e-4 for n in system.names]
-    )
-    flat, blocks = (
-        build_step(system, ADAPTIVE[method], kind)(column(y, h=h), data(system))
-        for kind in (ca.SX, ca.MX)
-    )
-    for one, other in zip(flat, blocks, strict=True):
-        # where a rejected attempt explodes, so do rounding errors
-        assert other.full() == pytest.approx(one.full(), rel=1e-6, abs=1e-12)
+    bristle = [1.0 if n != "z" or system.nx < 3 else 1e-4 for n in system.names]
+    y = 0.05 * rng.random(system.n) * bristle
+    for h in (1e-7, 1e-3, 0.3):
+        given = column(y, h=h), data(system)
+        flat, blocks = (step_of(model, kind, method)(*given) for kind in (ca.SX, ca.MX))
+        for one, other in zip(flat, blocks, strict=True):
+            # where a rejected attempt explodes, so do rounding errors
+            assert other.full() == pytest.approx(one.full(), rel=1e-6, abs=1e-12)
 
 
 def test_graph_of_blocks_is_smaller_for_a_large_system() -> None:
@@ -280,3 +285,43 @@ def test_monitored_difference_is_resolved_on_its_own_scale() -> None:
     before = column((1.0, 1.0), h=0.03)
     assert attempt(plain, before)[REJECTED] == 0.0
     assert attempt(watched, before)[REJECTED] == 1.0
+
+
+METHOD = METHODS["rodas5p"]
+
+
+def of(model: Model) -> System:
+    return system(model, input_data(model, None, 0.0, 1.0))
+
+
+@pytest.fixture
+def built(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """The kinds in which attempts are built."""
+    kinds: list[object] = []
+
+    def counted(whole: System, method: Any, kind: Any = ca.SX) -> ca.Function:
+        kinds.append(kind)
+        return build_step(whole, method, kind)
+
+    monkeypatch.setattr(module, "build_step", counted)
+    return kinds
+
+
+def test_a_small_one_is_written_out_and_a_large_one_never(built: list[object]) -> None:
+    belt, links = of(rabinowicz(BrownMcPhee())), of(chain(4, BrownMcPhee()))
+    step, count = written(belt, METHOD, 7000)
+    assert (step.class_name(), count) == ("SXFunction", step.n_instructions())
+    step, count = written(links, METHOD, 2000)
+    assert step.class_name() == "MXFunction"
+    assert built == [ca.SX, ca.MX]
+    assert least(links, METHOD) < count == instructions(step)
+    assert least(belt, METHODS["dopri5"]) == 0
+
+
+def test_one_in_between_is_counted(built: list[object]) -> None:
+    belt = of(rabinowicz(BrownMcPhee()))
+    least_count, count = least(belt, METHOD), build_step(belt, METHOD).n_instructions()
+    assert least_count < count - 1
+    assert written(belt, METHOD, count - 1)[0].class_name() == "MXFunction"
+    assert written(belt, METHOD, count)[0].class_name() == "SXFunction"
+    assert built == [ca.SX, ca.MX, ca.SX]

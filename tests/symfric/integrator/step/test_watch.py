@@ -89,12 +89,12 @@ def test_friction_peaks_without_a_coulomb_level_catch_the_block() -> None:
         many = simulate_many(
             rabinowicz(law(case)),
             20.0,
-            x0={"v": STARTS},
+            x0={"v": STARTS[::4]},
             rtol=rtol,
             backend="vm",
             executor="serial",
         )
-        assert np.abs(many["x"][:, -1] - x).max() < 1e-4, case
+        assert np.abs(many["x"][:, -1] - x[::4]).max() < 1e-4, case
 
 
 def test_both_engines_catch_it() -> None:

@@ -1,13 +1,12 @@
 """Slip in a plane and in space: every isotropic law as vectors, refusals by reason."""
 
 from functools import cache
+from itertools import product
 from math import cos, pi, sin
 
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from law_cases import CASES, EXAMPLE_INPUTS
 
 from symfric import ALL_LAWS, Coulomb, Dahl, Law, LoadDependent, LuGre, Sum, Viscous, parameters
@@ -30,7 +29,7 @@ from symfric.laws import (
     SpatialSlip,
     StaticLaw,
 )
-from symfric.laws.composed.isotropic import Isotropic, anisotropy, is_isotropic
+from symfric.laws.composed.isotropic import Isotropic, anisotropy
 
 pytestmark = pytest.mark.heavy
 
@@ -40,14 +39,9 @@ SUMS: dict[str, Law] = {
     "lagged(ambrosio)": Lagged(Ambrosio()),
     "dahl+gms+viscous": Sum((Dahl(n=1.5), GMS(), Viscous())),
 }
-LAWS = {name: law for name, law in (CASES | SUMS).items() if is_isotropic(law)}
+LAWS = {name: law for name, law in (CASES | SUMS).items() if not anisotropy(law)}
 DYNAMIC = [name for name, law in LAWS.items() if law.states]
-each = pytest.mark.parametrize("name", LAWS)
-each_dynamic = pytest.mark.parametrize("name", DYNAMIC)
-pair = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)).map(np.array)
-triple = st.tuples(*3 * [st.floats(-1.0, 1.0)]).map(np.array)
-fewer = settings(max_examples=settings().max_examples // 3)  # all laws go through the same code
-logs = st.floats(-6.0, 0.0).map(lambda e: 10.0**e)
+RNG = np.random.default_rng(5)
 
 
 def turn(angle: float) -> np.ndarray:
@@ -76,23 +70,19 @@ def turned(law: Isotropic, R: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.concatenate([(R @ vectors).ravel(), z[n * len(R) :]])
 
 
-@each
-@fewer
-@given(v=pair, scale=logs, a=pair, b=pair, angle=st.floats(0.0, 2 * pi))
-def test_turned_slip_turns_force_and_rate(
-    name: str, v: np.ndarray, scale: float, a: np.ndarray, b: np.ndarray, angle: float
-) -> None:
-    law, v, R = PlanarSlip(LAWS[name]), scale * v, turn(angle)
-    z = bent(law, a, b)
-    w, w_turned = given_inputs(law.law, b), given_inputs(law.law, R @ b)
-    F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
-    size = np.abs(F).max() + N
-    assert law.force(R @ v, N, turned(law, R, z), **w_turned) == pytest.approx(
-        R @ F, abs=1e-9 * size
-    )
-    found = law.rate(R @ v, N, turned(law, R, z), **w_turned)
-    expected = turned(law, R, np.asarray(rate).ravel())
-    assert found == pytest.approx(expected, abs=1e-9 * (np.abs(expected).max(initial=0.0) + scale))
+def test_turned_slip_turns_force_and_rate() -> None:
+    for name, scale in product(LAWS, (1.0, 1e-4)):
+        v, a, b = RNG.uniform(-1.0, 1.0, (3, 2))
+        law, v, R = PlanarSlip(LAWS[name]), scale * v, turn(RNG.uniform(0.0, 2 * pi))
+        z = bent(law, a, b)
+        w, w_turned = given_inputs(law.law, b), given_inputs(law.law, R @ b)
+        F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
+        force = law.force(R @ v, N, turned(law, R, z), **w_turned)
+        assert force == pytest.approx(R @ F, abs=1e-9 * (np.abs(F).max() + N)), name
+        found = law.rate(R @ v, N, turned(law, R, z), **w_turned)
+        expected = turned(law, R, np.asarray(rate).ravel())
+        error = 1e-9 * (np.abs(expected).max(initial=0.0) + scale)
+        assert found == pytest.approx(expected, abs=error), name
 
 
 STEP, COUNT = 1e-5, 2000
@@ -130,51 +120,41 @@ TIMES = STEP / 2 * np.arange(2 * COUNT + 1)
 REVERSING = 5e-3 * np.sin(2 * pi * 100 * TIMES) + 2e-3 * np.sin(2 * pi * 330 * TIMES)
 
 
-@each_dynamic
-@pytest.mark.parametrize("direction", [(0.0, 1.0), (0.6, -0.8), (2 / 3, -1 / 3, 2 / 3)])
-def test_straight_slip_with_reversals_is_the_law_itself(
-    name: str, direction: tuple[float, ...]
-) -> None:
-    one, e = LAWS[name], np.array(direction)
-    law = PlanarSlip(one) if len(e) == 2 else SpatialSlip(one)
-    v = REVERSING
-    z, F, _ = along_path(name, 0, at_rest(one), v[None, :])
-    states, forces, _ = along_path(name, len(e), at_rest(law), e[:, None] * v)
-    assert np.isfinite(F).all()
-    assert np.ptp(F) > 0.1
-    np.testing.assert_allclose(forces, e[:, None] * F, atol=1e-9 * np.abs(F).max())
-    odd = directed(one)
-    expected = [*(c * row for c in e for row in z[odd]), *z[[not x for x in odd]]]
-    sizes = np.abs(expected).max(axis=1, initial=1e-30)
-    np.testing.assert_allclose(states / sizes[:, None], expected / sizes[:, None], atol=1e-9)
+def test_straight_slip_with_reversals_is_the_law_itself() -> None:
+    in_space = product(("lugre", "gms", "bouc_wen"), ((2 / 3, -1 / 3, 2 / 3),))
+    for name, direction in (*product(DYNAMIC, ((0.6, -0.8),)), *in_space):
+        one, e = LAWS[name], np.array(direction)
+        law = PlanarSlip(one) if len(e) == 2 else SpatialSlip(one)
+        z, F, _ = along_path(name, 0, at_rest(one), REVERSING[None, :])
+        states, forces, _ = along_path(name, len(e), at_rest(law), e[:, None] * REVERSING)
+        assert np.isfinite(F).all(), name
+        assert np.ptp(F) > 0.1, name
+        np.testing.assert_allclose(forces, e[:, None] * F, atol=1e-9 * np.abs(F).max())
+        odd = directed(one)
+        expected = [*(c * row for c in e for row in z[odd]), *z[[not x for x in odd]]]
+        sizes = np.abs(expected).max(axis=1, initial=1e-30)[:, None]
+        np.testing.assert_allclose(states / sizes, expected / sizes, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.parametrize("name", [n for n in LAWS if not LAWS[n].states])
-@given(v=st.floats(-1.0, 1.0), angle=st.floats(0.0, 2 * pi))
-def test_straight_slip_of_a_memoryless_law_is_the_law_itself(
-    name: str, v: float, angle: float
-) -> None:
-    one, e = LAWS[name], turn(angle)[0]
-    expected = e * one.force(v, N, **{n: x[0] for n, x in given_inputs(one, np.ones(1)).items()})
-    found = PlanarSlip(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
-    if abs(v) > 1e-6 or v == 0.0:
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+def test_straight_slip_of_a_memoryless_law_is_the_law_itself() -> None:
+    for name, v in product([n for n in LAWS if not LAWS[n].states], (0.0, 2e-5, -3e-3, 0.7)):
+        one, e = LAWS[name], turn(RNG.uniform(0.0, 2 * pi))[0]
+        inputs = {n: x[0] for n, x in given_inputs(one, np.ones(1)).items()}
+        found = PlanarSlip(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
+        expected = e * one.force(v, N, **inputs)
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
 
 
-CIRCLES = {"pre-sliding": 1e-6, "sliding": 4e-5}
 ANGLES = 2 * pi * 100 * TIMES
 
 
-@each_dynamic
-@pytest.mark.parametrize("radius", CIRCLES.values(), ids=CIRCLES.keys())
-def test_a_closed_circle_takes_energy(name: str, radius: float) -> None:
+def test_a_closed_circle_takes_energy() -> None:
     """The second of two turns at 100 Hz, of a size below and far above the break-away path."""
-    law = PlanarSlip(LAWS[name])
-    v = 2 * pi * 100 * radius * np.array([np.cos(ANGLES), np.sin(ANGLES)])
-    _, F, work = along_path(name, 2, at_rest(law), v)
-    assert np.isfinite(F).all()
-    second = work[0, COUNT // 2 :].sum()
-    assert second >= 0.0
+    for name, radius in product(DYNAMIC, (1e-6, 4e-5)):
+        v = 2 * pi * 100 * radius * np.array([np.cos(ANGLES), np.sin(ANGLES)])
+        _, F, work = along_path(name, 2, at_rest(PlanarSlip(LAWS[name])), v)
+        assert np.isfinite(F).all(), name
+        assert work[0, COUNT // 2 :].sum() >= 0.0, name
 
 
 def limits(law: Law) -> np.ndarray:
@@ -185,48 +165,38 @@ def limits(law: Law) -> np.ndarray:
     return np.max(found, axis=0)[directed(law)]
 
 
-@each_dynamic
-@fewer
-@given(seed=st.integers(0, 9))
-def test_states_never_leave_the_ball_of_their_limit_in_curved_slip(name: str, seed: int) -> None:
-    law, rng = PlanarSlip(LAWS[name]), np.random.default_rng(seed)
-    speed = 8e-3 * np.abs(np.sin(2 * pi * rng.uniform(20, 120) * TIMES))
-    waves = (rng.uniform(0, 3) * np.sin(2 * pi * f * TIMES + f) for f in (30.0, 110.0, 270.0))
-    angle = sum(waves, start=0.0)
-    z, _, _ = along_path(name, 2, at_rest(law), speed * np.array([np.cos(angle), np.sin(angle)]))
-    n = sum(directed(law.law))
-    sizes = np.hypot(z[:n], z[n : 2 * n]).max(axis=1)
-    assert (sizes <= limits(law.law) * (1 + 1e-6)).all()
+def test_states_never_leave_the_ball_of_their_limit_in_curved_slip() -> None:
+    for name in DYNAMIC:
+        law = PlanarSlip(LAWS[name])
+        speed = 8e-3 * np.abs(np.sin(2 * pi * RNG.uniform(20, 120) * TIMES))
+        waves = (RNG.uniform(0, 3) * np.sin(2 * pi * f * TIMES + f) for f in (30.0, 110.0, 270.0))
+        angle = sum(waves, start=0.0)
+        v = speed * np.array([np.cos(angle), np.sin(angle)])
+        z, _, _ = along_path(name, 2, at_rest(law), v)
+        n = sum(directed(law.law))
+        sizes = np.hypot(z[:n], z[n : 2 * n]).max(axis=1)
+        assert (sizes <= limits(law.law) * (1 + 1e-6)).all(), name
 
 
-@each
-def test_value_gradient_and_hessian_are_finite(name: str) -> None:
-    law, derivatives = PlanarSlip(LAWS[name]), second_derivatives(name)
-    for share in (0.0, 1.0):
-        z = bent(law, share * np.array([0.6, 0.8]))
-        for v in ((0.0, 0.0), (1e-300, 0.0), (-1e-12, 1e-12), (1e-9, 0.0), (0.0, 1e3)):
-            assert all(result.is_regular() for result in derivatives(v, z, 0.1)), (share, v)
+def test_value_gradient_and_hessian_are_finite_and_rest_has_no_force() -> None:
+    for name in LAWS:
+        law, v = PlanarSlip(LAWS[name]), ca.SX.sym("v", 2)
+        assert np.abs(law.force((0.0, 0.0), N, at_rest(law))).max() == 0.0, name
+        z, w = ca.SX.sym("z", len(law.states)), ca.SX.sym("w", 2)
+        inputs = {i.name: EXAMPLE_INPUTS[i.name] * w for i in law.inputs}
+        x = ca.vertcat(v, z, w)
+        y = ca.vertcat(law.force(v, N, z, **inputs), law.rate(v, N, z, **inputs))
+        # a sum is finite only if every term is; the weights keep infinities from cancelling
+        hessian, gradient = ca.hessian(ca.dot(y, np.arange(1.0, 1.0 + y.numel())), x)
+        derivatives = ca.Function("f", [v, z, w], [y, ca.jacobian(y, x), gradient, hessian])
+        for share in (0.0, 1.0):
+            bend = bent(law, share * np.array([0.6, 0.8]))
+            for slip in ((0.0, 0.0), (1e-300, 0.0), (-1e-12, 1e-12), (1e-9, 0.0), (0.0, 1e3)):
+                results = derivatives(slip, bend, 0.1)
+                assert all(result.is_regular() for result in results), (name, share, slip)
 
 
-@cache
-def second_derivatives(name: str) -> ca.Function:
-    law, v = PlanarSlip(LAWS[name]), ca.SX.sym("v", 2)
-    z, w = ca.SX.sym("z", len(law.states)), ca.SX.sym("w", 2)
-    inputs = {i.name: EXAMPLE_INPUTS[i.name] * w for i in law.inputs}
-    F, rate = law.force(v, N, z, **inputs), law.rate(v, N, z, **inputs)
-    x, y = ca.vertcat(v, z, w), ca.vertcat(F, rate)
-    hessians = [ca.hessian(y[i], x)[0] for i in range(y.numel())]
-    return ca.Function("f", [v, z, w], [y, ca.jacobian(y, x), *hessians])
-
-
-@each
-def test_no_slip_and_no_load_is_no_force(name: str) -> None:
-    law = PlanarSlip(LAWS[name])
-    z = at_rest(law)
-    assert np.abs(law.force((0.0, 0.0), N, z)).max() == 0.0
-
-
-@each
+@pytest.mark.parametrize("name", LAWS)
 def test_all_number_types_give_the_same(name: str) -> None:
     law, v, e = PlanarSlip(LAWS[name]), np.array([3e-4, -2e-3]), np.array([0.6, 0.8])
     z, w = bent(law, 0.7 * e, turn(1.0)[0]), given_inputs(LAWS[name], e)
@@ -249,10 +219,10 @@ def test_all_number_types_give_the_same(name: str) -> None:
             np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-14)
 
 
-@each
-def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str) -> None:
-    flat, law = PlanarSlip(LAWS[name]), SpatialSlip(LAWS[name])
-    for plane in ((0, 1), (1, 2), (2, 0)):
+def test_slip_in_a_plane_of_space_is_slip_in_the_plane() -> None:
+    for k, name in enumerate(LAWS):
+        plane = ((0, 1), (1, 2), (2, 0))[k % 3]
+        flat, law = PlanarSlip(LAWS[name]), SpatialSlip(LAWS[name])
         P = np.eye(3)[:, [*plane]]
         v, a, b = np.array([0.03, -0.04]), np.array([0.5, 0.2]), np.array([0.1, -0.6])
         n = sum(directed(flat.law))
@@ -274,12 +244,13 @@ def test_sideways_slip_lowers_the_resistance_along() -> None:
     assert F[0] == pytest.approx(0.1 * N * 0.01, rel=1e-3)
 
 
-@each_dynamic
-def test_sliding_points_against_the_motion_with_the_force_of_the_law(name: str) -> None:
-    one, e = LAWS[name], np.array([0.6, -0.8])
-    law = PlanarSlip(one)
-    expected = one.force(0.1, N, one.steady_state(0.1, N)) * e
-    assert law.force(0.1 * e, N, law.steady_state(0.1 * e, N)) == pytest.approx(expected, rel=1e-9)
+def test_sliding_points_against_the_motion_with_the_force_of_the_law() -> None:
+    e = np.array([0.6, -0.8])
+    for name in DYNAMIC:
+        one, law = LAWS[name], PlanarSlip(LAWS[name])
+        expected = one.force(0.1, N, one.steady_state(0.1, N)) * e
+        force = law.force(0.1 * e, N, law.steady_state(0.1 * e, N))
+        assert force == pytest.approx(expected, rel=1e-9), name
 
 
 def test_states_are_vectors_by_axis_then_numbers() -> None:
@@ -302,22 +273,19 @@ def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
     assert rate == pytest.approx([turning.real, turning.imag], rel=1e-12)
 
 
-@given(v=pair, z=pair)
-def test_bouc_wen_is_the_biaxial_element(v: np.ndarray, z: np.ndarray) -> None:
+def test_bouc_wen_is_the_biaxial_element() -> None:
     """Of Park, Wen, Ang with n = 2 and one product for both axes; loads along z only."""
     law = PlanarSlip(BoucWen(n=2.0, A=1.2), turn=1e-9)
-    rate = law.rate(v, N, z) * 0.1 * N / 1e5
-    power = v @ z
-    if abs(power) < 1e-6:
-        return
-    assert rate == pytest.approx(1.2 * v - 0.5 * z * (abs(power) + power), abs=1e-6)
+    for v, z in RNG.uniform(-1.0, 1.0, (30, 2, 2)):
+        rate, power = law.rate(v, N, z) * 0.1 * N / 1e5, v @ z
+        assert rate == pytest.approx(1.2 * v - 0.5 * z * (abs(power) + power), abs=1e-6)
 
 
 def test_sharp_maxwell_slip_is_radial_return() -> None:
     """Against steps of perfect plasticity: a spring returned to the disc after each."""
     slider = Slider(k=1e5, mu=0.1)
     law, limit = PlanarSlip(MaxwellSlip(elements=(slider,), n=300.0), turn=1e-4), 0.1 * N
-    t = np.linspace(0.0, 1.0, 40_001)
+    t = np.linspace(0.0, 1.0, 20_001)
     x = 3e-5 * np.array([np.sin(2 * pi * t), np.sin(6 * pi * t + 1.0) * np.cos(3 * t)])
     v = np.diff(x) / np.diff(t)
     exact, worst = np.zeros(2), 0.0
@@ -376,7 +344,7 @@ def test_expressions_without_vectors_are_refused_by_what_they_do() -> None:
 
 
 def test_every_law_without_sides_and_modes_has_a_vector_form() -> None:
-    missing = {name for name, kind in ALL_LAWS.items() if not is_isotropic(kind())}
+    missing = {name for name, kind in ALL_LAWS.items() if anisotropy(kind())}
     assert missing == {"capstan", "quarter_car_general", "exact_coulomb"}
 
 
@@ -384,15 +352,13 @@ STATIC_LEVEL = ["lugre", "dahl", "dahl, n 0.5", "dahl, n 2", "elasto_plastic", "
 STATIC_LEVEL += ["maxwell_slip", "gms", "haessig_friedland", "stick_slip", "gonthier", "bristle_2d"]
 
 
-@pytest.mark.parametrize("name", STATIC_LEVEL)
-@given(v=pair, scale=logs, z=pair, w=pair)
-def test_force_stays_within_the_static_level(
-    name: str, v: np.ndarray, scale: float, z: np.ndarray, w: np.ndarray
-) -> None:
+def test_force_stays_within_the_static_level() -> None:
     """Without damping of the bristles and for all loads of the elements below their limits."""
-    damped = "sigma_1" in parameters(LAWS[name]) and name not in ("gonthier", "bristle_2d")
-    law = PlanarSlip(with_values(LAWS[name], {"sigma_1": 0.0}) if damped else LAWS[name])
-    below = [a / max(np.hypot(*a), 1.0) for a in (z, w)]
-    rounding = 1e-3 if name == "gonthier" else 1e-9
-    F = law.force(scale * v, N, bent(law, *below))
-    assert np.hypot(*F) <= 0.15 * N * (1 + rounding)
+    for name in STATIC_LEVEL:
+        damped = "sigma_1" in parameters(LAWS[name]) and name not in ("gonthier", "bristle_2d")
+        law = PlanarSlip(with_values(LAWS[name], {"sigma_1": 0.0}) if damped else LAWS[name])
+        rounding = 1e-3 if name == "gonthier" else 1e-9
+        for v, z, w in RNG.uniform(-1.0, 1.0, (20, 3, 2)):
+            below = [a / max(np.hypot(*a), 1.0) for a in (z, w)]
+            F = law.force(10.0 ** RNG.uniform(-6, 0) * v, N, bent(law, *below))
+            assert np.hypot(*F) <= 0.15 * N * (1 + rounding), name

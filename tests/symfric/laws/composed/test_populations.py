@@ -39,7 +39,8 @@ def test_same_seed_gives_the_same_force_and_another_seed_another() -> None:
 def test_scatter_falls_with_the_root_of_the_count() -> None:
     def scatter(count: int) -> float:
         late = [
-            GenericAsperity(count=count, seed=s).force(*sliding(1e-4), N)[-1] for s in range(60)
+            GenericAsperity(count=count, seed=s).force(*sliding(1e-4, 2.2e-5, 1e-6), N)[-1]
+            for s in range(60)
         ]
         return float(np.std(late))
 
@@ -54,16 +55,15 @@ def test_force_is_proportional_to_load_at_fixed_stretch_over_load() -> None:
 
 
 def cyclic(law: GenericAsperity, amplitude: float) -> tuple[np.ndarray, np.ndarray]:
-    s = np.linspace(0.0, 3.0, 6001)
+    s = np.linspace(0.0, 3.0, 1201)
     x = amplitude * np.sin(2 * np.pi * s)
     return x, law.force(s, x, N)
 
 
-@pytest.mark.parametrize("amplitude", [1e-6, 1e-5, 1e-4])
-def test_cycle_dissipates(amplitude: float) -> None:
-    x, F = cyclic(GenericAsperity(), amplitude)
-    last = slice(4000, None)
-    assert np.trapezoid(F[last], x[last]) > 0
+def test_cycle_dissipates() -> None:
+    for amplitude in (1e-6, 1e-5, 1e-4):
+        x, F = cyclic(GenericAsperity(), amplitude)
+        assert np.trapezoid(F[800:], x[800:]) > 0
 
 
 def test_small_inner_loop_returns_to_the_outer_one() -> None:
@@ -77,7 +77,7 @@ def test_small_inner_loop_returns_to_the_outer_one() -> None:
 
 
 def test_velocity_that_swings_opens_a_loop() -> None:
-    t = np.linspace(0.0, 0.4, 8001)
+    t = np.linspace(0.0, 0.3, 1501)
     v = 3e-4 + 2.5e-4 * np.sin(2 * np.pi * 10 * t)
     x = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2 * np.diff(t))])
     F = GenericAsperity(count=2000).force(t, x, N)

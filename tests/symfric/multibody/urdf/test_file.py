@@ -134,11 +134,6 @@ def test_joints_without_an_axis_may_have_one_of_zeros() -> None:
         assert wrist.axis.tolist() == [1, 0, 0]
 
 
-def test_a_fixed_joint_follows_nobody_and_says_so() -> None:
-    urdf = parse(small(LINK, joint('<mimic joint="hinge"/>', kind="fixed")))
-    assert (urdf.joints[1].mimic, urdf.left_out) == (None, ("<mimic> of joint 'wrist'",))
-
-
 def inertia(mass: float, entries: str) -> str:
     old = '<mass value="1"/><inertia ixx="1" iyy="1" izz="1"/>'
     assert old in LINK

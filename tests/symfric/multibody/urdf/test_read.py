@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from robots import SMALL, rod
 
-from symfric import Coulomb, Law, LuGre, Sum, Viscous, parameters, simulate
+from symfric import Coulomb, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
 from symfric.multibody import JointFriction, Mechanism, Universal, functions
 from symfric.multibody.urdf import read_urdf, relative, tag_friction
@@ -26,16 +26,13 @@ def test_damping_is_viscous_and_friction_a_constant_torque_without_any_unknown()
         assert acceleration == pytest.approx(-(weight * np.sin(0.3) + torque) / inertia, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("damping", "level", "expected"),
-    [(0.0, 0.0, None), (0.3, 0.0, Viscous), (0.0, 0.2, Coulomb), (0.3, 0.2, Sum)],
-)
-def test_tags_of_zero_add_no_friction(
-    damping: float, level: float, expected: type[Law] | None
-) -> None:
-    text = rod(**{'damping="0.3" friction="0.2"': f'damping="{damping}" friction="{level}"'})
-    friction = tag_friction(parse(text).joints[0])
-    assert friction is None if expected is None else isinstance(friction.law, expected)  # type: ignore[union-attr]
+def test_tags_of_zero_add_no_friction() -> None:
+    old = 'damping="0.3" friction="0.2"'
+    for damping, level, law in ((0.0, 0.0, None), (0.3, 0.0, Viscous), (0, 0.2, Coulomb)):
+        text = rod(**{old: f'damping="{damping}" friction="{level}"'})
+        friction = tag_friction(parse(text).joints[0])
+        assert friction is None if law is None else isinstance(friction.law, law)  # type: ignore[union-attr]
+    assert isinstance(tag_friction(parse(SMALL).joints[0]).law, Sum)  # type: ignore[union-attr]
 
 
 def test_another_law_gets_the_friction_tag_as_its_normal_force() -> None:
@@ -152,12 +149,6 @@ def test_all_that_is_left_out_is_said_once() -> None:
 def test_law_that_no_joint_uses_is_said() -> None:
     with pytest.warns(UserWarning, match="left out: LuGre, because no joint has <dynamics fric"):
         read_urdf(rod(**{' friction="0.2"': ""}), law=LuGre())
-
-
-def test_planar_joint_takes_no_friction_and_says_so() -> None:
-    with pytest.warns(UserWarning, match="<dynamics> of planar joint 'hinge'"):
-        m = read_urdf(rod(revolute="planar"))
-    assert [v.name for v in m.build().x[:3]] == ["hinge_x", "hinge_y", "hinge_angle"]
 
 
 def test_names_are_kept_apart() -> None:
@@ -321,11 +312,6 @@ def test_mass_matrix_may_have_zeros_on_one_side_only() -> None:
     M, bias = f["mass"](q, []).full(), f["bias"](q, qd, [1, 2], []).full().ravel()
     found = m.build().function("ode")(0, [*q, *qd], [], [1, 2], []).full().ravel()
     assert found[2:] == pytest.approx(np.linalg.solve(M, -bias), rel=1e-12)
-
-
-def test_a_single_body_is_told_how_it_moves() -> None:
-    with pytest.warns(UserWarning, match="nothing moves: floating=True frees the root 'world'"):
-        read_urdf(f"<robot name='r'>{bar('world', HEAVY)}</robot>")
 
 
 def test_bearing_of_a_fixed_joint_is_refused() -> None:

@@ -1,0 +1,206 @@
+"""Sequences of modes: read, cut, pruned, edited, solved and repaired; starts around a motion."""
+
+from dataclasses import replace
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+from phases import solve_once
+
+from ocp.formulation.problem import Problem
+from ocp.friction.arc_solution import ModeSolver, SolvedSequence
+from ocp.friction.arcs import STOPPED, Rules, arc_model, in_arcs
+from ocp.friction.mode_optimisation import KICK, SHORTEST, better, settled
+from ocp.friction.sequence import (
+    Leg,
+    Run,
+    Track,
+    cut,
+    flat,
+    inserted,
+    neighbours,
+    placed,
+    pruned,
+    read,
+    shown,
+    tracks_of,
+    with_rests,
+)
+from ocp.friction.smooth_models import smoothed, widths
+from ocp.friction.transfer import Known, sizes_of
+from ocp.problems import cart_pendulum, load_through_spring, out_and_back
+from ocp.solving.methods import Ipopt
+from ocp.solving.one_solve import starts_around
+from ocp.solving.starts import initial_points
+from ocp.transcription.schemes import Radau, make_meshes
+from ocp.transcription.transcribe import Transcription, discretise
+
+
+def there_and_back() -> Track:
+    t = np.linspace(0.0, 2.0, 201)
+    return read("guide", t, np.sin(np.pi * t), creep=0.05, shortest=0.05)
+
+
+def one(*runs: tuple[int, float, float]) -> tuple[Leg]:
+    """One leg of 1 s of the contact "guide"."""
+    return (cut([Track("guide", tuple(Run(*run) for run in runs))], (0, 0), 0.0, runs[-1][2]),)
+
+
+def two(*runs: tuple[int, float, float]) -> tuple[Leg, Leg]:
+    """Two legs of 1 s of the contact "guide"."""
+    track = Track("guide", tuple(Run(*run) for run in runs))
+    return cut([track], (0, 0), 0.0, 1.0), cut([track], (1, 0), 1.0, 2.0)
+
+
+def test_runs_are_read_without_gaps() -> None:
+    track = there_and_back()  # rests of 0.03 s at 0, 1 and 2 s are too short
+    assert [run.mode for run in track.runs] == [1, -1]
+    assert track.runs[0].begin == 0.0
+    assert track.runs[0].end == track.runs[1].begin == pytest.approx(1.0)
+    assert track.runs[1].end == 2.0
+    t = np.linspace(0.0, 3.0, 301)
+    slip = np.where(t < 1, 1.0, np.where(t < 2, 1e-3, -1.0))
+    assert [run.mode for run in read("guide", t, slip, 0.01, 0.05).runs] == [1, 0, -1]
+
+
+def test_rests_are_inserted_at_reversals_and_ends_that_can_hold() -> None:
+    track = with_rests(there_and_back(), lambda t: True, 0.02)
+    assert [run.mode for run in track.runs] == [0, 1, 0, -1, 0]
+    for before, after in zip(track.runs[:-1], track.runs[1:], strict=True):
+        assert before.end == after.begin
+    held = with_rests(there_and_back(), lambda t: t > 1.5, 0.02, (True, True))
+    assert [run.mode for run in held.runs] == [1, -1, 0]
+    moving = with_rests(there_and_back(), lambda t: True, 0.02, (False, False))
+    assert [run.mode for run in moving.runs] == [1, 0, -1]
+
+
+def test_legs_are_cut_where_any_contact_changes() -> None:
+    first = Track("one", (Run(1, 0.0, 1.2), Run(-1, 1.2, 2.0)))
+    second = Track("two", (Run(0, 0.0, 0.5), Run(1, 0.5, 2.0)))
+    legs = tuple(cut([first, second], (k, 0), k, k + 1.0) for k in range(2))
+    assert shown(legs) == "(+0)(++) | (++)(-+)"
+    assert [arc.duration for arc in flat(legs)] == pytest.approx([0.5, 0.5, 0.2, 0.8])
+    assert tracks_of(legs) == {"one": first.runs, "two": second.runs}
+
+
+def test_vanished_arcs_are_pruned_and_modes_inserted() -> None:
+    legs = placed(one((1, 0, 0.6), (0, 0.6, 0.7), (1, 0.7, 1)), [0.69, 1e-5, 0.31 - 1e-5])
+    (left,) = pruned(legs, 1e-4)
+    assert shown([left]) == "+"
+    assert (left.arcs[0].begin, left.arcs[0].end) == (0.0, pytest.approx(1.0))
+    longest = pruned(one((1, 0.0, 4e-5), (0, 4e-5, 1e-4)), 1e-3)
+    assert shown(longest) == "0"
+    assert shown(inserted(one((1, 0, 1)), 0, "guide", 0, 0.4, 0.5)) == "+0+"
+    assert shown(inserted(one((1, 0, 1)), 0, "guide", 0, 0.4, 1.0)) == "+0"
+
+
+@pytest.mark.parametrize("margin", [1e-2, 1e-4])
+def test_rests_keep_their_margin(margin: float) -> None:
+    rules = Rules(out_and_back(), {"guide": 1.0}, ("guide",), 1e-4, margin)
+    rest, slip, _ = in_arcs(rules, two((0, 0, 0.1), (1, 0.1, 1), (-1, 1, 2))).chain
+    assert rest.bounds["guide_up"] == (margin, None)
+    assert rest.start["guide_first_down"] == (margin, None)
+    assert slip.start["guide_pull"] == (margin, None)
+
+
+@pytest.mark.parametrize(
+    ("side", "stretch", "left"),
+    [(1, 0.019, 0.0), (1, 0.02, -0.2), (-1, -0.019, 0.0), (-1, 0.01, 5.8)],
+)
+def test_stops_keep_a_distance_from_the_sliding_force(
+    side: int, stretch: float, left: float
+) -> None:
+    """200 N/m hold a load that slides against 4 N: 5 % less than that is allowed at a stop."""
+    model = load_through_spring().chain[0].model
+    made = arc_model(model, {"load": 0}, (), {}, {}, {"load": side}, {"load": 6.0}, (0.01, 0.002))
+    symbols = [made.vector("x"), made.vector("z"), made.vector("u"), made.vector("p")]
+    room = ca.Function("room", symbols, [made.expression(f"load{STOPPED}")])
+    p = made.values("p", {})
+    assert float(room([stretch, 0, 0, 0], 0, 0, p)) * 6.0 == pytest.approx(left, abs=1e-5)
+
+
+# --- solved sequences ---------------------------------------------------------------------------
+
+
+@cache
+def known() -> Known:
+    """Out and back with friction smoothed over 0.05 m/s."""
+    p = {w.parameter: w.at(0.05) for w in widths(out_and_back().chain[0].model)}
+    smooth = solve_once(replace(smoothed(out_and_back()), p=p), 25)
+    return Known.of(out_and_back(), smooth.motions[0], {})
+
+
+def modes_solver() -> ModeSolver:
+    problem = out_and_back()
+    rules = Rules(problem, sizes_of(problem, known()), ("guide",), SHORTEST * 2)
+    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2, None)
+
+
+def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
+    first = modes_solver().solve(legs, known(), 30, 1e-2)
+    assert first.ok
+    return settled(modes_solver(), first, lambda solved: solved)
+
+
+@pytest.mark.parametrize(
+    "runs",
+    [
+        [(0, 0, 0.1), (1, 0.1, 0.9), (0, 0.9, 1.1), (-1, 1.1, 1.9), (0, 1.9, 2)],
+        pytest.param([(1, 0, 0.9), (-1, 0.9, 2)], marks=pytest.mark.slow),
+        pytest.param([(1, 0, 1.05), (-1, 1.05, 2)], marks=pytest.mark.slow),
+        pytest.param([(1, 0, 0.95), (-1, 0.95, 1.8), (1, 1.8, 2)], marks=pytest.mark.slow),
+    ],
+)
+def test_superfluous_arcs_shrink_and_are_pruned(runs: list[tuple[int, float, float]]) -> None:
+    found = found_for(two(*runs))
+    assert shown(found.legs) == "+ | -"
+    assert found.ideal_cost == pytest.approx(64.59984, rel=1e-3)
+
+
+def test_neighbouring_sequences_are_tried_and_the_better_one_is_kept() -> None:
+    """Reversing before or after the prescribed instant costs more; breaking away takes 6 N."""
+    legs = two((1, 0, 1), (-1, 1, 2))
+    assert [shown(other) for other in neighbours(legs, 0.01)] == ["+- | -", "+ | +-"]
+    found = found_for(legs)
+    kept = better(modes_solver(), found, 0.01, lambda solved: solved)
+    assert shown(kept.legs) == "+ | -"
+    assert kept.outcome.cost <= found.outcome.cost
+    forces = [points.u[0, 0] for points in found.points.spans]
+    assert forces[0] >= 6.0 * 1.009
+    assert forces[1] <= -6.0 * 1.009
+    assert np.isfinite(found.loss)
+
+
+# --- starts around a motion ---------------------------------------------------------------------
+
+
+def on(problem: Problem, intervals: int) -> Transcription:
+    return discretise(problem, Radau(3)).on(make_meshes(problem, intervals))
+
+
+def test_other_starts_differ_and_rates_belong_to_positions() -> None:
+    into = on(cart_pendulum(), 200)
+    begin = initial_points(into)
+    first, second, third = starts_around(into, begin, range(3), 0.5)
+    assert first is begin
+    assert np.abs(second.spans[0].inner - third.spans[0].inner).max() > 0.1
+    again = starts_around(into, begin, [1], 0.5)[0].spans[0]
+    assert np.array_equal(again.u, second.spans[0].u)
+    t = 2.0 * into.meshes[0]
+    for position, rate in zip(again.nodes[:2], again.nodes[2:], strict=True):
+        assert rate[5:-5] == pytest.approx(np.gradient(position, t)[5:-5], abs=1e-3)
+
+
+def test_ends_stay_phases_join_and_resting_states_take_the_size_of_their_unit() -> None:
+    into = on(load_through_spring(), 20)
+    begin = initial_points(into)
+    starts = starts_around(into, begin, range(1, 20), 0.5)
+    before, after = (span.nodes[:2] for span in starts[2].spans)
+    assert before[:, 0] == pytest.approx(begin.spans[0].nodes[:2, 0])
+    assert after[:, -1] == pytest.approx(begin.spans[1].nodes[:2, -1])
+    assert before[:, -1] == pytest.approx(after[:, 0])
+    assert np.ptp(begin.spans[0].nodes[0]) == 0.0
+    ways = [np.ptp(np.hstack([s.nodes for s in points.spans])[:2], axis=1) for points in starts]
+    typical = np.median(ways, axis=0)
+    assert typical[0] == pytest.approx(typical[1], rel=0.9)

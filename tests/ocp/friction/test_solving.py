@@ -1,0 +1,386 @@
+"""From wide layers to exact modes, and the messages of what fails on the way.
+
+Machines are judged by `rubbing.Machine.follow`: the equations again in NumPy, modes by hand, SciPy.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from math import pi, tanh
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from phases import unit_move
+from rubbing import KINDS, Machine, machine
+
+from ocp import Phase, Problem, Progress, Solution, at_end, integral, solve, strategies
+from ocp.formulation.phase import FREE
+from ocp.friction import homotopy
+from ocp.friction.event_check import motions, verify_exactly
+from ocp.friction.homotopy import FIRST, LAST, Sharp, sharpened
+from ocp.friction.mode_models import holding, mode_model
+from ocp.friction.smooth_models import (
+    Scale,
+    own_level,
+    same_size,
+    smoothed,
+    speeds_at,
+    sticking,
+    widths_at,
+)
+from ocp.problems import (
+    cart_pendulum,
+    load_through_spring,
+    out_and_back,
+    parcel_on_tray,
+    two_blocks,
+)
+from ocp.solving.methods import Ipopt
+from ocp.transcription.schemes import Radau
+from symfric import (
+    BrownMcPhee,
+    Contact,
+    ExactCoulomb,
+    LuGre,
+    Model,
+    SolveError,
+    Status,
+    Variable,
+    drive,
+)
+from symfric.laws import Law
+from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, Revolute
+
+OUT_AND_BACK = 40.0 + 0.5 / (1.0 - 4.0 * tanh(0.25))
+SCALES = {"guide": Scale(2.0)}
+FORCE = integral(lambda s: s.force**2)
+
+
+# --- layers from wide to narrow -----------------------------------------------------------------
+
+
+def test_layers_narrow_down_to_a_hundredth(steps: tuple[Sharp, ...]) -> None:
+    levels = [step.level for step in steps]
+    assert levels[0] == FIRST
+    assert levels[-1] == pytest.approx(LAST)
+    assert all(a / b <= 1.79 for a, b in pairwise(levels))
+    assert 6 < len(steps) < 12
+    counts = [step.solution.statistics.solves for step in steps]  # only the first are many
+    assert counts[0] <= 2 * 2 + 3
+    assert all(b - a <= 6 for a, b in pairwise(counts))
+    last = steps[-1]
+    speed = last.scales["guide"].speed
+    assert last.error <= 1e-3
+    assert last.solution.problem.p["guide_v_t"] == pytest.approx(LAST * speed)
+    assert speeds_at(out_and_back(), last.scales, LAST) == {"guide": pytest.approx(LAST * speed)}
+    assert abs(last.solution["v"]).max() == pytest.approx(speed, rel=0.2)
+
+
+def test_cost_tends_to_that_of_coulomb(steps: tuple[Sharp, ...]) -> None:
+    """J is nearly linear in the width: from two widths to none."""
+    (a, J_a), (b, J_b) = ((step.level, step.solution.cost) for step in (steps[-3], steps[-1]))
+    assert J_b - b * (J_a - J_b) / (a - b) == pytest.approx(OUT_AND_BACK, rel=5e-3)
+
+
+def test_step_to_a_worse_motion_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(homotopy, "ABOVE", -1.0)  # nothing is good enough
+    steps = list(sharpened(out_and_back(), Radau(3), Ipopt(), starts=1, intervals=20))
+    assert [step.level for step in steps] == [FIRST]
+
+
+def test_sizes_do_not_matter(steps: tuple[Sharp, ...]) -> None:
+    """A thousandth of the way by a thousandfold mass: forces and cost are the same."""
+    law = BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=500.0, v_t=1e-8, N_t=1e-3)
+    heavy = drive(law, m=1000.0, N=1.0)
+    out, back = (
+        replace(phase, model=heavy, end={name: 1e-3 * value for name, value in phase.end.items()})
+        for phase in out_and_back().chain
+    )
+    problem = replace(out_and_back(), phases=out >> back)
+    first = next(sharpened(problem, Radau(3), Ipopt(), starts=2))
+    assert first.scales["guide"].speed == pytest.approx(1e-3 * steps[0].scales["guide"].speed, 0.1)
+    assert first.solution.cost == pytest.approx(steps[0].solution.cost, 0.02)
+
+
+def test_widths_follow_from_speeds_and_are_not_smaller_than_the_users() -> None:
+    wide, sharp = out_and_back(v_t=0.5), out_and_back(v_t=1e-5)
+    assert widths_at(wide, SCALES, 0.1) == {"guide_v_t": 0.5}
+    assert widths_at(sharp, SCALES, 0.1) == {"guide_v_t": pytest.approx(0.2)}
+    assert own_level(wide, SCALES) == 0.25
+    assert own_level(sharp, SCALES) == pytest.approx(5e-6)
+    assert same_size(SCALES, {"guide": Scale(5.0)}, 3.0)
+    assert not same_size(SCALES, {"guide": Scale(7.0)}, 3.0)
+    assert not sticking(unit_move().chain[0].model)
+    assert sticking(parcel_on_tray().chain[0].model)
+
+
+@pytest.mark.parametrize("law", [ExactCoulomb(mu_s=6.0, mu_d=4.0), LuGre(mu_s=6.0, mu_d=4.0)])
+def test_laws_without_a_width_have_a_stand_in(law: Law) -> None:
+    move = Phase(drive(law, m=1.0, N=1.0), 1.0, end={"x": 1.0, "v": 0.0})
+    problem = Problem(move, FORCE)
+    assert sticking(move.model)
+    assert own_level(problem, SCALES) == 0.0
+    assert [v.name for v in smoothed(problem).chain[0].model.x] == ["x", "v"]
+    assert widths_at(problem, SCALES, 0.1) == {"guide_width": pytest.approx(0.2)}
+
+
+# --- motions by modes ---------------------------------------------------------------------------
+
+
+def test_out_and_back_by_modes_has_its_closed_form(by_modes: Solution) -> None:
+    """Held controls cost a little more; the superfluous rests are pruned."""
+    assert by_modes.verified
+    assert by_modes.miss < 1e-4
+    assert OUT_AND_BACK < by_modes.cost < 1.001 * OUT_AND_BACK
+    (modes,) = by_modes.modes.values()
+    assert [mode.kind for mode in modes] == ["slip+", "slip-"]
+    assert [mode.end for mode in modes] == pytest.approx([1.0, 2.0])
+    assert [phase.name for phase in by_modes.phases] == ["out", "back"]
+    assert [phase.T for phase in by_modes.phases] == pytest.approx([1.0, 1.0])
+    assert by_modes["x"][by_modes.t.searchsorted(1.0 - 1e-9)] == pytest.approx(1.0)
+    assert set(by_modes.signals) >= {"x", "v", "force", "friction"}
+
+
+def test_motion_by_modes_holds_under_exact_friction(by_modes: Solution) -> None:
+    found = verify_exactly(by_modes, tolerance=1e-6)
+    assert found.ok, str(found)
+    assert {m.what for m in found.checked} >= {"start", "end", "cost"}
+    assert found.cost == pytest.approx(by_modes.cost, rel=1e-9)
+    exact = [m for motion in motions(by_modes) for m in motion.modes["guide"]]
+    kept = [m for m in exact if m.end - m.begin > 1e-6]
+    assert [m.kind for m in kept] == [m.kind for m in by_modes.modes["guide"]]
+    ends = [m.end for m in by_modes.modes["guide"]]
+    np.testing.assert_allclose([m.end for m in kept], ends, atol=1e-5)
+    with pytest.raises(ValueError, match="verify_exactly: expected a solution"):
+        verify_exactly(out_and_back())  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="verify_exactly: tolerance: expected"):
+        verify_exactly(by_modes, tolerance=0.0)
+
+
+def test_smooth_law_on_a_coarse_mesh_does_not_hold_under_exact_friction() -> None:
+    model = drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-4), m=1.0, N=1.0)
+    phase = Phase(model, 1.0, start={"x": 0.0, "v": 0.0}, end={"x": 0.3, "v": 0.0})
+    options = {"friction": "smooth", "intervals": 20, "verify": False, "refine": False}
+    solution = solve(Problem(phase, FORCE, bounds={"force": (-20.0, 20.0)}), **options)
+    assert solution.status.ok
+    found = verify_exactly(solution)
+    assert not found.ok
+    assert (found.worst.what, found.worst.name) == ("end", "x")  # type: ignore[union-attr]
+
+
+NEAR = 1e-3
+"""Tolerance of `solve`: distance of the exact motion from its goal, over its way."""
+TELLING = ("Friction is still smooth", "Modes were not found", "re-simulated", "maximum number",
+           "unstable", "No point satisfies", "time limit")  # fmt: skip
+"""Texts of a message about a motion that is not right, or of other friction than the user's."""
+
+
+def judged(of: Machine, found: Solution) -> str:
+    """Return "exact", "reported", or the fault of a motion."""
+    if found.modes and found.verified:
+        missed = of.missed(found)
+        return "exact" if missed < NEAR else f"misses by {missed:.1e}: {found.message}"
+    return "reported" if any(text in found.message for text in TELLING) else found.message
+
+
+def test_random_machine_is_solved_by_modes() -> None:
+    of = machine(12)
+    assert judged(of, solve(of.problem(), starts=2, throw=False)) == "exact"
+
+
+@pytest.mark.slow
+def test_a_hundred_machines_are_solved_or_reported() -> None:
+    ends = {}
+    for seed in range(len(KINDS), len(KINDS) + 100):
+        of = machine(seed)
+        ends[seed] = judged(of, solve(of.problem(), throw=False))
+    wrong = {seed: text for seed, text in ends.items() if text not in ("exact", "reported")}
+    assert wrong == {}
+    assert sum(text == "exact" for text in ends.values()) >= 98
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("make", "cost", "kinds"),
+    [
+        (cart_pendulum, 71.534, {"x": ["slip+", "slip-", "stick", "slip+"]}),
+        (load_through_spring, 28.480, {"load": ["stick", "slip+", "slip-"]}),
+        (two_blocks, 59.18, {}),
+    ],
+)
+def test_rests_on_the_way_hold_under_exact_friction(
+    make: Callable[..., Problem], cost: float, kinds: dict[str, list[str]]
+) -> None:
+    solution = solve(make(1e-5), friction="modes")
+    assert solution.cost == pytest.approx(cost, rel=5e-3)
+    for name, expected in kinds.items():
+        assert [mode.kind for mode in solution.modes[name]][: len(expected)] == expected
+    every = {mode.kind for modes in solution.modes.values() for mode in modes}
+    assert every == {"slip+", "slip-", "stick"}
+    assert verify_exactly(solution, tolerance=1e-4).ok
+
+
+def cart_pole(law: Callable[[float, float], Law]) -> Problem:
+    """1 kg on a rail and 0.3 kg on a rod of 0.5 m, friction in both joints: swing up, 0.8 m on."""
+    m = Mechanism("cart_pole", gravity=(0.0, 0.0, -9.81))
+    m.body("cart", 1.0, (1e-6,) * 3)
+    m.body("bob", 0.3, (1e-6,) * 3)
+    for frame in ("ground.rail", "cart.rail"):
+        m.frame(frame, z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
+    m.frame("cart.h", z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
+    m.frame("bob.h", at=(0.0, 0.0, 0.5), z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
+    rail = JointFriction(law(2.2, 1.5), normal=1.0)
+    pin = JointFriction(law(0.03, 0.02), radius=1.0, normal=1.0)
+    m.joint(Prismatic("x", "ground.rail", "cart.rail", friction=rail))
+    m.joint(Revolute("th", "cart.h", "bob.h", friction=pin))
+    force = m.input("force", "N", nominal=10.0)
+    m.force(JointSpringDamper("motor", "x", "slide", actuator=force))
+    start = dict.fromkeys(("x", "th", "x_rate", "th_rate"), 0.0)
+    move = Phase(m.build(), 2.0, start=start, end=start | {"x": 0.8, "th": pi})
+    return Problem(move, FORCE, bounds={"force": (-20.0, 20.0)})
+
+
+def narrow(mu_s: float, mu_d: float) -> Law:
+    return BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=1e-5)
+
+
+def test_holding_force_of_one_joint_contains_the_reaction_of_the_other() -> None:
+    model = cart_pole(narrow).chain[0].model
+    modes = {"x": 1, "th": 0}
+    moving = mode_model(model, modes)
+    force, rooms = holding(model, modes, "x")
+    known = [moving.t, *(moving.vector(letter) for letter in "xzup")]
+    assert not ca.Function("held", known, [force, *rooms.values()], {"allow_free": True}).has_free()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [narrow, lambda s, d: ExactCoulomb(mu_s=s, mu_d=d)])
+def test_cart_pole_with_friction_in_both_joints(law: Callable[[float, float], Law]) -> None:
+    """Both laws tend to the same friction: 73.8 N^2 s to three digits."""
+    found = solve(cart_pole(law))
+    assert found.verified
+    assert found.cost == pytest.approx(73.8, abs=0.1)
+    assert set(found.modes) == {"x", "th"}
+    assert "With exact Coulomb friction it misses by" in found.message
+
+
+# --- margins of rests ---------------------------------------------------------------------------
+
+PUSH, MOST = 2.0, 5.0
+"""mu g of a part on a tray, and the largest acceleration of the tray [m/s^2]."""
+BEST = (MOST - PUSH**2 / MOST) / 16.0
+"""Way of the part in a cycle of 1 s: it rests under PUSH, and slides under -MOST [m]."""
+
+
+def conveyor() -> Problem:
+    """The farthest way of a part on a shaken tray in a period."""
+    tray, part = (Variable(name, "m", nominal=0.1) for name in ("tray", "part"))
+    v_tray, v_part = (Variable(name, "m/s") for name in ("v_tray", "v_part"))
+    w = Variable("w", "m/s^2", lower=-MOST, upper=MOST, nominal=MOST)
+    law = BrownMcPhee(mu_s=PUSH, mu_d=PUSH, v_t=1e-5)
+    bed = Contact("bed", v_part.symbol - v_tray.symbol, 1.0, law)
+    model = Model(
+        "conveyor", x=(tray, v_tray, v_part, part), u=(w,), contacts=(bed,),
+        ode=ca.vertcat(v_tray.symbol, w.symbol, -bed.force, v_part.symbol),
+    )  # fmt: skip
+    start = {"tray": 0.0, "part": 0.0, "v_tray": FREE, "v_part": FREE}
+    names = ["tray", "v_tray", "v_part"]
+    return Problem(Phase(model, 1.0, start=start), at_end(lambda s: -s.part), periodic=names)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("margin", "least", "rel"), [(1e-4, 0.0, 5e-4), (0.02, 0.01, 2e-3)])
+def test_conveyor_has_its_closed_form_but_for_the_cost_of_its_margin(
+    margin: float, least: float, rel: float
+) -> None:
+    found = solve(conveyor(), resting_margin=margin)
+    assert found.verified
+    text = re.search(r"Rests keep (\S+) of .*, which costs about (\S+) of", found.message)
+    assert text is not None, found.message
+    cost = float(text[2])
+    assert float(text[1]) == margin
+    assert cost >= least * BEST
+    assert -found.cost + cost == pytest.approx(BEST, rel=rel)
+
+
+# --- failures on the way ------------------------------------------------------------------------
+
+INTERNAL = RuntimeError("variables [z] are free")
+
+
+def raising(error: BaseException) -> Callable[..., Any]:
+    def fails(*_: object, **__: object) -> object:
+        raise error
+
+    return fails
+
+
+def sharpened_by(monkeypatch: pytest.MonkeyPatch, steps: tuple[Sharp, ...]) -> None:
+    """Use known layers instead of a search."""
+    monkeypatch.setattr(strategies, "sharpened", lambda *_, **__: iter(steps))
+
+
+@pytest.mark.parametrize(
+    "error", [INTERNAL, SolveError("no unique mode", Status.SOLVER_FAILED)], ids=str
+)
+def test_failed_modes_end_in_the_sharpened_motion(
+    error: Exception, monkeypatch: pytest.MonkeyPatch, steps: tuple[Sharp, ...]
+) -> None:
+    sharpened_by(monkeypatch, steps)
+    monkeypatch.setattr(strategies, "optimise_modes", raising(error))
+    found = solve(out_and_back(v_t=1e-5), throw=False)
+    assert found.ok
+    assert found.modes == {}
+    assert "Friction is still smooth: guide over" in found.message
+    assert f"Modes were not found: {'internal error, ' * (error is INTERNAL)}" in found.message
+    assert str(error) in found.message
+    monkeypatch.setattr(strategies, "optimise_modes", raising(KeyboardInterrupt()))
+    with pytest.raises(KeyboardInterrupt):
+        solve(out_and_back(v_t=1e-5))
+
+
+def test_failed_layers_end_in_the_smooth_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    def layers(*_: object, **__: object) -> Iterator[object]:
+        yield raising(INTERNAL)()
+
+    monkeypatch.setattr(strategies, "sharpened", layers)
+    monkeypatch.setattr(strategies, "verified", raising(INTERNAL))
+    found = solve(out_and_back(v_t=0.2), throw=False, intervals=10, refine=False)
+    assert found.ok and not found.verified
+    assert "Friction was not sharpened: internal error, RuntimeError: variables" in found.message
+    assert "It was not verified: internal error, RuntimeError: variables" in found.message
+
+
+def test_failed_simulation_with_exact_friction_is_reported(
+    monkeypatch: pytest.MonkeyPatch, steps: tuple[Sharp, ...], by_modes: Solution
+) -> None:
+    sharpened_by(monkeypatch, steps)
+    error = ValueError("expected no events, got 1")
+    monkeypatch.setattr(strategies, "verify_exactly", raising(error))
+    monkeypatch.setattr(strategies, "optimise_modes", lambda *_, **__: iter([(by_modes, 1e-2)]))
+    found = solve(out_and_back(v_t=1e-5))
+    assert found.verified
+    assert found.modes
+    assert "With exact Coulomb friction it was not simulated: expected no events" in found.message
+
+
+def test_stop_during_the_search_for_modes_leaves_the_smooth_motion(
+    monkeypatch: pytest.MonkeyPatch, steps: tuple[Sharp, ...]
+) -> None:
+    stages: list[str] = []
+
+    def leave(progress: Progress) -> None:
+        stages.append(progress.stage)
+        if progress.stage.startswith("modes"):
+            raise KeyboardInterrupt
+
+    sharpened_by(monkeypatch, steps)
+    stopped = solve(out_and_back(v_t=1e-5), progress=leave, throw=False)
+    assert stopped.status is Status.INTERRUPTED
+    assert "Stopped while modes were sought; friction is still smooth." in stopped.message
+    assert stopped.modes == {}
+    assert sum(stage.startswith("modes") for stage in stages) == 1
+    assert abs(stopped["x"][-1]) < 1e-3

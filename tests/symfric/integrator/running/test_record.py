@@ -1,0 +1,214 @@
+"""Dense output, values at the times of the result, and the steps that a run keeps."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from backends import needs_compiler
+from numpy.typing import NDArray
+
+import symfric.integrator.running.run as module
+from symfric import (
+    BrownMcPhee,
+    ExactCoulomb,
+    Hold,
+    Linear,
+    LuGre,
+    Model,
+    Trajectory,
+    drive,
+    rabinowicz,
+    simulate,
+)
+from symfric.integrator.running.crossings import cutting
+from symfric.integrator.running.record import Dense, Record, Run, hermite
+from symfric.scenes import PendulumBox
+
+Array = NDArray[np.float64]
+RNG = np.random.default_rng(7)
+
+
+def pieces(rows: int, count: int = 3, n: int = 2) -> Dense:
+    """A continuous chain with random coefficients on [0, count] s."""
+    t, y = np.arange(count + 1.0), RNG.normal(size=(count + 1, n))
+    return Dense(t[:-1], t[1:], y[:-1], y[1:], RNG.normal(size=(count, rows, n)))
+
+
+def cubic(t: Array) -> Array:
+    return np.stack([1 + t - 2 * t**2 + t**3, 4 - t**3])
+
+
+def cubic_slope(t: Array) -> Array:
+    return np.stack([1 - 4 * t + 3 * t**2, -3 * t**2])
+
+
+def test_hermite_interpolation_reproduces_cubics() -> None:
+    t = np.array([0.0, 0.3, 1.0, 1.1, 2.5])
+    fine = np.linspace(0, 2.5, 77)
+    assert hermite(t, cubic(t), cubic_slope(t))(fine) == pytest.approx(cubic(fine), abs=1e-13)
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 3])
+def test_ends_of_the_pieces_are_the_accepted_values(rows: int) -> None:
+    dense = pieces(rows)
+    every = np.arange(3)
+    np.testing.assert_array_equal(dense.piece(every, np.zeros(3)), dense.y0)
+    np.testing.assert_array_equal(dense.piece(every, np.ones(3)), dense.y1)
+    assert (
+        pytest.approx(np.vstack([dense.y0, dense.y1[-1:]]), abs=1e-14)
+        == dense(np.array([0.0, 1.0, 2.0, 3.0])).T
+    )
+
+
+@pytest.mark.parametrize(("rows", "degree"), [(0, 1), (1, 2), (2, 3), (3, 4)])
+def test_piece_is_a_polynomial_one_degree_above_its_rows(rows: int, degree: int) -> None:
+    s = np.linspace(0, 1, 9)
+    values = pieces(rows).piece(np.zeros(9, int), s)
+    fitted = np.polynomial.polynomial.polyfit(s, values, degree)
+    assert pytest.approx(values, abs=1e-10) == np.polynomial.polynomial.polyval(s, fitted).T
+    if rows:
+        less = np.polynomial.polynomial.polyfit(s, values, degree - 1)
+        assert np.abs(np.polynomial.polynomial.polyval(s, less).T - values).max() > 1e-4
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 3])
+@pytest.mark.parametrize("theta", [0.001, 0.37, 0.999, 1.0])
+def test_step_cut_at_an_event_keeps_its_polynomial(rows: int, theta: float) -> None:
+    whole = pieces(rows, 1)
+    at = Record(2, rows)
+    row = np.concatenate([whole.t0, whole.t1, whole.y0[0], whole.y1[0], whole.D.ravel()])
+    cut = Dense.of(cutting(at)(theta, row).full().T, 2)
+    assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0], [theta])
+    times = np.linspace(0, theta, 101)
+    assert cut(times) == pytest.approx(whole(times), abs=1e-12)
+
+
+def test_value_at_a_jump_is_that_after_it() -> None:
+    first, second = pieces(1, 1, 1), pieces(1, 1, 1)
+    both = Dense.of(
+        np.vstack([first.rows, replace(second, t0=second.t0 + 1, t1=second.t1 + 1).rows]), 1
+    )
+    assert both(np.array([1.0]))[0, 0] == second.y0[0, 0]
+    assert both(np.array([np.nextafter(1.0, 0)]))[0, 0] == pytest.approx(first.y1[0, 0])
+    assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
+
+
+@pytest.mark.parametrize("count", [0, 1, 4])
+@pytest.mark.parametrize("rows", [0, 2, 3])
+def test_records_are_taken_apart(count: int, rows: int) -> None:
+    records = RNG.normal(size=(count, Record(3, rows).width))
+    dense = Dense.of(records, 3)
+    assert dense.D.shape == (count, rows, 3)
+    np.testing.assert_array_equal(dense.rows, records)
+
+
+@pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
+def test_dense_output_is_as_accurate_as_the_steps(method: str) -> None:
+    model = rabinowicz(LuGre())
+    run = simulate(model, 8.0, method=method, rtol=1e-6)
+    reference = simulate(model, 8.0, rtol=1e-11)
+    at_steps = np.abs(run.at(run.step_times)["x"] - reference.at(run.step_times)["x"]).max()
+    between = np.abs(run["x"] - reference["x"]).max()
+    assert between < 3 * at_steps + 1e-6
+
+
+each_engine = pytest.mark.parametrize(
+    "backend", ["vm", pytest.param("compiled", marks=needs_compiler)]
+)
+TIMES = [0.0, 0.1, 0.3, 0.30001, 0.4, 0.9, 1.7, 2.0]
+"""Some of them at jumps of the inputs."""
+FORCE = Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])
+RAMP = Linear([0.0, 0.3, 0.9], [0.0, 15.0, -25.0])
+LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+
+Case = tuple[Callable[[], Model], dict[str, Any]]
+CASES: dict[str, Case] = {
+    "one interval": (lambda: rabinowicz(BrownMcPhee()), {}),
+    "held": (lambda: drive(LuGre()), {"u": {"force": FORCE}}),
+    "sampled": (lambda: drive(BrownMcPhee()), {"u": {"force": RAMP}, "times": [0.1, 1.5]}),
+    "events": (lambda: drive(ExactCoulomb()), {"u": {"force": lambda t: 12 * ca.sin(9 * t)}}),
+    "held events": (lambda: drive(ExactCoulomb()), {"u": {"force": FORCE}}),
+    "algebraic": (lambda: PendulumBox(LAW).model(), {}),
+    "few steps": (lambda: rabinowicz(LuGre()), {"max_steps": 70, "throw": False}),
+}
+
+
+def run_of(case: str, backend: str, **further: Any) -> Trajectory:
+    make, arguments = CASES[case]
+    return simulate(make(), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
+
+
+@each_engine
+@pytest.mark.parametrize("case", CASES)
+def test_outputs_are_the_dense_output_to_the_bit(case: str, backend: str) -> None:
+    """`at` evaluates the records of accepted steps in NumPy, whatever ran."""
+    run = run_of(case, backend)
+    assert run.t.tolist() == [time for time in TIMES if time <= run.step_times[-1]]
+    assert run.t.size > 1
+    again = run.at(run.t)
+    for name in run.units:
+        assert run[name].tobytes() == again[name].tobytes(), name
+
+
+@each_engine
+@pytest.mark.parametrize("case", CASES)
+def test_a_long_run_keeps_no_steps_and_gives_the_same(
+    case: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, kept = run_of(case, backend), list[int]()
+    keep = Run.keep
+
+    def counted(self: Run, piece: Any) -> None:
+        keep(self, piece)
+        kept.append(sum(map(len, self.kept)))
+
+    monkeypatch.setattr(Run, "keep", counted)
+    monkeypatch.setattr(module, "MOST_BYTES", 200)
+    bounded = run_of(case, backend)
+    assert max(kept) == 1
+    once = len(kept)
+    assert bounded.statistics.smallest_step == whole.statistics.smallest_step
+    assert bounded.final == whole.final
+    for name in whole.units:
+        assert bounded[name].tobytes() == whole[name].tobytes(), name
+    assert len(kept) == once
+    at = np.linspace(0.0, whole.step_times[-1], 57)
+    for name, values in whole.at(at).items():
+        assert bounded.at(at)[name].tobytes() == values.tobytes(), name
+    assert len(kept) > once  # run again for what lies between, and no steps kept for that either
+    assert max(kept) == 1
+    assert bounded.step_times.tobytes() == whole.step_times.tobytes()
+
+
+def test_tiny_motions_are_found_without_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The size of a motion is known when its steps are not kept."""
+    model, start = drive(LuGre()), {"v": 1e-7}
+    whole = simulate(model, 0.1, x0=start, samples=11)
+    monkeypatch.setattr(module, "MOST_BYTES", 2000)
+    bounded = simulate(model, 0.1, x0=start, samples=11)
+    assert bounded["v"].tobytes() == whole["v"].tobytes()
+    assert bounded.statistics.steps == whole.statistics.steps
+
+
+@each_engine
+def test_a_callback_may_run_another_simulation(backend: str) -> None:
+    """Buffers belong to one run at a time."""
+    model = rabinowicz(LuGre())
+
+    def positions(x: float, progress: Callable[[float], None] | None = None) -> Array:
+        return simulate(
+            model, 20.0, x0={"x": x}, samples=21, backend=backend, progress=progress
+        )["x"]  # fmt: skip
+
+    inner, alone = list[Array](), [positions(x) for x in (0.0, 0.3)]
+    outer = positions(0.0, lambda _: inner.append(positions(0.3)))
+    assert outer.tobytes() == alone[0].tobytes()
+    assert all(found.tobytes() == alone[1].tobytes() for found in inner)
+    assert inner
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(positions, [0.0, 0.3] * 6))
+    assert [a.tobytes() for a in found] == [a.tobytes() for a in alone] * 6
