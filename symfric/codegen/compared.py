@@ -79,13 +79,12 @@ class Run:
         of = np.flatnonzero(modes(self.c.block))
         rows = np.flatnonzero((self.rows != self.expected)[:, of].any(axis=1))
         if 0 < rows.size <= RARE * len(self.rows):
-            places, made = np.ix_(rows, of), self._rounded(rows)
-            if made is not None:
-                as_c = (made[:, :, of] == self.rows[places]).any(axis=0)
-                found[places] = as_c & (self.rows != self.expected)[places]
+            places = np.ix_(rows, of)
+            as_c = (self._rounded(rows)[:, :, of] == self.rows[places]).any(axis=0)
+            found[places] = as_c & (self.rows != self.expected)[places]
         return found
 
-    def _rounded(self, rows: NDArray[np.int64]) -> Array | None:
+    def _rounded(self, rows: NDArray[np.int64]) -> Array:
         """Return results of CasADi's operations in float for some of the steps, see `rounded`."""
         states, parameters, inputs = self._arguments
         own = np.broadcast_to(parameters, (len(inputs), parameters.shape[-1]))
@@ -115,11 +114,11 @@ class Run:
     def rounding(self) -> float | None:
         """Largest change of the worst signal by rounding to float in the worst step, see `rounded`.
 
-        None if it is not known.
+        None if it is the status.
         """
         row, column = self._place
         made = self._rounded(np.array([row]))
-        if made is None or column == made.shape[-1]:  # the status
+        if column == made.shape[-1]:
             return None
         finite = made[:, 0, column][np.isfinite(made[:, 0, column])]
         moved = np.abs(finite - self.expected[row, column]).max(initial=0.0)
@@ -135,13 +134,13 @@ class Run:
     def _arguments(self) -> tuple[Array, Array, Array]:
         """States before every step, parameters and inputs, as arguments of the step."""
         count, model = len(self.c.block.states), GuardModel(self.c)
-        inputs, parameters = self.c.real.rounded(self.inputs), model.default
+        inputs, parameters = self.c.real.rounded(self.inputs), self.c.default
         if self.parameters is not None:
             parameters = self.c.real.rounded(self.parameters)
-        states = np.vstack([model.start, self.rows[:-1, :count]])
+        states = np.vstack([self.c.start, self.rows[:-1, :count]])
         if self.c.guards:
             inputs, _ = model.inputs(inputs)
-            states = np.where([[model.lost(x)] for x in states], model.start, states)
+            states = np.where([[model.lost(x)] for x in states], self.c.start, states)
         return states, parameters, inputs
 
     @cached_property
@@ -258,11 +257,6 @@ DECISIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP
 PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
 
 
-def functions(block: Block) -> list[ca.Function]:
-    """Return the Functions of the columns of a row: the step and the further initialisations."""
-    return [block.step, *(block.reset(name) for name in block.resets)]
-
-
 def modes(block: Block) -> NDArray[np.bool_]:
     """Return a mask of the columns that hold a mode, shape (columns,): a number from decisions
     only.
@@ -270,7 +264,7 @@ def modes(block: Block) -> NDArray[np.bool_]:
     It is the result of a comparison, or one of some constants and modes selected by comparisons. A
     state is a mode if its next value is one, in the step and in every initialisation.
     """
-    sources, count = [graph(function) for function in functions(block)], len(block.states)
+    sources, count = [graph(function) for function in block.functions], len(block.states)
     states = np.ones(count, bool)
     while True:
         found = [_discrete(source, states) for source in sources]
@@ -294,25 +288,23 @@ def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDAr
     return np.array([found[i] for row in source.results for i in row], bool)
 
 
-def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array | None:
+def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array:
     """Return results of CasADi's operations in float, shape (REPETITIONS, steps, columns).
 
     Args:
         states, parameters, inputs: before and in every step, shape (steps, ...).
 
     Returns:
-        The same at each call; None if NumPy lacks an operation of the block.
+        The same at each call.
     """
     random, parts = np.random.default_rng(0), list[Array]()
     size = max(1, AT_ONCE // REPETITIONS)
     for first in range(0, len(inputs), size):
         given = [a[first : first + size].astype("f4") for a in (states, parameters, inputs)]
         many = [np.tile(a, (REPETITIONS - 1, 1)) for a in given]
-        columns: list[Array] = []
-        for function in functions(block):
-            nearest, others = in_type(function, given, "f4"), in_type(function, many, "f4", random)
-            if nearest is None or others is None:
-                return None
-            columns.append(np.vstack([nearest, others]))
+        columns = [
+            np.vstack([in_type(function, given, "f4"), in_type(function, many, "f4", random)])
+            for function in block.functions
+        ]
         parts.append(np.hstack(columns).reshape(REPETITIONS, len(given[0]), -1))
     return np.concatenate(parts, axis=1)

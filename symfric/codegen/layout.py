@@ -8,11 +8,15 @@ defaults, so one block serves any number of joints.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
 from textwrap import wrap
 from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import GROUPS, Block
 from symfric.emitter.c99 import Real
@@ -35,6 +39,16 @@ class CBlock:
     def name(self) -> str:
         """Prefix of all names, and of the files."""
         return f"{self.block.name}_{self.real.suffix}"
+
+    @cached_property
+    def start(self) -> NDArray[np.float64]:
+        """Start values of the states, in the type."""
+        return self.real.rounded([float(v.start) for v in self.block.states])
+
+    @cached_property
+    def default(self) -> NDArray[np.float64]:
+        """Default parameters, in the type."""
+        return self.real.rounded([float(v.start) for v in self.block.parameters])
 
     def call(
         self, pointers: Mapping[str, str], inputs: Sequence[str], status: str = "&status"

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from math import isfinite, nan, remainder
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, final
@@ -23,7 +24,7 @@ from symfric.emitter.c99 import FUNCTIONS
 from symfric.foundation.files import write_text
 from symfric.foundation.graph import SELECT, graph
 from symfric.foundation.instructions import CODES
-from symfric.foundation.numeric import bound
+from symfric.foundation.numeric import bound, erf
 from symfric.foundation.programs import PATIENCE, CompileError, Compiler, ProgramError, finished
 
 WARNINGS = tuple(
@@ -42,15 +43,6 @@ def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
         CompileError: the compiler rejects it.
     """
     return compiler.warnings(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
-
-
-def link_program(compiler: Compiler, parts: Sequence[Path], include: Path, target: Path) -> None:
-    """Compile and link C and object files.
-
-    Raises:
-        CompileError: the compiler rejects them.
-    """
-    compiler.run(*FLAGS, f"-I{include}", *map(str, parts), "-o", str(target), "-lm")
 
 
 def needed_symbols(target: Path) -> frozenset[str] | None:
@@ -148,8 +140,10 @@ def compiled(c: CBlock, parts: Sequence[Path], include: Path, compiler: Compiler
     """
     main = parts[0].parent / f"{c.name}_main.c"
     write_text(main, program(c))
-    link_program(compiler, [main, *parts], include, main.with_suffix(""))
-    return main.with_suffix("")
+    target = main.with_suffix("")
+    files = [str(part) for part in (main, *parts)]
+    compiler.run(*FLAGS, f"-I{include}", *files, "-o", str(target), "-lm")
+    return target
 
 
 def run_c(c: CBlock, executable: Path, inputs: Array, parameters: Array | None = None) -> Array:
@@ -191,13 +185,11 @@ def run_vm(
     inputs, said = c.real.rounded(inputs), np.zeros(len(inputs), np.int64)
     if c.guards:
         inputs, said = model.inputs(inputs)
-    p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
+    p, x, u = c.default.copy(), c.start.copy(), np.zeros(len(block.inputs))
     following, y = np.zeros_like(x), np.zeros(len(block.outputs))
     others = [np.zeros_like(x) for _ in block.resets]
-    calls = [bound(block.step, (x, p, u), (following, y))] + [
-        bound(block.reset(reset), (x, p, u), (other,))
-        for reset, other in zip(block.resets, others, strict=True)
-    ]
+    results = [(following, y), *((other,) for other in others)]
+    calls = [bound(f, (x, p, u), of) for f, of in zip(block.functions, results, strict=True)]
     rows = np.zeros((len(inputs), len(c.signals)))
     for k, (row, now) in enumerate(zip(rows, inputs, strict=True)):
         u[:] = now
@@ -209,12 +201,12 @@ def run_vm(
                 p[:], bits = model.parameters(p)
                 said[k] |= bits
         if c.guards and model.lost(x):
-            x[:] = model.start
+            x[:] = c.start
             said[k] |= Status.STATE
         for call in calls:
             call()
         if c.guards and not np.isfinite(y).all():
-            following[:], y[:] = model.start, 0.0
+            following[:], y[:] = c.start, 0.0
             said[k] |= Status.OUTPUT
         row[:] = np.concatenate([following, y, *others, said[k : k + 1] if c.guards else ()])
         x[:] = following
@@ -227,16 +219,6 @@ class GuardModel:
     """Guards of a block in NumPy, on rows of numbers of one type."""
 
     c: CBlock
-
-    @cached_property
-    def start(self) -> Array:
-        """Start values of the states."""
-        return self.c.real.rounded([v.start for v in self.c.block.states])
-
-    @cached_property
-    def default(self) -> Array:
-        """Default parameters, in the type."""
-        return self.c.real.rounded([v.start for v in self.c.block.parameters])
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
         """Return inputs (steps, inputs) after the guards, and the status of every step."""
@@ -259,10 +241,10 @@ class GuardModel:
         unfit = ~((values >= low) & (values <= high))
         found = values.copy()
         if unfit[~is_size].any():
-            found[~is_size] = self.default[~is_size]
+            found[~is_size] = self.c.default[~is_size]
         for i in np.flatnonzero(unfit & is_size):
             clipped = np.clip(values[i], low[i], high[i])
-            found[i] = clipped if np.isfinite(values[i]) else self.default[i]
+            found[i] = clipped if np.isfinite(values[i]) else self.c.default[i]
         return found, int(Status.PARAMETER) if unfit.any() else 0
 
     @cached_property
@@ -282,6 +264,10 @@ class GuardModel:
         return low, high, np.array([v.name == STEP_SIZE for v in self.c.block.parameters], bool)
 
 
+def _remainder(x: float, y: float) -> float:
+    return remainder(x, y) if y and isfinite(x) else nan
+
+
 NUMPY = {"pow": "power"} | {
     f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")
 }
@@ -299,9 +285,12 @@ OPERATIONS: dict[int, Callable[..., Any]] = {
 } | {
     op: getattr(np, NUMPY.get(name, name))
     for op, name in FUNCTIONS.items()
-    if name not in ("erf", "remainder")
-} | {ca.OP_TWICE: partial(np.multiply, 2)}  # fmt: skip
-"""Functions of NumPy by CasADi's numbers; erf is not there, and remainder is another function."""
+    if name not in ("erf", "remainder")  # absent, and another function
+} | {
+    ca.OP_TWICE: partial(np.multiply, 2), CODES["erf"]: erf,
+    CODES["remainder"]: np.vectorize(_remainder, otypes=[float]),
+}  # fmt: skip
+"""Functions of arrays by CasADi's numbers of operations."""
 
 
 def in_type(
@@ -309,7 +298,7 @@ def in_type(
     arguments: Sequence[Array],
     kind: str,
     random: np.random.Generator | None = None,
-) -> Array | None:
+) -> Array:
     """Return the results of a function, below each other, with every operation rounded to a type.
 
     Args:
@@ -321,7 +310,7 @@ def in_type(
             Source: Vignes, Mathematics and Computers in Simulation 35 (1993), CESTAC.
 
     Returns:
-        Shape (rows, results), in double; None if NumPy lacks an operation (erf, remainder).
+        Shape (rows, results), in double.
     """
     source, found = graph(function), list[Array]()
     with np.errstate(all="ignore"):
@@ -333,8 +322,6 @@ def in_type(
                 value = np.full(len(arguments[0]), node.value)
             elif node.op in (SELECT, ca.OP_IF_ELSE_ZERO):
                 value = np.where(given[0] != 0, given[1], given[2] if len(given) > 2 else 0.0)
-            elif node.op not in OPERATIONS:
-                return None
             elif random is None:
                 value = OPERATIONS[node.op](*given)
             else:

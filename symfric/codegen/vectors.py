@@ -106,7 +106,7 @@ def vectors(c: CBlock) -> Vectors:
 def made(c: CBlock, steps: Steps) -> Array:
     """Return the rows of steps by CasADi, see `run_vm`, which makes one step before them."""
     inputs = np.vstack([np.zeros((1, len(c.block.inputs))), steps.inputs])
-    parameters = np.vstack([_defaults(c), _parameters(c, steps)])
+    parameters = np.vstack([c.default, _parameters(c, steps)])
     return run_vm(c, inputs, steps.states, parameters)[1:]
 
 
@@ -144,20 +144,15 @@ def _run(c: CBlock) -> Steps:
     """Return the steps of a run, as far as it is finite."""
     inputs, count = c.real.rounded(excitation(c.block)), len(c.block.states)
     after = run_vm(c, inputs)
-    start = np.array([[float(v.start) for v in c.block.states]])
-    states = c.real.rounded(np.vstack([start, after[:-1, :count]]))
+    states = c.real.rounded(np.vstack([c.start, after[:-1, :count]]))
     broken = ~(np.isfinite(after).all(axis=1) & np.isfinite(states).all(axis=1))
     end = int(np.argmax(broken)) if broken.any() else len(inputs)
     return Steps(states[:end], inputs[:end], np.full(end, -1, np.int64), np.zeros(end))
 
 
-def _defaults(c: CBlock) -> Array:
-    return c.real.rounded([float(v.start) for v in c.block.parameters])
-
-
 def _parameters(c: CBlock, steps: Steps) -> Array:
     """Return the parameters of every step, shape (rows, parameters)."""
-    found = np.tile(_defaults(c), (len(steps.changed), 1))
+    found = np.tile(c.default, (len(steps.changed), 1))
     rows = np.flatnonzero(steps.changed >= 0)
     found[rows, steps.changed[rows]] = steps.values[rows]
     return found
@@ -178,17 +173,14 @@ def _spread(c: CBlock, steps: Steps, results: Array) -> Array:
         return x * (1.0 + unit * random.choice([-1.0, 1.0], x.shape))
 
     for _ in range(3):
-        parameters = near(np.vstack([_defaults(c), given]))
+        parameters = near(np.vstack([c.default, given]))
         inputs = np.vstack([first, near(steps.inputs)])
         other = run_vm(c, inputs, near(steps.states), parameters)[1:]
         found = np.maximum(found, np.abs(other - results))
     if c.real.size == 4:
         arguments = [steps.states, given, steps.inputs]
-        functions = (c.block.step, *map(c.block.reset, c.block.resets))
-        parts = [in_type(function, arguments, "f4") for function in functions]
-        known = [rows for rows in parts if rows is not None]
-        if len(known) == len(parts):
-            found = np.fmax(found, np.abs(np.hstack(known) - results))
+        rounded = np.hstack([in_type(function, arguments, "f4") for function in c.block.functions])
+        found = np.fmax(found, np.abs(rounded - results))
     return found
 
 
@@ -222,7 +214,7 @@ def _outcomes(c: CBlock, steps: Steps) -> Array:
     arguments = [ca.SX.sym("x", *step.size_in(i)) for i in range(3)]
     columns = rebuild(Graph(source.nodes, wanted), arguments, {})
     function = ca.Function("outcomes", arguments, columns).map(count)
-    p = np.tile(_defaults(c)[:, None], (1, count))
+    p = np.tile(c.default[:, None], (1, count))
     found = function(steps.states.T, p, steps.inputs.T)
     held, first, second = (column.full().T for column in found)
     return np.hstack([held != 0, first < np.where(alone, 0.0, second)])

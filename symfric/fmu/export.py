@@ -229,7 +229,7 @@ class Running:
     """Instance for co-simulation, initialised; made by `running`.
 
     Attributes:
-        said: messages of the unit.
+        said: messages of the unit, in their order.
         t: communication point [s].
     """
 
@@ -237,7 +237,7 @@ class Running:
         self.said: list[str] = []
         self.t = 0.0
         self._library, self._references = library, references
-        self._log = LOG(self._hear)
+        self._log = LOG(self._keep)
         library.fmi3InstantiateCoSimulation.restype = c.c_void_p
         none = c.c_size_t(0)
         handle = library.fmi3InstantiateCoSimulation(
@@ -249,7 +249,7 @@ class Running:
         self._reached = c.c_double()
         self._out = [*map(c.byref, self._flags), c.byref(self._reached)]
 
-    def _hear(self, _environment: Any, _status: int, _category: bytes, text: bytes) -> None:
+    def _keep(self, _environment: Any, _status: int, _category: bytes, text: bytes) -> None:
         self.said.append(text.decode())
 
     def initialise(self, start: Mapping[str, float]) -> None:

@@ -272,6 +272,11 @@ class Block:
         """
         return self._function(name, {"state_next": self.resets[name][0]})
 
+    @property
+    def functions(self) -> list[ca.Function]:
+        """Step and further initialisations, whose results are the columns of a run."""
+        return [self.step, *map(self.reset, self.resets)]
+
     def _function(self, name: str, results: Mapping[str, ca.SX]) -> ca.Function:
         columns = [symbols_of(group) for group in self.groups.values()]
         dense = [ca.densify(ca.SX(result)) for result in results.values()]

@@ -14,7 +14,6 @@ from symfric.codegen.runner import (
     GuardModel,
     compile_object,
     compiled,
-    link_program,
     needed_symbols,
     run_c,
     run_vm,
@@ -132,7 +131,7 @@ def test_the_model_of_the_guards_keeps_the_bristle_and_replaces_parameters() -> 
     assert inputs.tolist() == [[0.0, N], [2e-3, N]]  # a lost sample of v is rest
     assert said.tolist() == [Status.NOT_FINITE, 0]
     names = [v.name for v in model.c.block.parameters]
-    values = model.default.copy()
+    values = model.c.default.copy()
     assert model.parameters(values)[1] == 0
     values[names.index("mu_s")], values[names.index("h")] = np.nan, 1e4
     found, said = model.parameters(values)
@@ -211,7 +210,7 @@ def test_programs_that_do_not_run_stop_early_or_hang_are_errors(compiler, tmp_pa
     with pytest.raises(CompileError, match="ended too early"):
         run_c(of_mass, executable, np.zeros((1, 1)))
     (tmp_path / "main.c").write_text("int main(void) { for (;;) { } }\n")
-    link_program(compiler, [tmp_path / "main.c"], tmp_path, tmp_path / "main")
+    compiler.run(str(tmp_path / "main.c"), "-o", str(tmp_path / "main"))
     monkeypatch.setattr(runner, "PATIENCE", 0.3)
     with pytest.raises(CompileError, match="did not end"):
         run_c(of_mass, tmp_path / "main", np.ones((2, 2)))

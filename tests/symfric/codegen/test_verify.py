@@ -1,6 +1,7 @@
 """Verification and random tests find errors of C; rounding and ties are no errors."""
 
 import json
+from math import erf, remainder
 
 import casadi as ca
 import numpy as np
@@ -224,6 +225,15 @@ def test_chance_takes_the_floats_on_both_sides_and_leaves_what_is_exact():
     spread = np.ptp(rounded(LUGRE, np.zeros((3, 1)), p, rest), axis=0).max(axis=1)
     assert spread[0] == 0.0  # nothing is rounded
     assert 0.0 < spread[1] < 1e-6
+
+
+def test_functions_that_numpy_lacks_are_rounded_too():
+    x = ca.SX.sym("x", 2)
+    both = ca.Function("f", [x], [ca.vertcat(ca.erf(x[0]), ca.remainder(x[0], x[1]))])
+    rows = np.array([[0.7, 0.5], [1.3, 0.5], [1.0, 0.0], [np.inf, 1.0]], "f4")
+    wanted = [[np.float32(erf(float(a))), remainder(a, b) if b and a < 9 else np.nan]
+              for a, b in rows.tolist()]  # fmt: skip
+    np.testing.assert_array_equal(in_type(both, [rows], "f4"), wanted)
 
 
 def copies() -> Block:
