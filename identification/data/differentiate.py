@@ -155,11 +155,9 @@ def differentiate(
     cut = (y[inside] for y in (record.time, *motion, record[force]))
     signals = MotionSignals(record.name, *cut, filter=chosen, slow=slow[inside])
     if signals.decimation.rows == 0 or signals.kept.size < 10:
-        limit = "by the data" if chosen.v_min is None else f"{chosen.v_min:g} m/s"
         raise ValueError(
-            f"data '{record.name}': expected enough samples for the filter ({chosen.cutoff:g} Hz, "
-            f"decimation {chosen.decimation}, v_min {limit}), got {record.size}; "
-            "raise the cut-off, lower the decimation or v_min"
+            f"data '{record.name}': expected enough samples for the filter ({chosen}), got "
+            f"{record.size}; raise the cut-off, lower the decimation or v_min"
         )
     return signals
 

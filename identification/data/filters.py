@@ -57,6 +57,10 @@ class Filter:
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
+    def __str__(self) -> str:
+        limit = "by the data" if self.v_min is None else f"{self.v_min:g} m/s"
+        return f"{self.cutoff:g} Hz, decimation {self.decimation}, v_min {limit}"
+
     def inside(self, size: int, step: float) -> slice:
         """Return the samples away from both ends, where reflection affects the result."""
         cut = ceil(5.0 / (self.cutoff * step) - 1e-9)

@@ -85,12 +85,8 @@ def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
         return tuple(Coordinate(x[i], x[n + i], model.holonomic.a[i]) for i in range(n))
     own = {v.name for c in model.contacts for v in c.states}
     motion = [k for k, v in enumerate(model.x) if v.name not in own]
-    rate = {
-        i: j
-        for i in motion
-        for j in motion
-        if i != j and ca.is_equal(model.ode[i], model.x[j].symbol)
-    }
+    pairs = [(i, j) for i in motion for j in motion if i != j]
+    rate = {i: j for i, j in pairs if ca.is_equal(model.ode[i], model.x[j].symbol)}
     position = {j: model.x[i] for i, j in rate.items()}
     return tuple(
         Coordinate(position.get(k), model.x[k], model.xdot[k])

@@ -65,8 +65,7 @@ class Controller:
         object.__setattr__(self, "reference", tuple(names))
         object.__setattr__(self, "gain", checks.number(f"{where}: gain", self.gain))
         sizes = [step.numel_in(i) for i in range(step.n_in())]
-        out = [step.numel_out(i) for i in range(step.n_out())]
-        n = sizes[0] if sizes else 0
+        out, n = [step.numel_out(i) for i in range(step.n_out())], sizes[0] if sizes else 0
         if len(sizes) != 3 or sizes[1] not in (1, 2) or sizes[2] != len(names) or out != [n, 1]:
             raise ValueError(
                 f"{where}: step: expected (state, measured of 1 or 2, reference of {len(names)}) "
@@ -80,10 +79,10 @@ class Controller:
                     f"got one of {into} returning {out}"
                 )
         elif self.start is not None:
-            start = checks.array(f"{where}: start", self.start)
-            if start.size != n:
-                raise ValueError(f"{where}: start: expected {n} numbers, got {start.size}")
-            object.__setattr__(self, "start", tuple(start.tolist()))
+            start = tuple(checks.array(f"{where}: start", self.start).tolist())
+            if len(start) != n:
+                raise ValueError(f"{where}: start: expected {n} numbers, got {len(start)}")
+            object.__setattr__(self, "start", start)
 
     @property
     def memory(self) -> int:
@@ -210,10 +209,8 @@ class ClosedLoop:
             units = {name: record.unit(name) for name in self.signals}
             regressors = _regressors(record, given, self.signals)
             for name, y in run.measured.items():
-                rows = slice(first, first := first + y.size)
-                channels.append(
-                    Channel(number, name, units[name], rows, record.time, y, regressors)
-                )
+                rows, unit = slice(first, first := first + y.size), units[name]
+                channels.append(Channel(number, name, unit, rows, record.time, y, regressors))
             unit = units.get("x", "m")
             for name, value, of in zip("xv", run.first.tolist(), (unit, f"{unit}/s"), strict=True):
                 scale, start_value = max(abs(value), 1e-3), f"x0.{name}[{number}]"
@@ -225,18 +222,14 @@ class ClosedLoop:
         """Return a record with its drive and controller, and references and disturbance."""
         loop, where = record.loop if self.loop is None else self.loop, f"data '{record.name}'"
         if loop is None:
-            raise ValueError(
-                f"{WHERE}: {where}: expected a known controller, got none; give "
-                "ClosedLoop(loop=...) or fit Shooting()"
-            )
+            hint = "give ClosedLoop(loop=...) or fit Shooting()"
+            raise ValueError(f"{WHERE}: {where}: expected a known controller, got none; {hint}")
         record = record.uniform()
         if isinstance(loop, PositionLoop):
             controller = position_controller(loop, record.step)
-            if loop.reference.size != record.size:
-                raise ValueError(
-                    f"{WHERE}: {where}: expected a reference of {record.size} samples, got "
-                    f"{loop.reference.size}"
-                )
+            if (size := loop.reference.size) != record.size:
+                such = f"a reference of {record.size} samples"
+                raise ValueError(f"{WHERE}: {where}: expected {such}, got {size}")
             given = np.column_stack([loop.reference, loop.disturbance])
         else:
             controller, given = loop, loop.rows(record)

@@ -46,14 +46,12 @@ def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[sli
         near = [np.searchsorted(t, [end - reach, end + reach]) for end in ends]
         cuts = [int(a + np.argmax(np.abs(speed[a : max(b, a + 1)]))) for a, b in near]
     edges = [0, *cuts, n]
-    pieces = tuple(slice(a, b) for a, b in pairwise(edges))
-    shortest = min(piece.stop - piece.start for piece in pieces)
+    shortest = min(np.diff(edges))
     if shortest < FEWEST:
-        raise ValueError(
-            f"Shooting: windows: expected windows of at least {FEWEST} samples, got one of "
-            f"{shortest} with windows={length:g} s"
-        )
-    return pieces
+        such = f"windows of at least {FEWEST} samples"
+        got = f"one of {shortest} with windows={length:g} s"
+        raise ValueError(f"Shooting: windows: expected {such}, got {got}")
+    return tuple(slice(a, b) for a, b in pairwise(edges))
 
 
 def turnaround(t: Array, y: Array) -> float:
@@ -186,16 +184,16 @@ class Sensed(NamedTuple):
     def at(self, k: int) -> dict[str, Begin]:
         """Return the start values at sample k; for bristles if they are unknown or unstrained."""
         found = dict[str, Begin]()
-        values, errors, scales = list[float](), list[float](), list[float]()
+        rows = list[tuple[float, float, float]]()
         for name, (source, is_rate) in self.observed_from.items():
             y = self.measured[source]
             one = local(self.t, y, k, self.noise[source])
-            values.append(one.rate if is_rate else one.value)
-            errors.append(one.rate_error if is_rate else one.value_error)
-            scales.append(self._pace(y) if is_rate else float(np.std(y)))
-            found[name] = Begin(values[-1], scales[-1])
+            both = (one.rate, one.rate_error) if is_rate else (one.value, one.value_error)
+            rows.append((*both, self._pace(y) if is_rate else float(np.std(y))))
+            found[name] = Begin(rows[-1][0], rows[-1][2])
+        values, errors, scales = np.array(rows).reshape(-1, 3).T
         for slip, names in self.slips.values():
-            value, slope = (np.ravel(np.array(a)) for a in slip(np.array(values)))
+            value, slope = (np.ravel(np.array(a)) for a in slip(values))
             usual = float(np.linalg.norm(slope * scales))
             error = float(np.linalg.norm(slope * errors))
             sticks = abs(value[0]) <= max(REST * usual, MISFIT * error)

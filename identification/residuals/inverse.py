@@ -181,10 +181,8 @@ def measure(
     for c in found:
         names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
         x, v = (record[n] if n is not None and n in record else None for n in names)
-        needed = c.rate if c.position is None else c.position
-        if (v if c.position is None else x) is None and (
-            v is None or ca.depends_on(known, needed.symbol)
-        ):
+        needed, given = (c.rate, v) if c.position is None else (c.position, x)
+        if given is None and (v is None or ca.depends_on(known, needed.symbol)):
             missing.append(called.get(needed.name, needed.name))
         raw.append((x, v))
     inputs = [called.get(u.name, u.name) for u in model.u]
@@ -255,14 +253,11 @@ def _piece(made: Balance, motion: Motion, model: Model, p: Array, adapts: bool) 
     left = left if found.decimation.rows else {"all signals": 0}
     for signal, count in left.items():
         if count < FEWEST:
-            f = found.motion.filter
-            limit = "by the data" if f.v_min is None else f"{f.v_min:g} m/s"
             raise ValueError(
                 f"data '{motion.name}': expected at least {FEWEST} equations of {signal} after the "
-                f"filter ({f.cutoff:g} Hz, decimation {f.decimation}, v_min {limit}), got {count}; "
-                "raise the cut-off, lower the decimation or v_min in "
-                "InverseDynamics(filter=Filter(...)), or leave out a part with few equations by "
-                "data.between(begin, end)"
+                f"filter ({found.motion.filter}), got {count}; raise the cut-off, lower the "
+                "decimation or v_min in InverseDynamics(filter=Filter(...)), or leave out a part "
+                "with few equations by data.between(begin, end)"
             )
     return found
 
@@ -272,9 +267,8 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
     decimation = Decimation(n, motion.filter.decimation)
     kept: list[NDArray[np.int64]] = []
     for row in rows:
-        unsure = np.zeros(n, bool)
-        for k in row.slips:
-            unsure |= slow[k][motion.inside]
+        masks = [slow[k][motion.inside] for k in row.slips]
+        unsure = np.any([np.zeros(n, bool), *masks], axis=0)
         touched = decimation.touched(unsure) if decimation.rows else np.ones(0, bool)
         kept.append(np.flatnonzero(~touched))
     return Piece(motion, decimation, tuple(kept))

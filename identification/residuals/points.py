@@ -115,11 +115,8 @@ class Points:
         number = load if channel is None or isinstance(channel, str) else float(channel)
         N = record[channel] if isinstance(channel, str) else np.full(record.size, number)
         if (N < 0).any():
-            k = int(np.argmax(N < 0))
-            raise ValueError(
-                f"data '{record.name}': normal force: expected >= 0 N, got {N[k]:g} at "
-                f"{record.place(k)}"
-            )
+            k, where = int(np.argmax(N < 0)), f"data '{record.name}': normal force"
+            raise ValueError(f"{where}: expected >= 0 N, got {N[k]:g} at {record.place(k)}")
         weights = np.ones(v.size)
         if self.weight is not None:
             weights = record[self.weight]
@@ -156,10 +153,8 @@ class PointRows(Blocks):
             F, J = np.zeros(table.F.size), np.ones((table.F.size, p.size + own.size))
             h = np.diff(table.t) if table.t is not None and self.imposed else 1.0
             sides = np.vstack([table.w, np.sign(table.F)])
-            for rows, w, what in (
-                (~table.rest, table.w, self.slides),
-                (table.rest, sides, self.breaks),
-            ):
+            both = (~table.rest, table.w, self.slides), (table.rest, sides, self.breaks)
+            for rows, w, what in both:
                 if what is None or not rows.any():
                     continue
                 begin = w[:, rows][:, 0].copy()
@@ -205,8 +200,6 @@ def _middle(tables: tuple[Table, ...]) -> float:
     """Return the force half-way between both directions [N]."""
     v, F = (np.concatenate(part) for part in zip(*((t.w[0], t.F) for t in tables), strict=True))
     if not v.min() < 0 < v.max():
-        raise ValueError(
-            "Points: offset: expected motion in both directions, got one: an offset cannot be "
-            "separated from friction"
-        )
+        got = "got one: an offset cannot be separated from friction"
+        raise ValueError(f"Points: offset: expected motion in both directions, {got}")
     return float(np.median(F[v > 0]) + np.median(F[v < 0])) / 2

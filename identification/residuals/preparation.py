@@ -17,7 +17,6 @@ from identification.residuals.stepper import why_not_sampled
 from identification.unknowns.spec import Unknown
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
-from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import find_compiler
 from symfric.integrator import Hold, Linear
 from symfric.model import Model
@@ -72,12 +71,11 @@ class Preparation:
         parameters = tuple(v.name for v in model.p)
         if isinstance(tau, tuple):
             if not self.channels:
-                raise ValueError(
-                    "Shooting: dead_time: expected an input that is a channel, got none"
-                )
+                such = "an input that is a channel"
+                raise ValueError(f"Shooting: dead_time: expected {such}, got none")
             low, high = tau
-            middle = (low + high) / 2
-            self.own.append(Unknown(DEAD_TIME, "s", middle, low, high, high - low, nuisance=True))
+            tau = Unknown(DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True)
+            self.own.append(tau)
             tau, model = None, delayed(model, [*self.channels])
         pieces, channels, rows = list[Shot](), list[Channel](), 0
         for number, record in enumerate(self.records):
@@ -143,10 +141,8 @@ class Preparation:
         for record in self.records:
             there = record.unit(channel) if channel in record else ""
             if unit and there and unit != there:
-                raise ValueError(
-                    f"{where}: expected {name} in {unit}, got {channel} of '{record.name}' in "
-                    f"{there}; pass units= when reading the data"
-                )
+                got = f"{channel} of '{record.name}' in {there}; pass units= when reading the data"
+                raise ValueError(f"{where}: expected {name} in {unit}, got {got}")
 
     def _inputs(self) -> dict[str, Any]:
         """Return input of the model -> channel, or an input for `simulate`."""
@@ -159,12 +155,13 @@ class Preparation:
                 self._check_span(f"{where}: {name}", source)
             if not isinstance(source, str):
                 continue
-            lacking = [record.name for record in self.records if source not in record]
-            if lacking:
-                raise ValueError(
-                    f"{where}: expected a channel '{source}' for the input {name}, got none in "
-                    f"'{lacking[0]}'; name it as inputs={{'{name}': 'channel'}}, or give a number"
-                )
+            for record in self.records:
+                if source not in record:
+                    raise ValueError(
+                        f"{where}: expected a channel '{source}' for the input {name}, got none in "
+                        f"'{record.name}'; name it as inputs={{'{name}': 'channel'}}, or give a "
+                        "number"
+                    )
             self._same_unit(where, name, units[name], source)
         return found
 
@@ -196,11 +193,9 @@ class Preparation:
                 checks.choice(where, value, ("estimate",))
             elif not np.ndim(value):
                 checks.number(where, value)
-            elif (size := checks.array(where, value).size) != len(self.records):
-                raise ValueError(
-                    f"{where}: expected a number for each of the {len(self.records)} records, got "
-                    f"{size}"
-                )
+            elif (size := checks.array(where, value).size) != (n := len(self.records)):
+                such = f"a number for each of the {n} records"
+                raise ValueError(f"{where}: expected {such}, got {size}")
 
     # ---- windows of records
 
@@ -249,23 +244,20 @@ class Preparation:
             elif here is None:
                 continue
             elif (
-                here.value is not None and wish is None and (not here.estimated or given == "data")
+                (value := here.value) is not None
+                and wish is None
+                and (not here.estimated or given == "data")
             ):
-                held[v.name] = here.value
+                held[v.name] = value
             else:
+                if value is None:  # without data it starts as in the model
+                    known = {n: b.value for n, b in begin.items() if b.value is not None}
+                    starts = self.model.initial_state(known, self.values)
+                    value = float(starts[self.states.index(v.name)])
+                name, scale = f"x0.{v.name}{label}", here.scale if here.scale > 0 else v.nominal
                 free[v.name] = len(self.model.p) + len(self.own)
-                self.own.append(self._unknown(v, here, label, begin))
+                self.own.append(Unknown(name, v.unit, value, scale=scale, nuisance=True))
         return held, free
-
-    def _unknown(self, v: Variable, here: Begin, label: str, begin: Mapping[str, Begin]) -> Unknown:
-        """Return the unknown start value of a state; without data it starts as in the model."""
-        value = here.value
-        if value is None:
-            known = {n: b.value for n, b in begin.items() if b.value is not None}
-            starts = self.model.initial_state(known, self.values)
-            value = float(starts[self.states.index(v.name)])
-        scale = here.scale if here.scale > 0 else v.nominal
-        return Unknown(f"x0.{v.name}{label}", v.unit, value, scale=scale, nuisance=True)
 
     def _channels(
         self, number: int, record: Record, pieces: Sequence[Shot], row: int
@@ -310,16 +302,12 @@ class Preparation:
 
     def _why_not_sampled(self) -> str:
         """Return the reason why the sampled engine does not suit the windows; "" if it does."""
-        others = [name for name in self.signals if name not in self.states]
-        odd = [n for n, given in self.others.items() if not is_number(given)]
-        states = ", ".join(self.states)
-        why = why_not_sampled(self.model)
-        if not why and others:
-            why = f"expected signals among the states {states}, got {', '.join(others)}"
-        if not why and odd:
-            got = ", ".join(odd)
-            why = f"expected inputs that are channels or numbers, got another type for {got}"
-        return why
+        if why := why_not_sampled(self.model):
+            return why
+        if others := ", ".join(name for name in self.signals if name not in self.states):
+            return f"expected signals among the states {', '.join(self.states)}, got {others}"
+        odd = ", ".join(n for n, given in self.others.items() if not is_number(given))
+        return odd and f"expected inputs that are channels or numbers, got another type for {odd}"
 
 
 def _rtol(shots: Shots, values: NDArray[np.float64]) -> float:

@@ -74,23 +74,18 @@ def _left_out(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -
     """Return the mean square error of predicted quarters over the variance of each signal."""
     found = list[float]()
     for block in range(BLOCKS):
-        rest, other = _divided(data, block)
+        rest, other = list[Record](), list[Record]()
+        for record in data:
+            a, b = (record.size * k // BLOCKS for k in (block, block + 1))
+            other.append(record.at(slice(a, b)))
+            rest += [record.at(s) for s in (slice(0, a), slice(b, record.size)) if s.stop > s.start]
         try:
-            values = solve(kind, rest)
-            found.append(np.inf if values is None else _free_run(kind, subject, other, values))
+            values = solve(kind, Dataset(tuple(rest), data.name))
+            quarters = Dataset(tuple(other), data.name)
+            found.append(np.inf if values is None else _free_run(kind, subject, quarters, values))
         except ValueError:  # a remainder with short windows or without motion
             found.append(np.inf)
     return float(np.mean(found))
-
-
-def _divided(data: Dataset, block: int) -> tuple[Dataset, Dataset]:
-    """Return all but a quarter of each record, and these quarters."""
-    rest, other = list[Record](), list[Record]()
-    for record in data:
-        a, b = (record.size * k // BLOCKS for k in (block, block + 1))
-        other.append(record.at(slice(a, b)))
-        rest += [record.at(s) for s in (slice(0, a), slice(b, record.size)) if s.stop > s.start]
-    return replace(data, records=tuple(rest)), replace(data, records=tuple(other))
 
 
 def _free_run(

@@ -108,13 +108,12 @@ def sampled_motion(
         ValueError: an unsuitable model, or arrays of the wrong size.
     """
     checks.choice("sampled_motion: hold", hold, HOLDS)
-    count = _chain(model).inputs
     u = np.asarray(inputs, dtype=float).reshape(t.size, -1)
-    if u.shape[1] != count or np.size(p) != len(model.p) or np.size(start) != 2:
-        raise ValueError(
-            f"sampled_motion of '{model.name}': expected {count} inputs, {len(model.p)} "
-            f"parameters and a start of 2, got {u.shape[1]}, {np.size(p)} and {np.size(start)}"
-        )
+    sizes = u.shape[1], np.size(p), np.size(start)
+    if sizes != (_chain(model).inputs, len(model.p), 2):
+        such = f"{_chain(model).inputs} inputs, {len(model.p)} parameters and a start of 2"
+        got = "{}, {} and {}".format(*sizes)
+        raise ValueError(f"sampled_motion of '{model.name}': expected {such}, got {got}")
     instants = refined(t, substeps)
     between = [means(t, column, instants, hold == "held") for column in u.T]
     motion = stepped(model, instants, between, np.asarray(p, float), np.asarray(start, float))

@@ -79,11 +79,10 @@ def why_not_sampled(model: Model) -> str:
     """Return the reason why a model cannot be stepped as one mass; "" if it can."""
     states, algebraic = ([v.name for v in group] for group in (model.x, model.z))
     if len(states) != 2 or model.z or model.ode is None:
+        more = f" and algebraic {', '.join(algebraic)}" if algebraic else ""
         return (
             "expected two states, a position and its velocity, and a friction law without states, "
-            f"got states {', '.join(states) or 'none'}"
-            f"{' and algebraic ' + ', '.join(algebraic) if algebraic else ''}; "
-            "use engine='simulate'"
+            f"got states {', '.join(states) or 'none'}{more}; use engine='simulate'"
         )
     rate = model.ode[0]
     if model.events or not ca.is_equal(ca.simplify(rate), model.x[1].symbol, 2):

@@ -215,10 +215,17 @@ def _head(fit: Outcome) -> Iterator[str]:
         yield from wrap(f"noise   {', '.join(noise)}", WIDTH, subsequent_indent=" " * 8)
 
 
+def parted(fit: Outcome) -> tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]:
+    """Return requested and held parameters, and start values and dead times of records."""
+    every = fit.parameters.items()
+    fitted = {n: e for n, e in every if not e.fixed}
+    requested = {n: e for n, e in fitted.items() if not e.nuisance}
+    nuisance = {n: e for n, e in fitted.items() if e.nuisance}
+    return requested, {n: e for n, e in every if e.fixed}, nuisance
+
+
 def _parameters(fit: Outcome) -> Iterator[str]:
-    requested = {n: e for n, e in fit.parameters.items() if not e.nuisance and not e.fixed}
-    held = {n: e for n, e in fit.parameters.items() if e.fixed}
-    nuisance = {n: e for n, e in fit.parameters.items() if e.nuisance and not e.fixed}
+    requested, held, nuisance = parted(fit)
     if requested:
         yield from _table("parameter", requested)
     if held:

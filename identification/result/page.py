@@ -15,6 +15,7 @@ from identification.result.outcome import (
     count_of,
     interval,
     number,
+    parted,
     percent,
     remark,
     rounded,
@@ -184,17 +185,11 @@ def kind_of(fit: Outcome) -> str:
 
 
 def _parameters(fit: Outcome) -> Iterator[str]:
-    fitted = {n: e for n, e in fit.parameters.items() if not e.fixed}
-    yield _estimates(
-        "Fitted, with 95 % intervals", {n: e for n, e in fitted.items() if not e.nuisance}
-    )
-    held = [
-        (n, number(e.value), _unit(e.unit), e.note) for n, e in fit.parameters.items() if e.fixed
-    ]
-    yield html.table(
-        "Held", ("parameter", "value", "unit", "why"), held, (1,), ["note"] * len(held)
-    )
-    nuisance = {n: e for n, e in fitted.items() if e.nuisance}
+    requested, held, nuisance = parted(fit)
+    yield _estimates("Fitted, with 95 % intervals", requested)
+    rows = [(n, number(e.value), _unit(e.unit), e.note) for n, e in held.items()]
+    header = ("parameter", "value", "unit", "why")
+    yield html.table("Held", header, rows, (1,), ["note"] * len(held))
     some = dict(list(nuisance.items())[:MANY])
     more = f", the first {MANY} of {len(nuisance)}" if len(nuisance) > MANY else ""
     yield _estimates(f"Of single records: start values, dead times{more}", some)

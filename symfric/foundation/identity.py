@@ -60,7 +60,8 @@ def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
     """Return the atoms in some expressions, which keep their names from now on."""
     atoms = list[Atom]()
     with _lock:
-        for symbol in _symbols(expressions):
+        flat: list[Any] = [ca.vec(e) for e in expressions if not e.is_constant()]
+        for symbol in ca.symvar(ca.vertcat(*flat)) if flat else ():
             found = _by_node.get(_node(symbol))
             atoms.append(found or _known(symbol, uuid4().hex))
     keep(expressions, atoms)
@@ -74,34 +75,20 @@ def atoms_of(labels: Sequence[str], names: Sequence[str]) -> list[Atom]:
 
 
 def again(
-    expressions: Sequence[Expression], symbols: Sequence[Expression], names: Sequence[str]
-) -> list[Expression]:
-    """Return expressions that were read, in the symbols of this process with these names.
-
-    Args:
-        expressions: in the `symbols` that were read with them.
-        symbols: of the file or pickle.
-        names: of the symbols.
+    expression: Expression, symbols: Sequence[Expression], names: Sequence[str]
+) -> Expression:
+    """Return an expression that was read with its `symbols`, in those of this process with these
+    names.
     """
-    if not expressions:
-        return []
     with _lock:
         atoms = [_known(symbol, name) for symbol, name in zip(symbols, names, strict=True)]
-    pairs = [
-        (s, a.symbol) for s, a in zip(symbols, atoms, strict=True) if _node(s) != _node(a.symbol)
-    ]
-    found = list(expressions)
-    if pairs:
-        old, new = map(list, zip(*pairs, strict=True))
-        found = list(ca.substitute(found, old, new))  # pyright: ignore
-    keep(found, atoms)
-    return found
-
-
-def _symbols(expressions: Sequence[Any]) -> Iterable[Any]:
-    """Return all symbols, each once, in a fixed order."""
-    flat = [ca.vec(e) for e in expressions if not e.is_constant()]
-    return ca.symvar(ca.vertcat(*flat)) if flat else ()
+    pairs = zip(symbols, (atom.symbol for atom in atoms), strict=True)
+    moved = [(old, new) for old, new in pairs if _node(old) != _node(new)]
+    if moved:
+        old, new = map(list, zip(*moved, strict=True))
+        (expression,) = ca.substitute([expression], old, new)  # pyright: ignore
+    keep([expression], atoms)
+    return expression
 
 
 def keep(expressions: Iterable[Any], atoms: Sequence[Atom]) -> None:
@@ -117,7 +104,7 @@ def deserialized(text: str, names: Sequence[str] | None) -> Any:
         return ca.Function.deserialize(text)
     reader: Any = ca.StringDeserializer(text)
     symbols = reader.unpack()
-    return again([reader.unpack()], symbols, names)[0]
+    return again(reader.unpack(), symbols, names)
 
 
 def serialized(value: Any) -> tuple[str, tuple[str, ...] | None]:

@@ -360,18 +360,9 @@ def cost(law: AnyLaw) -> Cost:
     if isinstance(law, Population):
         r, dt = ca.SX.sym("r"), ca.SX.sym("dt")
         arguments, results = ca.vertcat(v, N, z, r, dt), law.contact(z, r, v * dt, dt, N)
-        return _cost(arguments, results)
-    given = {i.name: ca.SX.sym(i.name) for i in law.inputs}
-    arguments = ca.vertcat(v, N, z, *given.values())
-    results = ca.vertcat(law.force(v, N, z, **given), law.rate(v, N, z, **given))
-    return _cost(arguments, results)
-
-
-def _cost(arguments: ca.SX, results: ca.SX) -> Cost:
-    return Cost(
-        _instructions(arguments, results), _instructions(arguments, ca.jacobian(results, arguments))
-    )
-
-
-def _instructions(arguments: ca.SX, results: ca.SX) -> int:
-    return ca.Function("law", [arguments], [ca.cse(results)]).n_instructions()
+    else:
+        given = {i.name: ca.SX.sym(i.name) for i in law.inputs}
+        arguments = ca.vertcat(v, N, z, *given.values())
+        results = ca.vertcat(law.force(v, N, z, **given), law.rate(v, N, z, **given))
+    both = results, ca.jacobian(results, arguments)
+    return Cost(*(ca.Function("law", [arguments], [ca.cse(y)]).n_instructions() for y in both))

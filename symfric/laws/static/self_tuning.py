@@ -1,7 +1,7 @@
 """The magic formula as friction: a sine of an arctangent, and laws that tune its factors."""
 
 import math
-from math import inf, pi
+from math import pi
 
 from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
 from symfric.foundation.parameters import parametric
@@ -169,48 +169,6 @@ def _inverse_phi(target: Scalar, E: float) -> float:
         y = (low + high) / 2
         low, high = (y, high) if (1 - E) * y + E * math.atan(y) < target else (low, y)
     return high
-
-
-def corrected_shape_factor(
-    ratio: float, theta: float = pi / 2, tolerance: float = 1e-12, max_iterations: int = 200
-) -> tuple[float, int]:
-    """Return the same C by an iterative correction as in the paper, here Newton's method.
-
-    Solves sin(C theta) = mu_d / mu_s from the right end C = pi/theta, from where convergence is
-    monotone. `theta` = atan(phi(B v_d)) refers the dynamic level to a finite velocity v_d.
-
-    Returns:
-        C and the number of iterations used. As the ratio tends to 1 the root becomes double and
-        convergence linear; the closed form has no such limit.
-
-    Raises:
-        ValueError: ratio outside 0 ... 1; theta outside 0 ... pi/2, or so small that C would be
-            beyond 2, where friction reverses in fast sliding; no convergence within
-            `max_iterations`.
-    """
-    if not 0.0 <= ratio <= 1.0:
-        raise ValueError(
-            f"corrected_shape_factor: expected 0 <= mu_d/mu_s <= 1, got {ratio:g}; "
-            "the dynamic level cannot exceed the static one"
-        )
-    least = (pi - math.asin(ratio)) / 2
-    if not least * (1 - 1e-15) <= theta <= pi / 2:
-        raise ValueError(
-            f"corrected_shape_factor: expected {least:.6g} <= theta <= pi/2 for mu_d/mu_s = "
-            f"{ratio:g}, got {theta:g}; below, C is beyond 2 and friction reverses in fast "
-            "sliding; a larger v_d or B widens theta"
-        )
-    shape, error = pi / theta, inf
-    for iteration in range(max_iterations):
-        error = math.sin(shape * theta) - ratio
-        if abs(error) < tolerance:
-            return shape, iteration
-        shape -= error / (theta * math.cos(shape * theta))
-    raise ValueError(
-        f"corrected_shape_factor: expected convergence within {max_iterations} iterations, "
-        f"got residual {error:.1e} at ratio {ratio:g}; use the closed form "
-        f"C = {(pi - math.asin(ratio)) / theta:.6g}"
-    )
 
 
 def brittleness(

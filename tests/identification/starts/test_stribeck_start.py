@@ -146,7 +146,8 @@ def free_of(law: Law) -> list[str]:
 def test_start_of_any_law_can_be_constructed(name: str) -> None:
     law = ALL_LAWS[name]()
     free = free_of(law)
-    found = start_values(law, record(), free=free)
+    few = record().at([np.arange(0, T.size, 4)])
+    found = start_values(law, few, free=free)
     assert set(found) == set(free)
     with_values(law, found)
 

@@ -290,7 +290,7 @@ def test_bad_input_is_refused_in_a_sentence() -> None:
             select(**arguments)
 
 
-@pytest.mark.parametrize(("shortest", "longest"), [(1.5, 3.0), (2.0, 40.0), (1.0, 2000.0)])
+@pytest.mark.parametrize(("shortest", "longest"), [(1.5, 3.0), (1.0, 2000.0)])
 def test_the_picture_has_round_numbers_and_names_the_exact_law(
     choice: Choice, shortest: float, longest: float
 ) -> None:
@@ -308,10 +308,9 @@ def test_the_picture_has_round_numbers_and_names_the_exact_law(
     assert "exact_coulomb" in [text.get_text() for text in left.texts]
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_names_in_the_picture_stand_inside_and_apart(choice: Choice, wide: bool) -> None:
+def test_names_in_the_picture_stand_inside_and_apart(choice: Choice) -> None:
     """Where they stand in the end: titles and legends move panels."""
-    figure = choice.plot(wide=wide)
+    figure = choice.plot(wide=True)
     figure.draw_without_rendering()
     plane = figure.axes[0]
     boxes = [text.get_window_extent() for text in plane.texts]

@@ -66,7 +66,7 @@ def test_names_end_with_what_travelled() -> None:
 def test_a_name_that_another_symbol_has_does_not_make_them_one() -> None:
     """As a file may say that was put together by hand."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    kept = [identity.again([one], [one], ["of both"])[0] for one in (x, y)]
+    kept = [identity.again(one, [one], ["of both"]) for one in (x, y)]
     assert same(kept[0], x) and same(kept[1], y)
 
 

@@ -1,23 +1,28 @@
 """Figures for a printed page: width, text, legends, fonts."""
 
+from functools import cache
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from symfric import BrownMcPhee, LuGre, for_print, rabinowicz, simulate
+from symfric import BrownMcPhee, LuGre, Trajectory, for_print, rabinowicz, simulate
 from symfric.results.pictures import plot_trajectories
 
 PLAIN = 10.0
 """Ordinary text of Matplotlib [pt]."""
 
 
+@cache
+def runs() -> dict[str, Trajectory]:
+    laws = {"Brown-McPhee": BrownMcPhee(), "LuGre": LuGre(), "another name, rather long": LuGre()}
+    return {name: simulate(rabinowicz(law), 1.0) for name, law in laws.items()}
+
+
 @pytest.fixture(name="figure")
 def _figure() -> Figure:
-    laws = {"Brown-McPhee": BrownMcPhee(), "LuGre": LuGre(), "another name, rather long": LuGre()}
-    runs = {name: simulate(rabinowicz(law), 1.0) for name, law in laws.items()}
-    return plot_trajectories(runs, ["x", "friction"])
+    return plot_trajectories(runs(), ["x", "friction"])
 
 
 def sizes(figure: Figure) -> set[float]:
@@ -47,19 +52,14 @@ def test_text_in_pdf_is_truetype(figure: Figure, tmp_path: Path) -> None:
     assert b"/Type3" not in content
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
+def test_bad_sizes_and_endings_are_refused(figure: Figure) -> None:
+    for arguments, message in (
         ({"width": 0.0}, "for_print: width: expected .*> 0"),
         ({"text": -8.0}, "for_print: text"),
         ({"height": "x"}, "for_print: height"),
         ({"path": "figure.docx"}, "ending: expected one of"),
-    ],
-)
-def test_bad_sizes_and_endings_are_refused(
-    figure: Figure, arguments: dict[str, object], message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        for_print(figure, **arguments)  # type: ignore[arg-type]
+    ):
+        with pytest.raises(ValueError, match=message):
+            for_print(figure, **arguments)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="a figure, such as run"):
         for_print(None)  # type: ignore[arg-type]

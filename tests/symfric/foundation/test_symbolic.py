@@ -1,6 +1,5 @@
 """Variables in equations: as their symbols, but found in tuples and keys of mappings."""
 
-import copy
 import operator
 from dataclasses import dataclass
 from typing import Any
@@ -104,11 +103,6 @@ def test_a_condition_on_a_symbol_is_no_truth_value():
             decide()
     chosen = ca.Function("f", [A.symbol], [ca.if_else(A > 0, 1, 2), (A <= 1) * A])
     assert [float(x) for x in chosen(0.5)] == [1.0, 0.5]
-
-
-def test_a_copy_is_another_variable_of_the_same_symbol():
-    assert copy.copy(A) != A
-    assert same(copy.copy(A) - 1, A.symbol - 1)
 
 
 def test_plain_goes_into_lists_tuples_and_mappings():

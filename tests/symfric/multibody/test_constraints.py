@@ -60,30 +60,6 @@ def test_driven_slider_crank_goes_through_full_turns_as_its_closed_relation(
     assert run["constraint_acceleration"].max() < 1e-11
 
 
-def test_pivot_that_is_shaken_drives_the_pendulum() -> None:
-    """L theta'' = -g sin(theta) - x'' cos(theta) for x = A sin(w t)."""
-    A, w, L = 0.1, 7.0, 0.4
-    m = Mechanism("shaken")
-    m.body("cart", 1.0, (0.1, 0.1, 0.1))
-    m.body("bob", 2.0, (1e-9, 1e-9, 1e-9))
-    m.frame("ground.rail", z=X)
-    m.frame("cart.rail", z=X)
-    m.frame("cart.pivot", z=Y)
-    m.frame("bob.pivot", at=(0.0, 0.0, L), z=Y)
-    m.joint(Prismatic("x", "ground.rail", "cart.rail", rate=A * w))
-    m.joint(Revolute("theta", "cart.pivot", "bob.pivot", start=0.5))
-    m.constraint(PrescribedMotion("shaker", "x", lambda t: A * ca.sin(w * t)))
-    run = simulate(m.build(), 3.0, rtol=1e-9, samples=301)
-
-    def rate(t: float, y: np.ndarray) -> list[float]:
-        # about y a positive angle swings the hanging bob towards -x
-        return [y[1], (-9.81 * np.sin(y[0]) - A * w**2 * np.sin(w * t) * np.cos(y[0])) / L]
-
-    expected = solve_ivp(rate, (0, 3), [0.5, 0.0], "DOP853", run.t, rtol=1e-11, atol=1e-12)
-    assert run["theta"] == pytest.approx(expected.y[0], abs=1e-6)
-    assert run["x"] == pytest.approx(A * np.sin(w * run.t), abs=1e-14)
-
-
 def test_accelerated_arm_needs_inertia_times_acceleration_and_weight() -> None:
     m = Mechanism("arm")
     m.body("rod", 2.0, (0.1, 0.1, 0.1))
@@ -124,27 +100,6 @@ def test_every_direction_is_driven_alike_in_both_formulations(name: str, reverse
         assert motion == pytest.approx(whole.bodies[body], rel=1e-10, abs=1e-10), body
     for joint, wrench in tree.reactions.items():
         assert wrench == pytest.approx(whole.reactions[joint], rel=1e-9, abs=1e-8), joint
-
-
-@in_both
-def test_energy_changes_by_the_power_of_the_drive(formulation: str) -> None:
-    m = chain()
-    q, qd = (values[0] for values in begin(Revolute, 0))
-    m.constraint(PrescribedMotion("d", "j0", lambda t: q + qd * t + t * t))
-    made = m.prepare(formulation=formulation)
-    eq = made.eq
-    T_dot = ca.jtimes(eq.kinetic, eq.q, eq.qd) + ca.jtimes(eq.kinetic, eq.qd, eq.a)
-    arguments = [eq.q, eq.qd, eq.a, eq.lam, eq.kin.t]
-    values = ca.Function("power", arguments, [T_dot, eq.power])
-    found = solve(eq, made.q0, made.qd0)
-    rate, power = (float(x) for x in values.call([made.q0, made.qd0, found.a, found.lam, 0.0]))
-    weights = m.prepare().eq
-    without = ca.Function("p", [weights.q, weights.qd], [ca.jtimes(weights.potential, weights.q,
-                          weights.qd)])  # fmt: skip
-    tree = m.prepare()
-    drive = found.lam[made.labels.index("d_moment")] * qd
-    assert rate == pytest.approx(power, rel=1e-9)
-    assert power == pytest.approx(drive - float(without(tree.q0, tree.qd0)), rel=1e-9)
 
 
 def winch(kind: str = "user", rate: float = -0.3) -> Mechanism:

@@ -4,7 +4,7 @@ from math import pi, sin
 
 import numpy as np
 import pytest
-from chains import X, Y, Z, solve
+from chains import Y, solve
 
 from symfric import simulate
 from symfric.foundation.numeric import Scalar
@@ -16,7 +16,6 @@ from symfric.multibody import (
     Mechanism,
     Planar,
     PrescribedMotion,
-    Prismatic,
     Revolute,
     Rolling,
     Screw,
@@ -130,27 +129,6 @@ def test_a_disc_rolls_down_an_incline(formulation: str) -> None:
     assert np.abs(run["track_force"]) == pytest.approx(mass * 9.81 * np.cos(beta), rel=1e-9)
     assert np.ptp(run["energy"]) < 1e-7
     assert run["constraint_position"].max() < 1e-12
-
-
-@in_both
-def test_a_pinion_and_its_rack_feel_each_others_inertia(formulation: str) -> None:
-    """Force 5 N on the rack: a = 5 / (m + J / r^2)."""
-    m = Mechanism("rack")
-    m.body("rack", 2.0, (0.1, 0.1, 0.1))
-    m.body("pinion", 1.0, (0.1, 0.1, 0.06))
-    m.frame("ground.rail", z=X, x=Z)
-    m.frame("rack.rail", z=X, x=Z)
-    m.frame("ground.pivot", at=(0.0, 0.1, 0.0))
-    m.joint(Prismatic("x", "ground.rail", "rack.rail"))
-    m.joint(Revolute("angle", "ground.pivot", "pinion"))
-    m.constraint(Rolling("mesh", "angle", "x", radius=-0.1))
-    m.force(JointSpringDamper("push", "x", "slide", actuator=5.0))
-    made = m.prepare(formulation=formulation)
-    found = solve(made.eq, made.q0, made.qd0)
-    a = 5.0 / (2.0 + 0.06 / 0.01)
-    assert found.bodies["rack"][3] == pytest.approx(a, rel=1e-13)
-    assert found.bodies["pinion"][2] == pytest.approx(-a / 0.1, rel=1e-13)
-    assert found.lam[made.labels.index("mesh_force")] == pytest.approx(2.0 * a - 5.0, rel=1e-12)
 
 
 @in_both

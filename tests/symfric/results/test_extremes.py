@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from symfric import (
     BrownMcPhee,
     Model,
-    RateAndState,
     SolveError,
     Trajectory,
     Variable,
@@ -36,26 +35,6 @@ def test_a_pulse_between_the_samples_is_the_greatest_value() -> None:
     run = hit()
     assert run["force"].max() < 1e-3
     assert run.extremes["force"] == pytest.approx((0.0, 1 / (WIDTH * sqrt(pi))), rel=1e-4)
-
-
-def test_an_earthquake_within_years_of_rest_is_seen() -> None:
-    """A spring slider under a plate of 1e-9 m/s: 0.356 m/s was told as 5.9e-8 m/s."""
-    load, a, b, length, slow = 50e6, 0.010, 0.015, 1e-4, 1e-9
-    law = RateAndState(mu_0=0.6, a=a, b=b, v_0=1e-6, D_c=length, v_eps=1e-15)
-    stiffness = 0.8 * load * (b - a) / length
-    level = load * (0.6 + (a - b) * np.log(slow / 1e-6))
-    tau = Variable("tau", "Pa", nominal=1e7, start=level * 1.001)
-    psi = Variable("psi", "1", start=float(np.log(1e-6 / slow)))
-    logarithm = Variable("log_v", "1", start=float(np.log(slow)))
-    v = ca.exp(logarithm.symbol)
-    model = Model(
-        "fault", x=(tau, psi), z=(logarithm,),
-        ode=ca.vertcat(stiffness * (slow - v), law.rate(v, load, psi.symbol)),
-        alg=(law.force(v, load, psi.symbol) + 5e6 * v - tau.symbol) / load,
-    )  # fmt: skip
-    run = simulate(model, 20 * 3.156e7, backend="vm")
-    assert np.exp(run["log_v"].max()) < 1e-6
-    assert np.exp(run.extremes["log_v"][1]) == pytest.approx(0.356, rel=0.01)
 
 
 def test_extremes_between_steps_are_refined() -> None:

@@ -55,12 +55,6 @@ def test_the_work_of_friction_is_its_power_integrated() -> None:
     assert run.work("friction", "v_rel", (1.0, 1.0)) == 0.0
 
 
-def test_the_work_sees_the_jumps_of_an_input() -> None:
-    u = {"v": Hold([0.0, 0.7, 1.1], [0.5, -2.0, 1.0])}
-    run = simulate(Prescribed(Viscous(sigma_2=3.0)).model(), 2.0, u=u, t_eval=[2.0])
-    assert run.work("friction", "v") == pytest.approx(3 * (0.25 * 0.7 + 4 * 0.4 + 0.9), rel=1e-9)
-
-
 def test_what_has_no_area_and_times_that_are_none_are_refused() -> None:
     run = simulate(Prescribed(Viscous()).model(), 1.0, u={"v": Hold([0.0], [0.5])}, t_eval=[1.0])
     with pytest.raises(ValueError, match="area: expected an x of the states and time"):

@@ -42,7 +42,7 @@ def test_what_was_varied_is_kept_with_its_unit() -> None:
     assert simulate_many(model, 1.0, u={"force": pushes}, backend="vm").varied == {}
 
 
-@pytest.mark.parametrize("backend", ["vm", "compiled"])
+@pytest.mark.parametrize("backend", [pytest.param("vm", marks=pytest.mark.slow), "compiled"])
 def test_extremes_of_states_are_those_of_all_steps(backend: str) -> None:
     """Samples three seconds apart miss each slip back, which lasts a fifth of one."""
     made, model = study(backend=backend), rabinowicz(LuGre(), free=["mu_s"])
