@@ -50,26 +50,27 @@ def compensator(
     The law makes the step of `law_block`. Scales act on forces, never on its states, so that they
     can be turned while the machine moves.
 
-    Limits: it adds what the law says. More than the friction that is there (a scale above 1, or a
-    law that is too high) is negative damping: with `error_gain` the axis then hunts where it should
-    rest. Moved by the measured velocity alone a law finds the way out of rest too late, and makes
-    hunting worse. Where the reference jumps, bristle damping makes a peak; set a `limit`.
+    Limits: a force above the actual friction (a scale above 1, or too high a law) is negative
+    damping: with `error_gain` the axis then hunts at rest. A law of the measured velocity alone
+    reacts too late at break-away and increases hunting. Bristle damping has a peak where the
+    reference jumps; set a `limit`.
 
     Measured (`symfric bench codegen`: 1 kg, 1 kHz, counts of 1 um, one sample late; LuGre with half
     the stiffness against four other plants): with `error_gain` and without the term "stribeck" the
-    RMS error of a sine is 10 to 15 times smaller, and hunting of 1100 counts after a step is gone.
-    That term makes axes jump that break away at once: on exact Coulomb friction 350 counts stay
-    with it. Levels of 80 % make the error 5 times smaller, of 50 % twice; 120 % hunt 1000 counts
-    there. A law without states and a `build_up` of 0.1 mm does as well as bristles.
+    RMS error of a sine is 10 to 15 times smaller, and hunting of 1100 counts after a step vanishes.
+    With that term, axes that break away at once jump: 350 counts remain on exact Coulomb friction.
+    Levels of 80 % divide the error by 5, levels of 50 % by 2; levels of 120 % cause hunting of 1000
+    counts on exact Coulomb friction. A law without states and a `build_up` of 0.1 mm are as
+    accurate as bristles.
 
     Args:
-        law: with numbers, with states or without, a function of v and N; or a drive, which brings
-            its law, its load, its offset, and whether it turns.
+        law: a law of v and N with numbers as parameters; or a drive, which defines law, load,
+            offset and units.
         name: C identifier; default "friction_compensator".
         h: sample time [s] as a constant; without it a parameter, by default 1 ms.
         turning: units rad/s and N m.
         fold: all parameters but h become constants.
-        settings: what it does, or the fields of `Compensation` by name.
+        settings: features, or the fields of `Compensation` by name.
 
     Raises:
         ValueError: bad input; a law with inputs besides v and N, or without a block; build-up of a

@@ -219,7 +219,7 @@ def close_loop(
     velocity: str = "v",
     load: float = 1.0,
 ) -> Comparison:
-    """Let a plant follow a reference, without compensation and with it in all `cases`.
+    """Simulate a plant in a position loop, without compensation and with it in all `cases`.
 
     At each sample the encoder counts the position, and the controller and the blocks are called;
     the sum of their forces, held within the limit of the controller, acts on the plant `delay`

@@ -39,12 +39,12 @@ class Compensation:
             values by name. By default all terms of the law except "bristle", with start value 1.
         without: omitted terms.
         error_gain: [1/s]; the desired velocity is v_ref + error_gain e, e the position error
-            (reference less measured), as the set velocity of a cascade. Without it nothing breaks
-            a standing error away at rest. Use the position gain.
+            (reference less measured), as the set velocity of a cascade. Without it a constant
+            error at rest remains. Use the position gain.
         hold: (error [m], velocity [m/s]): an output `hold` that is 1 if reference and axis are
-            slower than the velocity and the error is smaller, else 0. Stop the integrator of the
-            controller on it: an axis jumps when it breaks away, and if the jump is longer than a
-            count it hunts for ever unless the integrator rests.
+            slower than the velocity and the error is smaller, else 0. It must stop the integrator
+            of the controller: if the axis jumps by more than a count at break-away, it otherwise
+            hunts permanently.
         dead_zone: velocities up to this [m/s] count as rest.
         build_up: travel [m] over which friction builds up after a reversal, of a law without
             states.

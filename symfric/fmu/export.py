@@ -53,9 +53,9 @@ class Exported:
         identifier: name of its binary.
         variables: all variables.
         binary: name of the binary in the archive; empty without a compiler.
-        missing: why there is no binary.
+        missing: reason of a missing binary.
         method: formula of the steps.
-        times: seconds it took to write and to compile the C.
+        times: time [s] to write the C, and to compile it.
     """
 
     path: Path
@@ -98,31 +98,29 @@ def export_fmu(
 ) -> Exported:
     """Write `model` as a Functional Mock-up Unit: sources and the binary of this platform.
 
-    The unit has the adaptive step of `simulate` inside, the same bits, in C of its own. Inputs are
-    held over a communication step, which may be as long or short as the importer likes: steps go
-    beyond a communication point and are not cut there, as long as no input jumps; values in between
-    are those of the step's polynomial. Where inputs or tunable parameters jump, the last step is
-    made again up to there, and the algebraic variables follow at once. Events of the model are
-    located and carried out inside.
+    The unit contains the adaptive step of `simulate` as C, with the same bits. Inputs are held over
+    a communication step, which may have any length: while no input jumps, steps pass communication
+    points, whose values are those of the polynomial of the step. After a jump of an input or of a
+    tunable parameter the unit repeats the last step up to that point and solves the algebraic
+    equations again. It locates events of the model and applies their resets.
 
-    All unknowns may be set before the initialisation ends; those that were not set follow, as in
-    `simulate(x0=...)`: bristles start in steady sliding, algebraic variables where their equations
-    hold.
+    All unknowns may be set before the end of the initialisation. The others follow from them as in
+    `simulate(x0=...)`: bristles start in steady sliding, algebraic variables solve their equations.
 
     Directional derivatives are exact; units of mechanisms with loops have none.
 
-    Limits: absolute tolerances stay 0.1 rtol times nominal, also for motions that are tiny against
-    their nominal values (`simulate` runs these again); pivots are those that are sound at the
-    start; events in time alone set the longest step by the default experiment.
+    Limits: absolute tolerances are 0.1 rtol times the nominal values, also for much smaller motions
+    (`simulate` repeats these); pivots are chosen at the start values; for events that depend on
+    time only, the default experiment determines the longest step.
 
     Args:
         model: a model, or a scene, whose parameters become tunable.
         path: the archive, such as "drive.fmu".
         fmi: 2 or 3.
-        kind: "co-simulation", with an integrator inside, or "model-exchange", for that of the
-            importer: rates of the states, with algebraic variables solved for inside, and event
-            indicators. Of a mechanism with loops the rates are those at the nearest state that
-            closes them, and pull there within 20 ms; its coordinates stay states.
+        kind: "co-simulation", with its own integrator, or "model-exchange", for the integrator of
+            the importer: rates of the states and event indicators; the unit solves the algebraic
+            equations. Rates of a mechanism with loops are those at the nearest closed state, and
+            lead there within 20 ms; its coordinates stay states.
         rtol: relative tolerance; the importer may change it, by the parameter `rtol` or the
             tolerance of the experiment.
         step: length [s] of fixed steps instead, without error control, as of `plant_block`. A
@@ -134,11 +132,11 @@ def export_fmu(
         name: model identifier; default the name of the model.
 
     Returns:
-        What was written; it prints itself.
+        Description of the unit; `print` shows a summary.
 
     Raises:
         ValueError: bad input, or start values without consistent algebraic variables.
-        CompileError: the compiler refuses the C.
+        CompileError: the compiler rejects the C.
     """
     where = "export_fmu"
     made, span = _model(where, model, free, t_end)
@@ -256,7 +254,7 @@ class Running:
         """Set start values, inputs and parameters by name, and initialise at t = 0.
 
         Raises:
-            RuntimeError: the unit refuses; with what it says.
+            RuntimeError: the unit refuses a value; the text has its message.
         """
         self.set(start)
         zero = c.c_double(0.0)
@@ -291,7 +289,7 @@ class Running:
         self.t = self._reached.value
 
     def free(self) -> None:
-        """Give its memory back."""
+        """Free its memory."""
         self._library.fmi3FreeInstance(self._self)
         self._self = c.c_void_p(None)
 

@@ -188,6 +188,8 @@ def test_friction_builds_up_over_a_way_and_remembers_short_reversals() -> None:
     again = [machine(v_ref=1e-3) for _ in range(20)]
     assert again[-1] == pytest.approx(4.0 - 0.5 * 8.0 / 100)
     assert machine() == pytest.approx(4.0)  # held at rest
+    viscous = Stribeck(mu_s=4.0, mu_d=4.0, sigma_2=20.0, v_eps=1e-9)
+    assert force(viscous, {"v_ref": 0.01}, 200, build_up=1e-4) == pytest.approx(4.2)
 
 
 def test_the_shape_of_the_build_up_is_a_table() -> None:
