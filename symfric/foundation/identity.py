@@ -60,7 +60,8 @@ def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
     """Return the atoms in some expressions, which keep their names from now on."""
     atoms = list[Atom]()
     with _lock:
-        for symbol in _symbols(expressions):
+        flat: list[Any] = [ca.vec(e) for e in expressions if not e.is_constant()]
+        for symbol in ca.symvar(ca.vertcat(*flat)) if flat else ():
             found = _by_node.get(_node(symbol))
             atoms.append(found or _known(symbol, uuid4().hex))
     keep(expressions, atoms)
@@ -88,12 +89,6 @@ def again(
         (expression,) = ca.substitute([expression], old, new)  # pyright: ignore
     keep([expression], atoms)
     return expression
-
-
-def _symbols(expressions: Sequence[Any]) -> Iterable[Any]:
-    """Return all symbols, each once, in a fixed order."""
-    flat = [ca.vec(e) for e in expressions if not e.is_constant()]
-    return ca.symvar(ca.vertcat(*flat)) if flat else ()
 
 
 def keep(expressions: Iterable[Any], atoms: Sequence[Atom]) -> None:

@@ -96,7 +96,11 @@ class Instructions:
             operands[operands >= len(atoms)] += len(constants)
             operands[operands < 0] = len(atoms) - 1 - operands[operands < 0]
         rows[:, 0] = np.searchsorted(used, rows[:, 0])
-        places = [(k, *place) for k, e in enumerate(expressions) for place in _places(e)]
+        places = [
+            (k, *place)
+            for k, e in enumerate(expressions)
+            for place in zip(*e.sparsity().get_triplet(), strict=True)
+        ]
         return cls(
             tuple(atom.symbol.name() for atom in atoms),
             tuple(atom.name for atom in atoms),
@@ -167,11 +171,6 @@ class Instructions:
 def _within(numbers: NDArray[np.int64], end: NDArray[np.int64] | int) -> bool:
     """Return True if all numbers lie in [0, end)."""
     return bool(((numbers >= 0) & (numbers < end)).all())
-
-
-def _places(expression: ca.SX) -> list[tuple[int, int]]:
-    """Return row and column of each structural nonzero, column by column."""
-    return list(zip(*expression.sparsity().get_triplet(), strict=True))
 
 
 def _matrix(rows: int, columns: int, entries: NDArray[np.int64], nodes: Sequence[ca.SX]) -> ca.SX:

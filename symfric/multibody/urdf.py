@@ -83,16 +83,16 @@ def read_urdf(
     """
     if law is not None:
         check_law("urdf: law", law)
-    for name, own in checks.named("urdf: laws", laws).items():
+    laws, bearings = checks.named("urdf: laws", laws), checks.named("urdf: bearings", bearings)
+    for name, own in laws.items():
         check_law(f"urdf: law of '{name}'", own)
     if not is_symbolic(level):
         checks.number("urdf: level", level, lower=0.0)
-    checks.named("urdf: bearings", bearings)
-    for name, bearing in (bearings or {}).items():
+    for name, bearing in bearings.items():
         what = "JointFriction(law, radius=...)"
         checks.kind(f"urdf: bearing '{name}'", bearing, JointFriction, what)
-    for name, value in (("floating", floating), ("strict", strict)):
-        checks.flag(f"urdf: {name}", value)
+    checks.flag("urdf: floating", floating)
+    checks.flag("urdf: strict", strict)
     urdf, held = holding(parse(source, strict))
     places = carried(urdf)
     weights = {link: merged(urdf, places, link) for link in urdf.links if link == places[link].body}
@@ -103,27 +103,26 @@ def read_urdf(
     if problems:
         raise ValueError("\n".join(f"urdf '{urdf.name}' > {text}" for text in problems))
     for what, given in (("bearings", bearings), ("laws", laws)):
-        check_names(f"urdf '{urdf.name}' {what}", given or {}, [j.name for j in moved])
+        check_names(f"urdf '{urdf.name}' {what}", given, [j.name for j in moved])
     m = Mechanism(_identifier(urdf.name), gravity)
     _add_bodies(m, places, weights, names)
     if not grounded:
         m.joint(Floating(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
     for joint in moved:
-        own = (laws or {}).get(joint.name, law)
-        friction = (bearings or {}).get(joint.name) or tag_friction(joint, own, level)
+        own = laws.get(joint.name, law)
+        friction = bearings.get(joint.name) or tag_friction(joint, own, level)
         left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
         left.append(f"{type(law).__name__}, because no joint has <dynamics friction>")
-    changes = [f"{old} to {new}" for old, new in names.changed.items()]
     still = grounded and not moved and weights[urdf.root].mass > 0
     texts = [
         ("nothing moves", [f"floating=True frees the root '{urdf.root}'"] if still else []),
         ("accepted unchanged", urdf.doubts),
         ("fixed at zero, because they move no mass", [f"joint '{name}'" for name in held]),
         ("left out", left),
-        ("names changed", changes),
+        ("names changed", [f"{old} to {new}" for old, new in names.changed.items()]),
     ]
     message = "; ".join(f"{what}: {', '.join(several)}" for what, several in texts if several)
     if message:

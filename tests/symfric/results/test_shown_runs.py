@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 from pages import on_a_screen, shown
 
-from symfric.figures import figure
 from symfric.integrator import simulate, simulate_many
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.multibody import Mechanism
@@ -87,13 +86,6 @@ def test_mechanisms_show_bodies_joints_and_what_rubs() -> None:
     assert "6 bodies, 6 joints, no closed loops" in repr(arm)
     assert len(shown(arm).pictures) == 1
     assert not shown(Mechanism("empty")).pictures
-
-
-def test_a_figure_says_the_range_of_its_columns() -> None:
-    data = figure(BrownMcPhee(), "profile")
-    assert on_a_screen(repr(data))
-    assert repr(data).startswith("figure 'profile': ")
-    assert len(shown(data).pictures) == 1
 
 
 def test_completion_offers_what_users_ask_for() -> None:
