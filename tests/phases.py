@@ -1,4 +1,4 @@
-"""Small problems in phases, for tests of what comes behind their text."""
+"""Small problems in phases, for tests."""
 
 from dataclasses import replace
 from typing import Any

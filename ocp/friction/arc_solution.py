@@ -13,6 +13,7 @@ from ocp.checking.interval_errors import zoh_losses
 from ocp.formulation.phase import Row, Span
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import CAUGHT, FIRST, PULLED, STOPPED, Rules, breaks_away, in_arcs
+from ocp.friction.mode_models import KINDS
 from ocp.friction.sequence import Leg, Legs, flat, placed, shown, tracks_of
 from ocp.friction.transfer import Known, points_in
 from ocp.solving.methods import Ipopt
@@ -41,7 +42,6 @@ FINER: dict[str, Option] = CLOSE | {"perturb_always_cd": "yes", "mumps_permuting
 dependent. Unless Ipopt always regularises them, and MUMPS orders the matrix without permuting it
 first, pivots are delayed until fronts are dense: for arms with 700 intervals, 30 to 150 s for one
 factorisation instead of 0.1 s."""
-KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
 @final

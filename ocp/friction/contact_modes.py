@@ -23,7 +23,14 @@ from numpy.typing import NDArray
 
 from ocp.formulation.expressions import arguments
 from ocp.formulation.statement import further_states, rebuilt
-from ocp.friction.mode_models import SIDES, loops_of, mode_model, nominal_load, slip_change
+from ocp.friction.mode_models import (
+    KINDS,
+    SIDES,
+    loops_of,
+    mode_model,
+    nominal_load,
+    slip_change,
+)
 from ocp.friction.smooth_models import sticking
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
@@ -208,16 +215,6 @@ class Machine:
                 return guess[name]
         return float(at_start(ca.substitute(ca.SX(v.start), model.vector("p"), ca.DM(self.p)), ()))
 
-    def margin(self, modes: Modes, at: Instant) -> float:
-        """Return the least friction margin of sticking contacts, over nominal loads; < 0: slip."""
-        _, look = self.solved(modes, at)
-        margins = [
-            min(row[0], row[1]) / self.sizes[c.name]
-            for c, row in zip(self.contacts, look, strict=True)
-            if not modes[c.name]
-        ]
-        return min(margins, default=np.inf) + OVERLOAD
-
     def undecided(self, t: float, why: str) -> SolveError:
         """Return the SolveError for undetermined contact modes."""
         return SolveError(
@@ -300,5 +297,4 @@ class Machine:
 
 def shown(modes: Modes) -> str:
     """Return modes as text."""
-    words = {1: "slip+", 0: "stick", -1: "slip-"}
-    return ", ".join(f"{name} {words[mode]}" for name, mode in modes.items())
+    return ", ".join(f"{name} {KINDS[mode]}" for name, mode in modes.items())

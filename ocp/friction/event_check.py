@@ -170,8 +170,6 @@ class _Run:
                 raise machine.undecided(
                     t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
                 )
-        if run.status is Status.TERMINATED:
-            reached = self._overloaded(run, modes, guess, reached)
         self.pieces.append(Piece(run, modes, t, reached))
         x = self._states(run, reached)
         guess |= self._unknowns(run, model, reached)
@@ -216,40 +214,6 @@ class _Run:
             return {}
         values = run.express(symbols_of(model.z), np.array([t]))[:, 0].tolist()
         return dict(zip((v.name for v in model.z), values, strict=True))
-
-    def _overloaded(
-        self, run: Trajectory, modes: Modes, guess: Mapping[str, float], t: float
-    ) -> float:
-        """Return when a sticking contact reached its level [s], if before `t`, by regula falsi.
-
-        Between steps the integrator's reactions have the accuracy of its interpolation; here the
-        algebraic equations are solved at each time.
-        """
-        begin = run.span[0]
-
-        def margin(time: float) -> float:
-            x, u = self._states(run, time), self.inputs.at(time, begin)
-            return self.machine.margin(modes, Instant(time, x, u, guess))
-
-        high, above = t, margin(t)
-        if not above < 0.0:
-            return t
-        low, below, step = t, above, 1e-9 * (t - begin)
-        while below < 0.0:
-            low = max(begin, t - step)
-            below, step = margin(low), 8.0 * step
-            if low == begin and below < 0.0:
-                return t
-        for _ in range(100):
-            middle = low + (high - low) * below / (below - above)
-            if not low < middle < high or high - low <= 1e-15 * max(1.0, abs(t)):
-                break
-            value = margin(middle)
-            if value < 0.0:
-                high, above, below = middle, value, below / 2
-            else:
-                low, below, above = middle, value, above / 2
-        return float(high)
 
 
 def verify_exactly(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.friction.contact_modes import Modes
+from ocp.friction.mode_models import KINDS
 from ocp.solving.solution import Mode
 from symfric import Hold, Linear, Statistics, Trajectory
 from symfric.foundation import checks
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 Given = float | Hold | Linear | Callable[[ca.SX], Any]
 LATER = 1e-13
 """Relative time difference that separates before from after an instant."""
-KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
 @final
@@ -54,14 +54,9 @@ class Inputs:
         """Return the inputs of the piece that begins at `t`."""
         return {n: self._at(n, t) if isinstance(v, Hold) else v for n, v in self.given.items()}
 
-    def at(self, t: float, begin: float | None = None) -> Array:
-        """Return values just after the instant `t`, in the order of the model.
-
-        With `begin` they are those at `t` of the piece that begins there: held inputs stay held.
-        """
-        held = t if begin is None else begin
-        values = {n: self._at(n, held if isinstance(v, Hold) else t) for n, v in self.given.items()}
-        return self.model.values("u", values)
+    def at(self, t: float) -> Array:
+        """Return values just after the instant `t`, in the order of the model."""
+        return self.model.values("u", {name: self._at(name, t) for name in self.given})
 
     def _at(self, name: str, t: float) -> float:
         value = self.given[name]

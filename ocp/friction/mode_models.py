@@ -48,6 +48,8 @@ RANK = 1e-11
 """Singular values below this share of the scaled equations count as zero."""
 UNLOADED = 1e-9
 """Static level [N] at the start below which a contact is unloaded."""
+KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
+"""Name of each mode."""
 SIDES = {1: "up", -1: "down"}
 """Suffixes of the outputs "<contact>_grip_<side>": friction margin of a sticking contact."""
 NEWTON_STEPS = 2

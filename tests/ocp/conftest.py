@@ -1,4 +1,4 @@
-"""Solutions that several files judge."""
+"""Solutions that several files share."""
 
 import pytest
 

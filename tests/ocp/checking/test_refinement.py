@@ -12,7 +12,7 @@ from motions import double_integrator
 from numpy.typing import NDArray
 from phases import SLIDER_CRANK, slider_crank, solve_once, unit_move
 
-from ocp.checking.interval_errors import zoh_losses
+from ocp.checking.interval_errors import cut_meshes, zoh_losses
 from ocp.checking.mesh_refinement import Goals, MeshErrors, refined, refined_solve
 from ocp.checking.verify import verify
 from ocp.formulation.expressions import TIME, integral
@@ -130,6 +130,15 @@ def test_kept_fractions_stay_nodes_and_meshes_increase() -> None:
         new = remeshed(mesh, local, local**2, loss=1e-5)
         assert (np.diff(new) > 0).all() and new[0] == 0.0 and new[-1] == 1.0
         assert 0.3 in new
+
+
+def test_intervals_are_cut_where_any_scenario_errs() -> None:
+    errors = [np.array([0.0, 0.0, 1e-2, 0.0]), np.array([3e-3, 0.0, 0.0, np.inf])]
+    cut = cut_meshes([even(4)] * 2, errors, 1, 1e-3, order=1, most=4)
+    assert cut is not None
+    for mesh in cut:  # 3, 1, 4 and 4 parts
+        np.testing.assert_allclose(np.diff(mesh), np.repeat([1 / 12, 1 / 4, 1 / 16], [3, 1, 8]))
+    assert cut_meshes([even(4)], errors[:1], 1, 1e-2, order=1, most=4) is None
 
 
 # --- refined solves -----------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The C of a controller: no warnings, nothing foreign, the bits of a reference in NumPy."""
+"""Generated C of controllers: warnings, symbols, and bits of a reference in NumPy."""
 
 from pathlib import Path
 
@@ -82,9 +82,7 @@ def test_bits_are_those_of_the_reference_in_a_cycle_with_active_bounds() -> None
     assert action.iterations == report.iterations
 
 
-def test_without_a_compiler_controllers_say_what_is_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_compiler_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = controller_of(positioning(), 0.01, name="uncompiled")
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("CC", "")
@@ -112,5 +110,5 @@ def test_c_is_c_plus_plus_too(tmp_path: Path) -> None:
     files = controller().to_c(tmp_path).files
     compiler = find_compiler()
     assert compiler is not None
-    said = compiler.run("-x", "c++", "-Wall", "-Wextra", "-fsyntax-only", str(files[1]))
-    assert said == ""
+    command = ("-x", "c++", "-Wall", "-Wextra", "-fsyntax-only", str(files[1]))
+    assert compiler.run(*command) == ""

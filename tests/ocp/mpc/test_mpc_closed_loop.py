@@ -1,4 +1,4 @@
-"""Drives with other friction than the controller believes."""
+"""Closed loops with plants whose friction differs from that of the controller."""
 
 import csv
 from pathlib import Path
@@ -26,7 +26,7 @@ def loop(plant: Model, t_end: float = 0.6) -> ClosedLoopRun:
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-def test_drive_gets_there_and_no_failure_is_hidden(plant: str) -> None:
+def test_drive_reaches_its_goal_and_reports_failures(plant: str) -> None:
     found = loop(PLANTS[plant]())
     assert found["x"][-1] == pytest.approx(0.1, abs=1e-3)
     assert found["x"].max() < 0.102
@@ -57,7 +57,7 @@ def test_noise_is_the_same_every_time() -> None:
     assert np.isnan(a.checked).all()
 
 
-def test_loop_tells_plots_and_writes_itself(tmp_path: Path) -> None:
+def test_run_has_a_table_a_plot_and_a_file(tmp_path: Path) -> None:
     found = controller().simulate(
         rubbing(), 0.03, {"goal": lambda t: 0.1 * np.sin(t)}, x0={"x": 0.02}, check=False
     )

@@ -1,4 +1,4 @@
-"""Controllers against Riccati's equation, CasADi's own solver, and bad wishes."""
+"""Controllers against Riccati's equation and a solver of CasADi; bounds, references, errors."""
 
 import casadi as ca
 import numpy as np
@@ -116,7 +116,7 @@ def test_rated_input_is_continuous_and_its_state_is_not_measured() -> None:
     assert np.diff(forces).max() <= 2.0 + 1e-3
 
 
-def test_numbers_that_are_not_finite_let_the_plan_go_on() -> None:
+def test_plan_continues_if_numbers_are_not_finite() -> None:
     session = controller().start()
     session.step([0.0, 0.0], {"goal": 0.1})
     planned = session.plan.U[1, 0]
@@ -141,7 +141,7 @@ def phase(**changes: object) -> Phase:
 
 
 @pytest.mark.parametrize(
-    ("problem", "said"),
+    ("problem", "message"),
     [
         (lambda: Problem(phase(T=Free(0.1, 1.0)), effort("force")), "a fixed duration T"),
         (lambda: Problem(phase(T=0.205), effort("force")), "whole number of steps"),
@@ -154,12 +154,12 @@ def phase(**changes: object) -> Phase:
         (lambda: Problem(phase(via={0.5: {"x": 0.1}}), effort("force")), "via points"),
     ],
 )  # fmt: skip
-def test_what_a_controller_cannot_take_is_said(problem: object, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_unsupported_problems_are_refused(problem: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         controller_of(problem(), 0.01)
 
 
-def test_wrong_names_and_sizes_are_said() -> None:
+def test_wrong_names_and_sizes_are_refused() -> None:
     session = controller().start()
     with pytest.raises(ValueError, match="all of x, v, got none for v"):
         session.step({"x": 0.0})

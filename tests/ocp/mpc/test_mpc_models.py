@@ -1,4 +1,4 @@
-"""Machines that are no drive: an unstable one, one with two inputs, one with bristles."""
+"""Controllers of an unstable machine, of one with two inputs, and of one with bristles."""
 
 import numpy as np
 import pytest

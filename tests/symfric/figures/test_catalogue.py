@@ -50,8 +50,7 @@ OTHER_INPUTS = {"quarter_car_general", "bam"}
 """Laws that need more than a pushed block offers."""
 
 
-SLOW = ("break_away", "drift", "dwell")
-"""Figures of a second for some laws."""
+STEADY = ("profile", "steady_state")
 LED = {"coulomb", "karnopp", "dahl", *OTHER_INPUTS, "wojewoda"}
 """Laws without and with states and events, and those that are refused: drawn in every suite."""
 
@@ -66,13 +65,14 @@ def shows(law: str, name: str) -> bool:
 
 @pytest.mark.parametrize("law", ALL_LAWS)
 def test_every_figure_has_finite_columns_of_one_length_or_is_refused(law: str) -> None:
-    every_figure_is_finite_or_refused(law, [n for n in FIGURES if law in LED or n not in SLOW])
+    names = [n for n in FIGURES if law in LED or n in STEADY or not shows(law, n)]
+    every_figure_is_finite_or_refused(law, names)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [law for law in ALL_LAWS if law not in LED])
-def test_long_figures_of_the_other_laws_are_finite_or_refused(law: str) -> None:
-    every_figure_is_finite_or_refused(law, SLOW)
+def test_motions_of_the_other_laws_are_finite(law: str) -> None:
+    every_figure_is_finite_or_refused(law, [n for n in FIGURES if n not in STEADY])
 
 
 def every_figure_is_finite_or_refused(law: str, names: Iterable[str]) -> None:

@@ -110,10 +110,10 @@ def test_a_pushed_block_on_a_spring_swings_with_its_frequency() -> None:
 
 def test_the_run_ends_where_the_velocity_is_reached() -> None:
     law = GenericAsperity(count=50, mu_0=0.0, mu_inf=0.0)
-    run = shoved(law, N, 2.0, Linear([0.0, 1.0], [0.0, 4.0]), 1.0, 0.25)
-    assert run.step_times[-1] == pytest.approx(0.5, abs=2e-3)  # v = t^2 without friction
-    assert run.at(0.25)["force"] == pytest.approx(1.0)
-    assert run.at([0.25])["v"] == pytest.approx(0.0625, abs=2e-3)
+    run = shoved(law, N, 2.0, Linear([0.0, 1.0], [0.0, 400.0]), 1.0, 0.25)
+    assert run.step_times[-1] == pytest.approx(0.05, abs=5e-4)  # v = (10 t)^2 without friction
+    assert run.at(0.025)["force"] == pytest.approx(10.0)
+    assert run.at([0.025])["v"] == pytest.approx(0.0625, abs=2e-3)
 
 
 @pytest.mark.slow

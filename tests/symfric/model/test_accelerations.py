@@ -2,6 +2,7 @@
 
 import casadi as ca
 import numpy as np
+import pytest
 
 from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate
@@ -76,6 +77,7 @@ def test_only_rates_that_are_states_have_accelerations_and_names_are_not_taken_t
     assert {n: o.unit for n, o in volts.further.items()} == {"w_acc": "m/s", "x_acc": "V/s"}
 
 
+@pytest.mark.slow
 def test_accelerations_of_a_loop_are_known_in_absolute_coordinates() -> None:
     model = FourBar(BrownMcPhee()).mechanism().build(formulation="absolute")
     run = simulate(model, 0.02, rtol=1e-9, samples=5)

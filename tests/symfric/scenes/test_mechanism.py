@@ -125,14 +125,6 @@ def test_frictionless_four_mass_meets_the_published_positions() -> None:
     assert max(constraints(run)) < 1e-11
 
 
-def test_four_mass_with_friction_meets_the_published_positions() -> None:
-    run = simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=[2.0, 4.0])
-    found = np.array([run[name] for name in ("x1", "y2", "z3", "x4")])
-    assert found[:, 0] == pytest.approx([0.765030, 4.941126, 4.958354, 2.484775], abs=1e-5)
-    assert found[:, 1] == pytest.approx([-0.134542, 4.998190, 4.900827, 0.212878], abs=1e-5)
-    assert run["energy"][1] == pytest.approx(304.733, abs=1e-3)
-
-
 def test_four_mass_with_the_self_tuning_law_meets_the_published_positions() -> None:
     law = SelfTuning.from_peak_velocity(0.01, mu_s=0.12, mu_d=0.1)
     assert pytest.approx(1.37286, abs=1e-5) == law.C
@@ -150,7 +142,7 @@ def test_slider_crank_with_the_self_tuning_law_meets_the_published_numbers() -> 
     assert run["energy"][-1] == pytest.approx(741.108, abs=1e-2)
 
 
-def test_four_mass_agrees_with_minimal_coordinates() -> None:
+def test_four_mass_agrees_with_minimal_coordinates_and_published_positions() -> None:
     times = np.linspace(0.1, 4.0, 40)
 
     def mu(v: float) -> float:
@@ -158,6 +150,10 @@ def test_four_mass_agrees_with_minimal_coordinates() -> None:
 
     th, x4, *_ = reference("four_mass", four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)
     run = simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=times)
+    found = np.array([run[name] for name in ("x1", "y2", "z3", "x4")])[:, [19, 39]]  # as published
+    assert found[:, 0] == pytest.approx([0.765030, 4.941126, 4.958354, 2.484775], abs=1e-5)
+    assert found[:, 1] == pytest.approx([-0.134542, 4.998190, 4.900827, 0.212878], abs=1e-5)
+    assert run["energy"][-1] == pytest.approx(304.733, abs=1e-3)
     assert run["x1"] == pytest.approx(5 * np.cos(th), abs=1e-6)
     assert run["y2"] == pytest.approx(5 * np.sin(th), abs=1e-6)
     assert run["z3"] == pytest.approx(np.sqrt(49 - 25 * np.sin(th) ** 2), abs=1e-6)
@@ -184,25 +180,21 @@ def test_frictionless_slider_crank_keeps_its_energy_and_meets_the_published_numb
 CRANK = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
 
 
-def test_slider_crank_with_friction_meets_the_published_numbers() -> None:
-    run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10)
-    assert run["crank_N"][0] == pytest.approx(4724.36, abs=5e-3)
-    assert -run["crank_power"][0] == pytest.approx(-4535.4, abs=0.05)
-    last = [run[name][-1] for name in ("crank_rate", "crank", "slider")]
-    assert last == pytest.approx([84.363452, 25.271674, 0.2235396], abs=5e-6)
-    assert constraints(run) < (1e-13, 1e-13 * 120, 1e-12 * 1e4)
-
-
-def test_slider_crank_agrees_with_the_crank_angle_alone() -> None:
+def test_slider_crank_agrees_with_the_crank_angle_alone_and_published_numbers() -> None:
     times = np.linspace(0.01, 0.25, 25)
 
     def mu(v: float) -> float:
         return brown_mcphee(v, 0.1, 0.08, 0.01)
 
     th, w = reference("slider_crank", slider_crank(mu), [0.0, 120.0], times)
-    run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10, t_eval=times)
-    assert run["crank"] == pytest.approx(th, abs=1e-6)
-    assert run["crank_rate"] == pytest.approx(w, abs=1e-4)
+    run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10, t_eval=[0.0, *times])
+    assert run["crank"][1:] == pytest.approx(th, abs=1e-6)
+    assert run["crank_rate"][1:] == pytest.approx(w, abs=1e-4)
+    assert run["crank_N"][0] == pytest.approx(4724.36, abs=5e-3)
+    assert -run["crank_power"][0] == pytest.approx(-4535.4, abs=0.05)
+    last = [run[name][-1] for name in ("crank_rate", "crank", "slider")]
+    assert last == pytest.approx([84.363452, 25.271674, 0.2235396], abs=5e-6)
+    assert constraints(run) < (1e-13, 1e-13 * 120, 1e-12 * 1e4)
 
 
 def test_four_bar_closes_as_freudenstein_says() -> None:
@@ -241,11 +233,8 @@ def test_arm_loses_what_friction_takes() -> None:
 
 
 @each_scene
-@pytest.mark.parametrize(
-    "law", [LuGreNormalised(), BrownMcPhee()], ids=lambda law: type(law).__name__
-)
-def test_every_parameter_can_be_free(kind: type[MechanismScene], law: Law) -> None:
-    scene = kind(law)
+def test_every_parameter_can_be_free(kind: type[MechanismScene]) -> None:
+    scene = kind(LuGreNormalised())
     names = list(parameters(scene))
     free, fixed = scene.model(names), scene.model()
     assert [p.name for p in free.p] == names
@@ -254,10 +243,10 @@ def test_every_parameter_can_be_free(kind: type[MechanismScene], law: Law) -> No
 
 
 @each_scene
-@pytest.mark.parametrize("law", ["LuGre", "lugre", None], ids=str)
-def test_what_is_not_a_law_is_refused(kind: type[MechanismScene], law: object) -> None:
-    with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law"):
-        kind(law)  # type: ignore[arg-type]
+def test_what_is_not_a_law_is_refused(kind: type[MechanismScene]) -> None:
+    for law in (LuGreNormalised, "lugre", None):
+        with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law"):
+            kind(law)  # type: ignore[arg-type]
 
 
 def test_another_parameter_closes_the_loop_again() -> None:
