@@ -23,7 +23,7 @@ CLASSES = (
     "os:system", "subprocess:Popen", "casadi:external", "casadi.casadi:Function", "builtins:eval",
     "pathlib:Path", "symfric.foundation.programs:Compiler", "symfric.foundation.files:written",
     "symfric.integrator.compiled.columns:Rows", "symfric.integrator.stored:Stored",
-    "symfric.integrator.stored:Later", "symfric.model.model:Model", "symfric.__main__:main",
+    "symfric.integrator.stored:Basis", "symfric.model.model:Model", "symfric.__main__:main",
     "symfric.laws.dynamic.lugre:LuGre", "symfric.foundation.variable:Variable",
     "symfric.foundation.packed:Given",
     "identification.residuals.shots:delayed", "identification.fit:Fit", "ocp.mpc.session:Session",

@@ -156,12 +156,12 @@ def _rows(
 ) -> Iterator[Found]:
     """Yield the rows of a case, tolerance by tolerance, width by width."""
     knob = regularisation("bench", case.law)
-    model = case.scene(case.law).model(knob.names)
+    model = case.scene(case.law).model([*knob.powers])
     machine = Machine(case.name, lambda _: model, case.t_end, case.of, free=True, backend=engine)
     reference, of_what, uncertain = _reference(case, knob, machine, factors)
     cycles = replace(machine, of=last_cycle)
     cycle = _reference(case, knob, cycles, factors)[0] if case.cycle else None
-    name = knob.names[0]
+    name = next(iter(knob.powers))
     yield f"{case.name}: compared with {of_what}, accurate to {uncertain:.1g}"
     for rtol in rtols:
         before = (nan, nan)
@@ -198,7 +198,7 @@ def _reference(
     coarse, middle, finest = (_at(machine, knob, last * r**2, FINE) for r in (4.0, 2.0, 1.0))
     wide, near = distance(coarse, middle), distance(middle, finest)
     order = log(wide / near) / log(4.0) if wide > near > 0 else nan
-    name = knob.names[0]
+    name = next(iter(knob.powers))
     # near = C s^q (4^q - 1) where s is the finest width
     left = near / (4.0**order - 1.0) if order == order else near
     return finest, f"{name} = {finest.values[name]:.3g}", max(left, FINE)

@@ -19,6 +19,7 @@ import typer
 from symfric.bench import PICTURES, SUBJECTS, measure
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.app import INTERRUPTED
 from symfric.foundation.files import check_folder, make_folder
 from symfric.foundation.parameters import check_names
 
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from symfric.stress.cases import Case
     from symfric.stress.judge import Verdict
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C."""
 EVERY = 60.0
 """Interval between updates of the files of stress tests [s]."""
 

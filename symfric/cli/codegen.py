@@ -13,6 +13,7 @@ from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import formed, forms, kind_of
+from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
     Generated,
@@ -88,25 +89,25 @@ def codegen(
     out: Path,
     fit: Path | None = None,
     law: str | None = None,
-    settings: list[str] | None = None,
+    settings: Strings = None,
     preset: str | None = None,
-    law_of: list[str] | None = None,
+    law_of: Strings = None,
     scene: str | None = None,
     method: str | None = None,
     real: str | None = None,
     step_size: float | None = None,
     name: str | None = None,
     fold: bool = False,
-    free: list[str] | None = None,
+    free: Strings = None,
     guards: bool = True,
     kit: bool = True,
-    core: list[str] | None = None,
+    core: Strings = None,
     turning: bool = False,
     inverse_dynamics: bool = False,
     payload: str | None = None,
     tunable_gravity: bool = False,
     compensator: bool = False,
-    compensation: list[str] | None = None,
+    compensation: Strings = None,
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:

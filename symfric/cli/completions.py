@@ -4,7 +4,7 @@ These functions never print or raise; without a match they return an empty list.
 one command needs only.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any
 
@@ -24,23 +24,22 @@ def _last(names: Iterable[str], incomplete: str, separators: str = ",") -> list[
     return [incomplete[:cut] + name for name in _of(names, incomplete[cut:])]
 
 
-def _from(module: str, name: str) -> Any:
-    return getattr(import_module(module), name)
+def _names(module: str, name: str, separators: str = "") -> Callable[[str], list[str]]:
+    """Return a function that completes the entries of `name` in `module`."""
+
+    def complete(incomplete: str) -> list[str]:
+        names = getattr(import_module(module), name)
+        return _last(names, incomplete, separators) if separators else _of(names, incomplete)
+
+    return complete
 
 
-def laws(incomplete: str) -> list[str]:
-    """Complete laws of a scene, also in sums and wrappers."""
-    return _last(ALL_LAWS, incomplete, "+(")
-
-
-def each_law(incomplete: str) -> list[str]:
-    """Complete laws in a list with commas."""
-    return _last(ALL_LAWS, incomplete, "+(,")
-
-
-def needs(incomplete: str) -> list[str]:
-    """Complete words of `--need` in a list with commas."""
-    return _last(_from("symfric.choice", "NEEDS"), incomplete)
+laws = _names("symfric.laws", "ALL_LAWS", "+(")
+each_law = _names("symfric.laws", "ALL_LAWS", "+(,")
+needs = _names("symfric.choice", "NEEDS", ",")
+scenes = _names("symfric.scenes", "ALL_SCENES")
+subjects = _names("symfric.bench", "SUBJECTS")
+problems = _names("ocp.problems", "READY")
 
 
 def all_laws(incomplete: str) -> list[str]:
@@ -48,9 +47,18 @@ def all_laws(incomplete: str) -> list[str]:
     return [*laws(incomplete), *_of(POPULATIONS, incomplete)]
 
 
-def scenes(incomplete: str) -> list[str]:
-    """Complete scenes; the shell completes files of robots."""
-    return _of(_from("symfric.scenes", "ALL_SCENES"), incomplete)
+def figures(incomplete: str) -> list[str]:
+    """Complete figures of laws, and scenes."""
+    return [*_names("symfric.figures", "FIGURES")(incomplete), *scenes(incomplete)]
+
+
+def plates(incomplete: str) -> list[str]:
+    """Complete papers of the gallery and, after the slash, their figures."""
+    from symfric.gallery import scripts, short  # noqa: PLC0415  (for this completion only)
+
+    names = [short(name) for name in scripts()]
+    papers = dict.fromkeys(f"{name.partition('/')[0]}/" for name in names)
+    return _of(names if "/" in incomplete else papers, incomplete)
 
 
 def presets(context: typer.Context, incomplete: str) -> list[str]:
@@ -67,32 +75,10 @@ def places(context: typer.Context, incomplete: str) -> list[str]:
 
 def _machines(context: typer.Context) -> list[Any]:
     """Return the scenes on the command line."""
-    every = _from("symfric.scenes", "ALL_SCENES")
+    from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (for these completions only)
+
     words = (context.params.get("scene"), context.params.get("what"), *context.args)
-    return [every[word] for word in map(str, words) if word in every]
-
-
-def figures(incomplete: str) -> list[str]:
-    """Complete figures of laws, and scenes."""
-    return [*_of(_from("symfric.figures", "FIGURES"), incomplete), *scenes(incomplete)]
-
-
-def plates(incomplete: str) -> list[str]:
-    """Complete papers of the gallery and, after the slash, their figures."""
-    short = _from("symfric.gallery", "short")
-    names = [short(name) for name in _from("symfric.gallery", "scripts")()]
-    papers = dict.fromkeys(f"{name.partition('/')[0]}/" for name in names)
-    return _of(names if "/" in incomplete else papers, incomplete)
-
-
-def subjects(incomplete: str) -> list[str]:
-    """Complete subjects of `symfric bench`."""
-    return _of(_from("symfric.bench", "SUBJECTS"), incomplete)
-
-
-def problems(incomplete: str) -> list[str]:
-    """Complete ready optimal control problems."""
-    return _of(_from("ocp.problems", "READY"), incomplete)
+    return [ALL_SCENES[word] for word in map(str, words) if word in ALL_SCENES]
 
 
 def settings(context: typer.Context, incomplete: str) -> list[str]:

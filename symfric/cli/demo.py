@@ -1,6 +1,5 @@
 """`symfric demo`: simulation, identification, optimal control and generated C in one run."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -60,15 +59,10 @@ def demo(out: Path = Path("out"), data: Path | None = None) -> None:
     output.note("4/4 C for embedded controllers")
     chapters.append(generated_c(out / "c", found[0]))
     write_text(out / "README.md", index(out, chapters))
-    write_json(out / "summary.json", {c.title: c.numbers for c in chapters})
+    output.emit_json({c.title: c.numbers for c in chapters}, out / "summary.json")
     output.note(f"wrote {out / 'README.md'}, which lists the results")
     if chapters[-1].numbers["failed"]:
         raise typer.Exit(1)
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write an object as JSON."""
-    write_text(path, json.dumps(output.plain(content), indent=2) + "\n")
 
 
 def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str, ...], str]:
@@ -179,7 +173,7 @@ def generated_c(folder: Path, found: Fitted) -> Chapter:
         if law is None:
             raise ValueError(f"demo: expected a law, got none from {found.name}")
         verification = verify(generate(law, folder / name, name=name))
-        write_json(folder / name / "verification.json", verification.to_dict())
+        output.emit_json(verification.to_dict(), folder / name / "verification.json")
         show_verification(verification)
         output.show()
         numbers[name] = {"law": law_name(law), **verification.to_dict()}

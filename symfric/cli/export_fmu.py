@@ -6,6 +6,7 @@ from typing import Any
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import scenes_with
+from symfric.cli.options import Strings
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
 from symfric.fmu.export import KINDS
@@ -17,10 +18,10 @@ def export_fmu(
     what: str,
     out: Path | None = None,
     law: str | None = None,
-    settings: list[str] | None = None,
+    settings: Strings = None,
     preset: str | None = None,
-    law_of: list[str] | None = None,
-    free: list[str] | None = None,
+    law_of: Strings = None,
+    free: Strings = None,
     fmi: int = 3,
     kind: str = KINDS[0],
     rtol: float = 1e-6,

@@ -25,13 +25,13 @@ from identification.verdict.profile import Profile
 from symfric import SolveError, Status
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
 KINDS = ("points", "inverse", "shooting", "loop")
 RULES: dict[str, Callable[..., Any]] = {"log": log, "linear": linear, "above": above, "tied": tied}
 MOST_WORKERS = 256
-Strings = list[str] | None
 
 
 def reader(

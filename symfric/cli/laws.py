@@ -10,6 +10,7 @@ from typing import Any
 from symfric import ALL_LAWS, parameters
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.options import Strings
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.data import parts, phenomena
 from symfric.figures.motion import NORMAL_FORCE
@@ -23,10 +24,10 @@ from symfric.scenes import ALL_SCENES
 
 def laws(
     name: str | None = None,
-    settings: list[str] | None = None,
+    settings: Strings = None,
     plot: Path | None = None,
     figure: str | None = None,
-    others: list[str] | None = None,
+    others: Strings = None,
     normal_force: float | None = None,
     json: str | None = None,
 ) -> None:
@@ -68,7 +69,7 @@ def laws(
     return output.finish(described[0] if name else {"laws": described}, json, show, plot)
 
 
-def laws_with(texts: Sequence[str], settings: list[str] | None) -> list[AnyLaw]:
+def laws_with(texts: Sequence[str], settings: Strings) -> list[AnyLaw]:
     """Return the laws `texts`, all with the parameters and options of `--set`.
 
     `LAW.NAME=VALUE` sets the parameter of one law only.

@@ -17,6 +17,7 @@ from symfric.foundation.status import SolveError
 from symfric.laws import AnyLaw
 
 L = TypeVar("L", Law, AnyLaw)
+Strings = list[str] | None
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 

@@ -123,7 +123,7 @@ def note(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def emit_json(content: Mapping[str, Any], destination: str | None) -> None:
+def emit_json(content: Mapping[str, Any], destination: str | Path | None) -> None:
     """Write `content` as one JSON object to a file, or to standard output for "-"."""
     if destination is None:
         return

@@ -15,14 +15,13 @@ from symfric import Law, SolveError, Trajectory, parameters, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import Driven, driven, scenes_with
+from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES as ALL_SCENES  # for options.toml
 from symfric.scenes import MECHANISMS, Scene
-
-Strings = list[str] | None
 
 
 def run(

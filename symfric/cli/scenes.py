@@ -10,6 +10,7 @@ from symfric import Law, Viscous, parameters, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import driven, scenes_with
+from symfric.cli.options import Strings
 from symfric.cli.run import refuse_failed, simulated
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable, options
@@ -23,9 +24,9 @@ LAW = "brown_mcphee"
 def scenes(
     name: str | None = None,
     law: str | None = None,
-    settings: list[str] | None = None,
+    settings: Strings = None,
     preset: str | None = None,
-    law_of: list[str] | None = None,
+    law_of: Strings = None,
     plot: Path | None = None,
     json: str | None = None,
 ) -> None:

@@ -17,7 +17,7 @@ import typer
 
 from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
 from symfric.choice import NEEDS as NEEDS
-from symfric.choice import Choice, Friction
+from symfric.choice import Friction
 from symfric.choice import select as select_law
 from symfric.choice.nature import forms, lacking, needed
 from symfric.choice.ranking import LEGEND, lines
@@ -25,6 +25,7 @@ from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.identify import reader, residuals_of
 from symfric.cli.machines import formed, kind_of
+from symfric.cli.options import Strings
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
@@ -34,7 +35,6 @@ from symfric.scenes import Scene
 OFTEN = 10.0
 """Seconds between progress lines if standard error is not a terminal."""
 OF_FRICTION = ("mu_s", "mu_d", "v_s")
-Strings = list[str] | None
 
 
 def select(
@@ -112,7 +112,8 @@ def select(
     for path, write in ((csv, found.to_csv), (plot, found.plot), (html, found.to_html)):
         if path:
             write(path)
-    output.finish(found.to_dict(), json, partial(show_choice, found), plot, html, csv)
+    text = "\n".join([*lines(found), "", fill(LEGEND, 80)])
+    output.finish(found.to_dict(), json, partial(typer.echo, text), plot, html, csv)
     if found.interrupted:
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)
     if found.best is None:
@@ -247,10 +248,3 @@ def _paper(scene: str, json: str | None, others: bool) -> None:
     with output.progress(f"select {scene} --paper") as tell:
         found = compare_with_paper(scene, progress=tell)
     output.finish(found.to_dict(), json, lambda: typer.echo("\n".join(found.lines())))
-
-
-def show_choice(found: Choice) -> None:
-    """Print table, reasons and verdict."""
-    for line in lines(found):
-        typer.echo(line)
-    typer.echo("\n" + fill(LEGEND, 80))

@@ -11,9 +11,8 @@ The stabilised form of a mechanism has positions and velocities on the constrain
     q' = q_rate + phi_q' eta,   M a + phi_q' lam = Q,   phi(q) = 0,   phi_q q_rate = 0
 
 The accelerations a, the multipliers lam and eta and the normal forces are algebraic unknowns; eta
-is
-zero along the exact solution. The form of index 1 enforces only phi_q a + gamma = 0, so constraints
-drift.
+is zero along the exact solution. The form of index 1 enforces only phi_q a + gamma = 0, so
+constraints drift.
 
 Limits: of index 2, so the methods of this package, which take index 1, do not apply.
 Source: Gear, Leimkuhler, Gupta, J. Comput. Appl. Math. 12-13, 1985.
@@ -87,7 +86,14 @@ def stabilised(system: System) -> System:
 Array = NDArray[np.float64]
 PEERS = ("sundials", "rosenbrock", "ggl")
 CHUNKS = 32
-COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
+COUNTS = {
+    "steps": ("n_steps", "nsteps"),
+    "rejections": ("n_reject", "netfails"),
+    "evaluations": ("n_rhs", "nfevals"),
+    "jacobians": ("n_jac", "nlinsetups"),
+    "factorisations": ("n_jac", "nlinsetups"),
+}
+"""Entry of the statistics -> its names in CasADi's integrators; the first that exists counts."""
 STEPS_PER_INTERVAL = 100_000
 """Limit of SUNDIALS, which would otherwise spend minutes before a singularity."""
 HINTS = {
@@ -143,10 +149,7 @@ class Peer:
         f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
         # its own first step is so long that tight tolerances are never met
-        return {
-            "init_xdot": slope.tolist(),
-            "step0": first_step(float(grid[-1] - grid[0])),
-        }
+        return {"init_xdot": slope.tolist(), "step0": first_step(float(grid[-1] - grid[0]))}
 
 
 def rates_of(system: System) -> tuple[list[int], Array]:
@@ -248,24 +251,13 @@ def integrate_by_peer(
         part[rates] = result["xf"].full() * nominal[:, None]
         part[columns] = result["zf"].full()
         found = np.hstack([found, part])
-        for name, value in _counts(solver).items():
-            counts[name] += value
+        stats = solver.stats()
+        for name, keys in COUNTS.items():
+            counts[name] += next((int(stats[key]) for key in keys if key in stats), 0)
     dense = _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n])
     run.keep(dense.rows)
     outputs.fill(dense, last=True)
     return run, counts
-
-
-def _counts(solver: ca.Function) -> dict[str, int]:
-    stats = solver.stats()
-    jacobians = int(stats.get("n_jac", stats.get("nlinsetups", 0)))
-    return {
-        "steps": int(stats.get("n_steps", stats.get("nsteps", 0))),
-        "rejections": int(stats.get("n_reject", stats.get("netfails", 0))),
-        "evaluations": int(stats.get("n_rhs", stats.get("nfevals", 0))),
-        "jacobians": jacobians,
-        "factorisations": jacobians,
-    }
 
 
 def _dense(system: System, inputs: InputData, p: Array, grid: Array, y: Array) -> Dense:
@@ -299,8 +291,7 @@ def simulate_by_peer(
     """Integrate `model` as `simulate` does, with one of CasADi's own integrators.
 
     It is meant for comparisons: the constraints of mechanisms drift, jamming friction goes
-    unnoticed,
-    friction peaks and pulses of inputs may be skipped, and events are not supported.
+    unnoticed, friction peaks and pulses of inputs may be skipped, and events are not supported.
 
     Args:
         model: the equations; the mass matrix must be diagonal.
@@ -354,7 +345,7 @@ def simulate_by_peer(
     for said in doubts(integrator, inputs, run, values):
         run.message += f" {said}"
         warnings.warn(type(said)(f"simulate_by_peer '{model.name}': {said}"), stacklevel=2)
-    trajectory = trajectory_of(integrator, inputs, run, values, count)
+    trajectory = trajectory_of(model, lambda: integrator, inputs, run, values, count)
     if throw and not trajectory.status.ok:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     return trajectory

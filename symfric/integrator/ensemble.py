@@ -39,16 +39,7 @@ from symfric.integrator.arguments import (
 )
 from symfric.integrator.equations.initial import first_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.many.chunk import (
-    Chunk,
-    EventJob,
-    Job,
-    Points,
-    Solved,
-    Task,
-    digest,
-    suited,
-)
+from symfric.integrator.many.chunk import Chunk, EventJob, Job, Points, Solved, digest, suited
 from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of, member_data
 from symfric.integrator.many.program import program
 from symfric.integrator.many.store import Store
@@ -62,6 +53,9 @@ from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from symfric.integrator.cuda.on_device import OnDevice
+
+    Task = Job | EventJob | OnDevice
+    """Common part of all chunks of an ensemble."""
 
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
@@ -157,7 +151,7 @@ def simulate_many(
             f"member {np.argmin(ends)}"
         )
     formula = chosen("simulate_many", method, rtol)
-    _check(model, backend, executor, real)
+    _check(backend, executor, real)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
     chunk = None if chunk is None else checks.count("simulate_many: chunk", chunk)
     if backend == CUDA:
@@ -260,7 +254,7 @@ def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
     return SolveError(message, found.status, found)
 
 
-def _check(model: Model, backend: str, executor: object, real: str) -> None:
+def _check(backend: str, executor: object, real: str) -> None:
     checks.choice("simulate_many: backend", backend, (*BACKENDS, CUDA))
     checks.choice("simulate_many: real", real, REALS)
     if real != "double" and backend != CUDA:

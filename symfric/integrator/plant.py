@@ -94,10 +94,9 @@ class Plant:
 
         Args:
             u: inputs in the order of the model, shape (nu,) or (batch, nu); a number if there is
-            one
-                input and one plant; or by name, where a number applies to all plants and other
-                inputs keep their values. By default the inputs held last; at first, the start
-                values of the model.
+                one input and one plant; or by name, where a number applies to all plants and
+                other inputs keep their values. By default the inputs held last; at first, the
+                start values of the model.
 
         Raises:
             ValueError: unknown names, another shape, not finite; the plant is unchanged.

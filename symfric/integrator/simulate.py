@@ -10,7 +10,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,10 +31,10 @@ from symfric.integrator.arguments import (
     tolerances,
     warn_of_loose,
 )
-from symfric.integrator.derivatives.path import seeds
+from symfric.integrator.derivatives.path import Path, seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Input, InputData, input_data, paced
+from symfric.integrator.equations.inputs import Input, input_data, paced
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import FOR_DERIVATIVES
 from symfric.integrator.running.doubts import doubts
@@ -71,19 +71,8 @@ class Settings:
     times: Array
 
 
-def settings(
-    model: Model,
-    t_start: float,
-    t_end: float,
-    rtol: float,
-    atol: float | None,
-    samples: int,
-    method: str,
-    event_tolerance: float,
-    max_steps: int | None,
-    max_step: float | None,
-) -> Settings:
-    """Check the settings of `simulate` and return them, cached; arguments as there.
+def settings(model: Model, asked: tuple[Any, ...]) -> Settings:
+    """Check the settings of `simulate`, which are the arguments of `_checked`; cached.
 
     Raises:
         ValueError: bad input.
@@ -91,9 +80,6 @@ def settings(
     Warns:
         UserWarning: a loose tolerance.
     """
-    asked = (
-        t_start, t_end, rtol, atol, samples, method, event_tolerance, max_steps, max_step
-    )  # fmt: skip
     known: dict[Hashable, Settings] = model.memory.setdefault("settings", {})
     # 1.0 and True are equal keys, but only 1.0 is a valid time
     key = (*asked, *map(type, asked))
@@ -285,9 +271,8 @@ def simulate(
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
-    asked = settings(
-        model, t_start, t_end, rtol, atol, samples, method, event_tolerance, max_steps, max_step
-    )
+    limits = event_tolerance, max_steps, max_step
+    asked = settings(model, (t_start, t_end, rtol, atol, samples, method, *limits))
     t_start, t_end, formula, allowed = asked.t_start, asked.t_end, asked.formula, asked.allowed
     checks.choice("simulate: backend", backend, BACKENDS)
     if sensitivities != ():
@@ -309,20 +294,23 @@ def simulate(
     if integrator.system.has_pivots:
         at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
         integrator = integrator.suited([at_start], t_end - t_start)
-    run, own, count = _solve(
-        integrator, inputs, y0, values, allowed, backend, progress, build_time, looks
-    )
+    compiled_before, begin = integrator.compile_time, perf_counter()
+    run, own = integrate(integrator, inputs, y0, values, allowed, backend, progress, looks)
+    compile_time = integrator.compile_time - compiled_before
+    run_time = perf_counter() - begin - compile_time
+    count = partial(_statistics, integrator, run, build_time, compile_time, run_time)
     for said in doubts(own, inputs, run, values):
         run.message += f" {said}"
         warnings.warn(type(said)(f"simulate '{model.name}': {said}"), stacklevel=2)
-    trajectory = trajectory_of(integrator, inputs, run, values, count, backend)
+    trajectory = trajectory_of(model, lambda: integrator, inputs, run, values, count, backend)
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:
         basis = Basis(which, y0, tuple(run.jumps), allowed.event)
         known = trajectory.t, run.outputs.reached
-        make = partial(basis.path, own, run.dense, inputs, values, backend, known)
-        found = Differentiated(make, which, tuple(trajectory.units), trajectory.t)
+        jumps = basis.jumps, basis.tolerance, known
+        path = partial(Path, own, run.dense, inputs, values, backend, y0, *jumps)
+        found = Differentiated(path, which, tuple(trajectory.units), trajectory.t)
         trajectory = replace(
             trajectory, differentiate=found.at, pull_back=found.pull_back, delays=found.delays,
             keep=partial(Stored.of, integrator, inputs, run, values, backend, basis=basis),
@@ -341,40 +329,22 @@ def simulate(
     return trajectory
 
 
-def _solve(
-    integrator: Integrator,
-    inputs: InputData,
-    y0: Array,
-    p: Array,
-    allowed: Tolerances,
-    backend: str,
-    progress: Callable[[float], None] | None,
-    build_time: float,
-    times: Array,
-) -> tuple[Run, Integrator, Callable[[], Statistics]]:
-    """Run the selected engine; return the run, the last integrator and a function for
-    statistics.
-    """
-    compiled_before, begin = integrator.compile_time, perf_counter()
-    run, own = integrate(integrator, inputs, y0, p, allowed, backend, progress, times)
-    compile_time = integrator.compile_time - compiled_before
-    run_time = perf_counter() - begin - compile_time
-
-    def count() -> Statistics:
-        evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
-        return Statistics(
-            backend=run.engine,
-            method=integrator.tableau.name,
-            steps=run.steps,
-            rejections=run.attempts - run.steps,
-            evaluations=run.attempts * evaluations,
-            jacobians=run.attempts * jacobians,
-            factorisations=run.attempts * factorisations,
-            events=len(run.happened),
-            smallest_step=run.extent.shortest,
-            build_time=build_time,
-            compile_time=compile_time,
-            run_time=run_time,
-        )
-
-    return run, own, count
+def _statistics(
+    integrator: Integrator, run: Run, build_time: float, compile_time: float, run_time: float
+) -> Statistics:
+    """Return the cost of a run; times in [s]."""
+    evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
+    return Statistics(
+        backend=run.engine,
+        method=integrator.tableau.name,
+        steps=run.steps,
+        rejections=run.attempts - run.steps,
+        evaluations=run.attempts * evaluations,
+        jacobians=run.attempts * jacobians,
+        factorisations=run.attempts * factorisations,
+        events=len(run.happened),
+        smallest_step=run.extent.shortest,
+        build_time=build_time,
+        compile_time=compile_time,
+        run_time=run_time,
+    )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache
 from os import PathLike
 from typing import Any, final
 
@@ -30,44 +30,6 @@ Slopes = dict[str, dict[str, Array]]
 
 
 @final
-class Later:
-    """Integrator of a stored run, built only when needed for data that are not in the file."""
-
-    def __init__(self, model: Model, inputs: InputData, method: str) -> None:
-        self.model = model
-        self._how = inputs, METHODS[method]
-
-    @cached_property
-    def now(self) -> Integrator:
-        """Integrator, built on first use."""
-        inputs, method = self._how
-        return built(self.model, inputs, method)[0]
-
-    @property
-    def states(self) -> Columns | None:
-        """See `Integrator.states`."""
-        return self.now.states
-
-    @property
-    def signal_columns(self) -> Columns:
-        """See `Integrator.signal_columns`."""
-        return self.now.signal_columns
-
-    @property
-    def plain_signal_columns(self) -> Columns:
-        """See `Integrator.plain_signal_columns`."""
-        return self.now.plain_signal_columns
-
-    def refined(self, expression: ca.SX) -> ca.Function:
-        """See `Integrator.refined`."""
-        return self.now.refined(expression)
-
-    def of_time(self, name: str, expression: ca.SX) -> ca.Function:
-        """See `Integrator.of_time`."""
-        return self.now.of_time(name, expression)
-
-
-@final
 @dataclass(frozen=True, eq=False)
 class Basis:
     """Data that derivatives along stored steps need in addition.
@@ -83,14 +45,6 @@ class Basis:
     guess: Array
     jumps: tuple[Jumps, ...]
     tolerance: float
-
-    def path(
-        self, integrator: Integrator, steps: Dense, inputs: InputData, p: Array, backend: str,
-        known: tuple[Array, Array],
-    ) -> Path:  # fmt: skip
-        """Return the path of the run; `known` are times of the result [s] and unknowns there."""
-        made = self.guess, self.jumps, self.tolerance, known
-        return Path(integrator, steps, inputs, p, backend, *made)
 
 
 @final
@@ -195,8 +149,14 @@ class Stored:
             message=self.message,
             kept=[self.steps.rows],
         )
-        later = Later(self.model, self.inputs, self.method)
-        made = trajectory_of(later, self.inputs, run, self.p, lambda: self.statistics, self.backend)
+
+        @cache
+        def integrator() -> Integrator:
+            return built(self.model, self.inputs, METHODS[self.method])[0]
+
+        made = trajectory_of(
+            self.model, integrator, self.inputs, run, self.p, lambda: self.statistics, self.backend
+        )
         names, known = list(self.model.signals), self.signals
         by_name = dict(zip(names, known, strict=True))
 
@@ -208,10 +168,15 @@ class Stored:
                 return {v.name: by_name[v.name] for v in self.model.x}
             return made.states(at)
 
-        again: dict[str, Any] = {"evaluate": evaluate, "states": states, "keep": self._kept_by}
-        return replace(made, **again, **self._derivatives(later, made.t))
+        def keep(_: Trajectory) -> Stored:
+            return self
 
-    def _derivatives(self, later: Later, t: Array) -> dict[str, Any]:
+        return replace(
+            made, evaluate=evaluate, states=states, keep=keep,
+            **self._derivatives(integrator, made.t),
+        )  # fmt: skip
+
+    def _derivatives(self, integrator: Callable[[], Integrator], t: Array) -> dict[str, Any]:
         """Return the derivative functions: those at `t` are stored, others use the steps."""
         if self.slopes is None and not self.unable:
             return {}
@@ -220,7 +185,7 @@ class Stored:
 
         @cache
         def between(basis: Basis) -> Differentiated:
-            return Differentiated(lambda: self._path(basis, later.now), basis.which, names, t)
+            return Differentiated(lambda: self._path(basis, integrator()), basis.which, names, t)
 
         def known() -> Slopes:
             if self.slopes is None:
@@ -255,12 +220,10 @@ class Stored:
             d = [np.concatenate([self.p, self.inputs.values[:, k]]) for k in (0, -1)]
             ends = [(basis.guess, d[0]), (self.steps.y1[-1], d[1])]
             integrator = integrator.suited(ends, float(self.steps.t1[-1] - self.steps.t0[0]))
-        known = self.times, self.reached
-        return basis.path(integrator, self.steps, self.inputs, self.p, self.backend, known)
-
-    def _kept_by(self, trajectory: Trajectory) -> "Stored":
-        del trajectory
-        return self
+        return Path(
+            integrator, self.steps, self.inputs, self.p, self.backend,
+            basis.guess, basis.jumps, basis.tolerance, (self.times, self.reached),
+        )  # fmt: skip
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write it to a file."""
@@ -290,7 +253,8 @@ def load_run(
 
 
 def trajectory_of(
-    integrator: Integrator | Later,
+    model: Model,
+    integrator: Callable[[], Integrator],
     inputs: InputData,
     run: Run,
     p: Array,
@@ -300,7 +264,8 @@ def trajectory_of(
     """Return the trajectory of a run.
 
     Args:
-        integrator, inputs, p: of the run.
+        model, inputs, p: of the run.
+        integrator: returns its integrator, built on first use for a stored run.
         run: its results; only output times that were reached are used.
         count: returns the statistics.
         backend: for signals: "vm", otherwise the engine that is expected to be fastest.
@@ -308,8 +273,7 @@ def trajectory_of(
     Third-party integrators let the constraints of mechanisms drift, and their results show it;
     symfric's methods hold them to the tolerance between steps, and exactly in results.
     """
-    model, outputs = integrator.model, run.outputs
-    names, drifts = model.signals, run.engine.startswith("casadi")
+    outputs, names, drifts = run.outputs, model.signals, run.engine.startswith("casadi")
     times, engine = outputs.times, "vm" if backend == "vm" else "auto"
     if outputs.found < times.size:
         times = times[: outputs.found]
@@ -318,7 +282,7 @@ def trajectory_of(
         return outputs.reached.copy() if at is times else run.at(at)
 
     def states(at: Array) -> dict[str, Array]:
-        y, columns = unknowns(at), None if drifts else integrator.states
+        y, columns = unknowns(at), None if drifts else integrator().states
         if columns is not None:
             y = columns([y.T, data(at)], backend=engine)[0].T
         return {v.name: in_results(v.kind, row) for v, row in zip(model.x, y, strict=False)}
@@ -331,12 +295,14 @@ def trajectory_of(
         return np.ascontiguousarray(values.T)
 
     def evaluate(at: Array) -> dict[str, Array]:
-        columns = integrator.plain_signal_columns if drifts else integrator.signal_columns
+        own = integrator()
+        columns = own.plain_signal_columns if drifts else own.signal_columns
         return dict(zip(names, rows(columns, at), strict=True))
 
     def express(expression: ca.SX, at: Array) -> Array:
-        plain = partial(integrator.of_time, "signals")
-        return rows(Columns((plain if drifts else integrator.refined)(expression)), at)
+        own = integrator()
+        made = own.of_time("signals", expression) if drifts else own.refined(expression)
+        return rows(Columns(made), at)
 
     return Trajectory(
         model.name,
@@ -352,7 +318,5 @@ def trajectory_of(
         express,
         model,
         tuple(run.happened),
-        keep=None
-        if isinstance(integrator, Later)  # already stored
-        else partial(Stored.of, integrator, inputs, run, p, backend),
+        keep=lambda made: Stored.of(integrator(), inputs, run, p, backend, made),
     )

@@ -39,40 +39,115 @@ from symfric.integrator.compiled.compiler import (
 NICENESS = 10
 """Niceness of a background compiler."""
 _OWNER = os.getpid()
-_queue: list["Making"] = []
+_queue: list["Prospect"] = []
 """Libraries to compile; the first one is being compiled."""
+
+
+def possible() -> bool:
+    """Return True if a background compiler may run and will be stopped at exit."""
+    return processors() > 1 and os.getpid() == _OWNER
+
+
+def _advance() -> None:
+    """Poll the first library of the queue, and the next one if it is done."""
+    while _queue and os.getpid() == _OWNER:
+        if not _queue[0].finished():
+            return
+        del _queue[0]
+
+
+def wait() -> None:
+    """Wait until the queue is empty: for measurements and tests."""
+    while _queue and os.getpid() == _OWNER:
+        _advance()
+        sleep(1e-3)
+
+
+@atexit.register
+def _close() -> None:
+    if _queue and os.getpid() == _OWNER and not _queue[0].finished():
+        _queue[0].stop()
+    _queue.clear()
+
+
+def processors() -> int:
+    """Return the number of processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @final
 @dataclass(eq=False)
-class Making:
-    """Library to be compiled; mutable in its progress only.
+class Prospect:
+    """Library that is compiled when that pays; mutable in its progress only.
 
     Attributes:
-        source, names: as in `library`.
-        done: True if it is in a cache or has failed.
-        failed: True if no compiler or cache can be used, or the compiler rejected it.
+        write: () -> source.
+        names: that the library defines.
+        instructions: of the Function, to estimate its cost.
+        source: written for a library that is compiled or about to be loaded.
+        hopeless: True if no compiler or cache can be used, or the compiler rejected it.
     """
 
-    source: str
+    write: Callable[[], str]
     names: tuple[str, ...]
-    done: bool = False
-    failed: bool = False
+    instructions: int
+    source: str = ""
+    hopeless: bool = False
+    _looked: bool = False
+    _queued: bool = False
     _process: subprocess.Popen[bytes] | None = None
     _file: tuple[Cache, str, Path] | None = None
     _limit: float = 0.0
 
-    def look(self) -> None:
-        """Start the compiler, or store its result if it has finished."""
-        if self.done:
-            return
+    def pays(self, expected: float) -> bool:
+        """Return True if the library is to be loaded now.
+
+        The cache is searched if that is expected to save time, and the library is compiled if that
+        is, in the background if possible; loading runs the compiler only where no background
+        compiler can run.
+
+        Args:
+            expected: time [s] that compiled code is expected to save.
+        """
+        look_up = 2e-3 + 1e-5 * self.instructions
+        compiling = 0.1 + 1.5e-4 * self.instructions
+        if self.hopeless or expected < 2 * look_up:
+            return False
+        if self._queued and os.getpid() == _OWNER:
+            _advance()
+            return self not in _queue and not self.hopeless
+        if find_compiler() is None:
+            return False
+        if not self._looked:
+            self._looked, source = True, self.write()
+            if compiled_before(source) is not None:
+                self.source = source
+                return True
+        if expected < compiling / 2:
+            return False
+        if not possible():
+            return expected > 2 * compiling
+        self.source, self._queued = self.write(), True
+        _queue.append(self)
+        _advance()
+        return False
+
+    def written(self) -> str:
+        """Return the source, for loading, and release it."""
+        source, self.source = self.source or self.write(), ""
+        return source
+
+    def finished(self) -> bool:
+        """Start the compiler, or store its result; return True if that is done or has failed."""
         try:
             if self._process is None or self._file is None:
                 self._start()
-                return
+                return False
             status = self._process.poll()
             if status is None and perf_counter() < self._limit:
-                return
+                return False
             if status != 0:
                 raise CompileError(f"compile: status {status}")
             place, key, path = self._file
@@ -80,9 +155,9 @@ class Making:
             place.keep(key, path)
             place.evict()
         except (ProgramError, OSError):
-            self.failed = True
-        self.done = True
+            self.hopeless = True
         self.stop()
+        return True
 
     def _start(self) -> None:
         """Start the compiler at low priority, in the first cache that can be written.
@@ -114,107 +189,3 @@ class Making:
         if self._file is not None:
             with suppress(OSError):
                 self._file[2].unlink()
-
-
-def possible() -> bool:
-    """Return True if a background compiler may run and will be stopped at exit."""
-    return processors() > 1 and os.getpid() == _OWNER
-
-
-def make(source: str, *names: str) -> Making:
-    """Queue a library for compilation."""
-    making = Making(source, names)
-    _queue.append(making)
-    _advance()
-    return making
-
-
-def _advance() -> None:
-    """Poll the first library of the queue, and the next one if it is done."""
-    while _queue and os.getpid() == _OWNER:
-        _queue[0].look()
-        if not _queue[0].done:
-            return
-        del _queue[0]
-
-
-def wait() -> None:
-    """Wait until the queue is empty: for measurements and tests."""
-    while _queue and os.getpid() == _OWNER:
-        _advance()
-        sleep(1e-3)
-
-
-@atexit.register
-def _close() -> None:
-    if _queue and os.getpid() == _OWNER:
-        _queue[0].look()
-        _queue[0].stop()
-    _queue.clear()
-
-
-def processors() -> int:
-    """Return the number of processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-@final
-@dataclass(eq=False)
-class Prospect:
-    """Decision when compiled code is worth its compile time; mutable in its findings.
-
-    Attributes:
-        write: () -> source.
-        names: that the library defines.
-        instructions: of the Function, to estimate its cost.
-        source: written for a library that is about to be loaded.
-        hopeless: True if compiling failed.
-    """
-
-    write: Callable[[], str]
-    names: tuple[str, ...]
-    instructions: int
-    source: str = ""
-    hopeless: bool = False
-    _looked: bool = False
-    _making: Making | None = None
-
-    def pays(self, expected: float) -> bool:
-        """Return True if the library is to be loaded now.
-
-        The cache is searched if that is expected to save time, and the library is compiled if that
-        is, in the background if possible; loading runs the compiler only where no background
-        compiler can run.
-
-        Args:
-            expected: time [s] that compiled code is expected to save.
-        """
-        look_up = 2e-3 + 1e-5 * self.instructions
-        compiling = 0.1 + 1.5e-4 * self.instructions
-        if self.hopeless or expected < 2 * look_up:
-            return False
-        if self._making is not None and os.getpid() == _OWNER:
-            _advance()
-            self.hopeless = self._making.failed
-            return self._making.done and not self.hopeless
-        if find_compiler() is None:
-            return False
-        if not self._looked:
-            self._looked, source = True, self.write()
-            if compiled_before(source) is not None:
-                self.source = source
-                return True
-        if expected < compiling / 2:
-            return False
-        if not possible():
-            return expected > 2 * compiling
-        self.source = self.write()
-        self._making = make(self.source, *self.names)
-        return False
-
-    def written(self) -> str:
-        """Return the source, for loading, and release it."""
-        source, self.source = self.source or self.write(), ""
-        return source

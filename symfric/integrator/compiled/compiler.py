@@ -15,8 +15,8 @@ import sys
 import tempfile
 import time
 import weakref
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -82,22 +82,12 @@ class Cache:
             return None
         return next((self.folder / n for n in names if _whole(self.folder / n)), None)
 
-    @contextmanager
-    def new(self, key: str) -> Generator[Path]:
-        """Yield a temporary file in the folder that is kept under `key` if the block succeeds.
+    def begin(self, key: str) -> Path:
+        """Create an empty temporary file in the folder.
 
         Raises:
             OSError: the folder cannot be created or written, or belongs to another user.
         """
-        temporary = self.begin(key)
-        try:
-            yield temporary
-            self.keep(key, temporary)
-        finally:
-            temporary.unlink(missing_ok=True)
-
-    def begin(self, key: str) -> Path:
-        """Create an empty temporary file in the folder; raises as `new` does."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = self.folder.stat()
         if not trusted(found) and hasattr(os, "getuid") and found.st_uid == os.getuid():
@@ -218,13 +208,17 @@ def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
         try:
             path = place.find(key)
             if path is None:
-                with place.new(key) as temporary:
+                temporary = place.begin(key)
+                try:
                     arguments, variables = call_of(compiler, flags, temporary)
-                    try:
-                        compiler.run(*arguments, code=source, variables=variables)
-                    except CompileError as error:
-                        raise CompileError(f"compile: {first_error(str(error))}") from None
+                    compiler.run(*arguments, code=source, variables=variables)
                     opened(temporary, names)  # do not keep an unusable library
+                    place.keep(key, temporary)
+                except CompileError as error:
+                    reason = first_error(str(error).removeprefix("compile: "))
+                    raise CompileError(f"compile: {reason}") from None
+                finally:
+                    temporary.unlink(missing_ok=True)
                 place.evict()
                 path = place.find(key)
             if path is None:

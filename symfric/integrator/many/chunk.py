@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from hashlib import sha256
-from typing import Any, Protocol, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -81,19 +81,6 @@ class Solved:
         return np.nan_to_num(np.abs(self.reach).max(axis=1))
 
 
-class Task(Protocol):
-    """Common part of all chunks of an ensemble; picklable, unless it needs a device."""
-
-    @property
-    def program(self) -> Program:
-        """Equations that the results depend on."""
-        ...
-
-    def solve(self, chunk: Chunk) -> Solved:
-        """Integrate the members of a chunk."""
-        ...
-
-
 def digest(*parts: Any) -> str:
     """Return a hash of plain data, Functions and data classes; arrays count with every digit."""
     total = sha256()
@@ -116,7 +103,7 @@ def digest(*parts: Any) -> str:
 @final
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Task of a model without events.
+    """Task of a model without events; picklable.
 
     Attributes:
         program: the equations.
@@ -241,7 +228,7 @@ def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integra
 @final
 @dataclass(frozen=True, eq=False)
 class EventJob:
-    """Task of a model with events, whose members run one by one like `simulate`.
+    """Task of a model with events, whose members run one by one like `simulate`; picklable.
 
     Another process builds its own integrator, with the same pivots.
 

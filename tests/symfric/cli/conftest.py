@@ -40,7 +40,7 @@ number = 3
 
 
 class Said(NamedTuple):
-    """What a command printed."""
+    """Output of a command."""
 
     out: str
     err: str

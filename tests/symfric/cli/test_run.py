@@ -11,7 +11,7 @@ from robots import SMALL
 from symfric import Linear, LuGre, drive, parameters, rabinowicz, simulate
 from symfric.cli.machines import input_from_text
 from symfric.results import animation
-from symfric.scenes import ALL_SCENES, Robot
+from symfric.scenes import Robot
 
 PNG = b"\x89PNG\r\n\x1a\n"
 RABINOWICZ = "run rabinowicz --law lugre --t-end 2"
@@ -65,11 +65,6 @@ def test_parameters_and_inputs_are_named_in_the_json(symfric) -> None:
     assert found["final"]["v"] == pytest.approx(2.75)
 
 
-def test_a_peer_runs_instead_of_our_integrator(symfric) -> None:
-    line = "run rabinowicz --law viscous --t-end 0.1 --peer sundials"
-    assert "casadi cvodes" in symfric(line).out
-
-
 def test_files_and_the_table(symfric) -> None:
     said = symfric(f"{RABINOWICZ} --samples 11 --out x.csv --plot x.png --json x.json")
     assert said.err == "wrote x.csv, x.png, x.json\n"
@@ -81,14 +76,6 @@ def test_files_and_the_table(symfric) -> None:
     assert header[:3] == ["t [s]", "x [m]", "v [m/s]"]
     assert "friction [N]" in header
     np.testing.assert_allclose([float(row[0]) for row in rows], np.arange(11) / 5, atol=1e-15)
-
-
-def test_several_laws_share_the_parameters_they_have_and_one_picture(symfric) -> None:
-    laws = "--law lugre --law brown_mcphee --set v_t=2e-3 --set mu_s=0.2"
-    out = symfric(f"run rabinowicz {laws} --t-end 2 --plot x.png").out
-    assert "rabinowicz with lugre" in out
-    assert "rabinowicz with brown_mcphee" in out
-    assert Path("x.png").read_bytes().startswith(PNG)
 
 
 def test_a_failed_solve_has_status_1_and_keeps_the_results_so_far(symfric) -> None:
@@ -104,18 +91,6 @@ def test_a_failed_solve_has_status_1_and_keeps_the_results_so_far(symfric) -> No
     assert result["status"] != "SUCCESS"
     assert 1.0 <= result["t_end"] < 2.0
     assert Path("x.csv").read_text().startswith("t [s],x [m]")
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] if name in ("arm", "four_bar") else [])
-        for name in ALL_SCENES
-    ],
-)
-def test_every_scene_runs_with_its_defaults(scene: str, symfric) -> None:
-    end = min(1.0, ALL_SCENES[scene].t_end)
-    symfric(f"run {scene} --law coulomb+viscous --backend vm --t-end {end}")
 
 
 def test_warnings_of_a_law_concern_numbers_that_were_changed(symfric) -> None:

@@ -17,13 +17,13 @@ FAST = "--no-fixed-steps --workers 1 --accuracy 0.02"
 def test_a_scene_with_parameters_gives_table_and_files(symfric) -> None:
     laws = "--law stribeck --law coulomb --set mu_s=0.2 --set m=1 --set stribeck.delta=1"
     files = "--json c.json --html c.html --csv c.csv"
-    out = symfric(f"select rabinowicz {laws} --t-end 8 {FAST} {files}").out
+    out = symfric(f"select rabinowicz {laws} --t-end 5 {FAST} {files}").out
     assert "mu_s = 0.2, mu_d = 0.1" in out
     assert "Simulation: take stribeck" in out
     assert json.loads(Path("c.json").read_text(encoding="utf-8"))["best"] == "stribeck"
     assert Path("c.html").stat().st_size > 10_000
     assert Path("c.csv").read_text(encoding="utf-8").startswith("law,")
-    line = f"select rabinowicz --law coulomb --need '' --t-end 8 {FAST}"
+    line = f"select rabinowicz --law coulomb --need '' --t-end 5 {FAST}"
     assert "coulomb comes nearest" in symfric(line, 1).err
 
 

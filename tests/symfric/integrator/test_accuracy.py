@@ -6,14 +6,11 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from backends import needs_compiler
 from numpy.typing import NDArray
 from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
-from symfric.integrator import simulate_by_peer
-from symfric.integrator.by_peer import PEERS
 
 Array = NDArray[np.float64]
 SPAN = 20.0
@@ -35,21 +32,15 @@ def deviation(x: Array, expected: Array) -> float:
     return float(np.abs(x - expected).max() / np.abs(expected).max())
 
 
-TOLERANCES = [10.0**-k for k in range(5, 12)]
-
-
-@each_law
-@pytest.mark.parametrize("rtol", TOLERANCES)
-def test_requested_tolerance_is_met_within_a_factor_of_ten(name: str, rtol: float) -> None:
-    """Though the error accumulates over three cycles: measured factors are 0.2 to 6."""
-    assert deviation(simulate(MODELS[name], SPAN, rtol=rtol)["x"], reference(name)) < 10 * rtol
-
-
 @each_law
 @pytest.mark.parametrize("method", ["rodas5p", "rodas4p"])
-def test_error_falls_with_the_tolerance(name: str, method: str) -> None:
-    runs = [simulate(MODELS[name], SPAN, rtol=r, method=method) for r in TOLERANCES[:-1]]
+def test_errors_are_those_requested_and_fall_with_the_tolerance(name: str, method: str) -> None:
+    """Though they accumulate over three cycles: measured factors are 0.2 to 6 for rodas5p."""
+    tolerances = [1e-5, 1e-7, 1e-9, *([1e-11] if method == "rodas5p" else [])]
+    runs = [simulate(MODELS[name], SPAN, rtol=r, method=method) for r in tolerances]
     errors = [deviation(run["x"], reference(name)) for run in runs]
+    if method == "rodas5p":
+        assert (np.array(errors) < 10 * np.array(tolerances)).all()
     assert all(tighter < looser for looser, tighter in pairwise(errors))
     steps = [run.statistics.steps for run in runs]
     assert all(tighter > looser for looser, tighter in pairwise(steps))
@@ -78,27 +69,6 @@ def test_solution_is_that_of_scipy(name: str, rates: object, start: list[float])
     assert deviation(ours["v"], scipy[1]) < 1e-8
 
 
-@each_law
-@pytest.mark.parametrize(
-    ("backend", "rtol", "bound"),
-    [
-        ("vm", 1e-8, 1e-7),
-        pytest.param("compiled", 1e-8, 1e-7, marks=needs_compiler),
-        ("rosenbrock", 1e-8, 2e-5),
-        ("sundials", 1e-8, 5e-5),
-        ("rosenbrock", 1e-10, 1e-6),
-        ("sundials", 1e-10, 1e-6),
-    ],
-)
-def test_backends_agree(name: str, backend: str, rtol: float, bound: float) -> None:
-    """CasADi's own integrators accumulate more error at the same tolerance."""
-    if backend in PEERS:
-        run = simulate_by_peer(MODELS[name], SPAN, backend, rtol=rtol)
-    else:
-        run = simulate(MODELS[name], SPAN, rtol=rtol, backend=backend)
-    assert deviation(run["x"], reference(name)) < bound
-
-
 def worst_break_away(model: Model, velocities: Array, span: float = SPAN, **run: object) -> float:
     """Largest position error over runs from several start velocities."""
     worst = 0.0
@@ -112,28 +82,23 @@ def worst_break_away(model: Model, velocities: Array, span: float = SPAN, **run:
 
 @each_law
 @pytest.mark.parametrize("rtol", [1e-6, 1e-5])
-@pytest.mark.parametrize("method", ["rodas5p", "rodas4p"])
-def test_no_break_away_is_missed(name: str, rtol: float, method: str) -> None:
+@pytest.mark.parametrize(
+    ("method", "count"),
+    [
+        ("rodas5p", 8),
+        *(pytest.param(m, 200, marks=pytest.mark.slow) for m in ("rodas5p", "rodas4p", "rodas3")),
+    ],
+)
+def test_no_break_away_is_missed(name: str, rtol: float, method: str, count: int) -> None:
     """A slip missed or mistimed shows as an error of 2 % and more; there is none of 0.1 %."""
-    velocities = np.linspace(-0.1, 0.1, 24)
-    assert worst_break_away(MODELS[name], velocities, rtol=rtol, method=method) < 1e-3
-
-
-@pytest.mark.slow
-@each_law
-@pytest.mark.parametrize("rtol", [1e-6, 1e-5])
-@pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
-def test_no_break_away_is_missed_from_200_start_velocities(
-    name: str, rtol: float, method: str
-) -> None:
-    velocities = np.linspace(-0.1, 0.1, 200)
+    velocities = np.linspace(-0.1, 0.1, count)
     assert worst_break_away(MODELS[name], velocities, rtol=rtol, method=method) < 1e-3
 
 
 @each_law
 def test_no_break_away_is_missed_at_a_loose_tolerance(name: str) -> None:
-    """Where nearly every other integrator loses whole slips."""
-    velocities = np.linspace(-0.1, 0.1, 12)
+    """Nearly every other integrator loses whole slips there."""
+    velocities = np.linspace(-0.1, 0.1, 6)
     with pytest.warns(UserWarning, match="stick phases may be lost"):
         assert worst_break_away(MODELS[name], velocities, rtol=1e-4) < 0.02
 
@@ -161,41 +126,7 @@ def test_bristle_under_slowly_growing_load_breaks_away(case: int, rtol: float) -
     assert worst_break_away(model, start, span=60.0, rtol=rtol) < 2e-3
 
 
-RANDOM = 60
-"""Random machines of a sweep."""
-
-
-def random_machine(rng: np.random.Generator, name: str) -> tuple[dict[str, float], float]:
-    """Parameters over decades, and a span of a few cycles."""
-
-    def over(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-    p = {"m": over(0.1, 10), "k": over(0.5, 50), "v_belt": over(0.01, 0.5), "mu_d": over(0.05, 0.5)}
-    p["mu_s"] = p["mu_d"] * rng.uniform(1.05, 2)
-    if name == "brown_mcphee":
-        p["v_t"] = over(1e-5, 1e-2)
-    else:
-        p |= {"v_s": over(1e-4, 1e-2), "sigma_0": over(1e4, 1e7)}
-        p["sigma_1"] = 2 * np.sqrt(p["sigma_0"] * p["m"]) * rng.uniform(0.2, 1.2)
-    stick = 2 * (p["mu_s"] - p["mu_d"]) * p["m"] * 9.81 / p["k"] / p["v_belt"]
-    return p, min(3 * stick + 5, 60.0)
-
-
-@pytest.mark.slow
-@each_law
-@pytest.mark.parametrize("seed", range(8))
-def test_no_break_away_is_missed_by_random_machines(name: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    for _ in range(RANDOM):
-        p, span = random_machine(rng, name)
-        law = BrownMcPhee() if name == "brown_mcphee" else LuGre(v_eps=0.0)
-        model = rabinowicz(law, free=(), **p)
-        start = rng.uniform(-0.1, 0.1, 1)
-        assert worst_break_away(model, start, span=span, rtol=1e-5, backend="vm") < 0.02, p
-
-
-@pytest.mark.parametrize("v_t", [1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("v_t", [1e-4, 1e-6])
 def test_transition_velocity_may_be_tiny(v_t: float) -> None:
     """The steps hardly grow in number, and the limit is the stick-slip of Coulomb's law."""
     model = rabinowicz(BrownMcPhee(v_t=v_t))
@@ -204,8 +135,7 @@ def test_transition_velocity_may_be_tiny(v_t: float) -> None:
     assert run.statistics.steps < 700
 
 
-@pytest.mark.parametrize("v_eps", [0.0, 1e-9])
-@pytest.mark.parametrize("sigma_0", [1e5, 1e6, 1e7, 1e8])
+@pytest.mark.parametrize(("sigma_0", "v_eps"), [(1e5, 0.0), (1e8, 0.0), (1e8, 1e-9)])
 def test_bristles_may_be_stiff(sigma_0: float, v_eps: float) -> None:
     """With the kink of |v| at zero, too."""
     law = LuGre(sigma_0=sigma_0, sigma_1=0.7 * 2 * np.sqrt(0.8 * sigma_0), v_eps=v_eps)

@@ -1,4 +1,4 @@
-"""Arguments that simulations have in common, and which method "auto" is."""
+"""Arguments that simulations have in common, checked once for a model; the method "auto"."""
 
 import warnings
 
@@ -16,8 +16,9 @@ from symfric import (
     simulate_many,
 )
 from symfric.integrator import simulate_by_peer
-from symfric.integrator.arguments import LOOSE, check_span, check_times, chosen
-from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RADAU5, RODAS5P
+from symfric.integrator.arguments import LOOSE, check_span, chosen
+from symfric.integrator.methods.tableaux import RADAU5, RODAS5P
+from symfric.integrator.simulate import REMEMBERED
 
 MODEL = drive(Viscous())
 
@@ -30,68 +31,40 @@ def test_tolerance_is_that_of_the_events_at_most_and_then_no_loose_one() -> None
     assert check_span("here", MODEL, 0.0, 1.0, 1e-6)[2] == 1e-6
 
 
-def test_good_arguments_pass_without_a_word() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_span("here", MODEL, 0.0, 1.0, 1e-5)
-    np.testing.assert_array_equal(check_times("here", 0.0, 1.0, [0, 1]), [0.0, 1.0])
-
-
-@pytest.mark.parametrize(
-    ("t_start", "t_end", "rtol", "message"),
-    [
-        (1.0, 1.0, 1e-6, "here: expected t_end > t_start = 1 s, got 1 s"),
-        (np.nan, 1.0, 1e-6, "here: t_start: expected a finite number \\[s\\], got nan"),
-        (0.0, np.inf, 1e-6, "here: t_end: expected a finite number \\[s\\], got inf"),
-        (0.0, 1.0, 1e-14, "here: rtol: expected 1e-13 <= number <= 0.1, got 1e-14"),
-        (0.0, 1.0, np.nan, "here: rtol: expected 1e-13 <= number <= 0.1, got nan"),
-    ],
-)
-def test_empty_span_and_odd_tolerance_are_refused(
-    t_start: float, t_end: float, rtol: float, message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        check_span("here", MODEL, t_start, t_end, rtol)
-
-
-@pytest.mark.parametrize("t_eval", [[], [[0.0]], [0.5, 0.5], [-0.1], [1.1], [np.nan], 0.5])
-def test_times_that_are_no_increasing_row_in_the_span_are_refused(t_eval: object) -> None:
-    with pytest.raises(
-        ValueError, match=r"here: t_eval: expected (increasing times in .0, 1. s|finite)"
-    ):
-        check_times("here", 0.0, 1.0, t_eval)  # pyright: ignore[reportArgumentType]
-
-
-def test_loose_tolerance_warns_with_its_place() -> None:
-    with pytest.warns(UserWarning, match="here: rtol = 0.001 is above 1e-05; whole stick phases"):
-        check_span("here", MODEL, 0.0, 1.0, 1e-3)
-
-
-@pytest.mark.parametrize("name", ADAPTIVE)
-def test_every_adaptive_method_is_chosen_by_its_name(name: str) -> None:
-    assert chosen("here", name, 1e-6) is METHODS[name]
-
-
-@pytest.mark.parametrize(
-    ("rtol", "method"), [(1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)]
-)
-def test_automatic_choice_takes_the_careful_method_at_loose_tolerances(
-    rtol: float, method: object
-) -> None:
-    assert chosen("here", "auto", rtol) is method
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
+def test_methods_by_name_and_by_tolerance() -> None:
+    for rtol, method in ((1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)):
+        assert chosen("here", "auto", rtol) is method
+    for name, message in (
         ("rodas5", "here: method: expected one of auto, rodas5p.* did you mean rodas5p"),
         ("backward_euler", "here: method: expected one with error control.* which has fixed steps"),
-        ("exponential", "use it with flow or in the C of plants"),
-    ],
-)
-def test_what_cannot_control_its_error_is_refused(name: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        chosen("here", name, 1e-6)
+    ):
+        with pytest.raises(ValueError, match=message):
+            chosen("here", name, 1e-6)
+
+
+def test_settings_are_checked_once_and_true_is_no_time() -> None:
+    """Equal numbers of another type are other settings."""
+    model = drive(Viscous())
+    first = simulate(model, 1.0, samples=5)
+    again = simulate(model, 1.0, samples=5)
+    assert again.t.tolist() == first.t.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
+    again.t[:] = 0.0
+    assert simulate(model, 1.0, samples=5).t[-1] == 1.0
+    assert len(model.memory["settings"]) == 1
+    with pytest.raises(ValueError, match="t_end"):
+        simulate(model, True, samples=5)
+    assert simulate(model, np.array(1.0), samples=5).t[-1] == 1.0
+    for k in range(REMEMBERED + 4):
+        simulate(model, 0.01 * (k + 1), samples=5)
+    assert len(model.memory["settings"]) == REMEMBERED
+
+
+def test_every_loose_call_is_warned_of_where_it_is_made() -> None:
+    assert simulate(MODEL, 0.1, rtol=LOOSE, samples=5).status.ok
+    for call in (simulate, simulate, simulate_by_peer):
+        with pytest.warns(UserWarning, match="rtol = 0.001 is above 1e-05; whole stick") as seen:
+            call(MODEL, 0.1, rtol=1e-3, samples=5)
+        assert [w.filename for w in seen] == [__file__]
 
 
 def test_numbers_that_would_change_results_silently_are_refused_by_every_door() -> None:

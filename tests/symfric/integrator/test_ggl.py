@@ -45,8 +45,9 @@ def error(of: Trajectory, scene: str) -> float:
     return max(np.abs(of[n] - truth[n]).max() / np.abs(truth[n]).max() for n in names)
 
 
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@pytest.mark.parametrize(
+    ("scene", "formulation"), [("slider_crank", "joint"), ("pendulum", "absolute")]
+)
 @pytest.mark.parametrize(
     ("peer", "loose", "tight"),
     [("rosenbrock", 2e-4, 1e-7), ("sundials", 2e-2, 1e-5), ("ggl", 5e-2, 4e-5)],
@@ -67,11 +68,10 @@ def test_all_formulations_go_to_the_same_motion(
     assert near < far / 50
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
-def test_drift_of_the_constraints_shows_in_the_results(formulation: str) -> None:
+def test_drift_of_the_constraints_shows_in_the_results() -> None:
     """Largest norms over a run at rtol 1e-6: index 1, index 2, and ours."""
     phi = {
-        b: run("slider_crank", formulation, b, 1e-6)["constraint_position"].max()
+        b: run("slider_crank", "joint", b, 1e-6)["constraint_position"].max()
         for b in ("sundials", "ggl", "ours")
     }
     assert phi["sundials"] > 1e-7

@@ -65,7 +65,7 @@ def slips(machine: Machine, rtol: float, method: str = "auto") -> tuple[Array, f
 
 
 def lost(machine: Machine, rtol: float) -> bool:
-    """Whether a slip of the reference is missing, or one too many is there."""
+    """Return True if a slip of the reference is missing, or an extra one is there."""
     expected, near = slips(machine, 1e-10, "rodas4p")
     found, _ = slips(machine, rtol)
     before = machine.t_end - near  # the last one may begin beyond the end

@@ -1,6 +1,5 @@
-"""All adaptive methods through `simulate`, `simulate_many` and their derivatives."""
+"""Adaptive methods through `simulate`, `simulate_many` and derivatives."""
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -10,8 +9,6 @@ from symfric import (
     LuGre,
     Model,
     Variable,
-    drive,
-    flow,
     rabinowicz,
     simulate,
     simulate_many,
@@ -61,16 +58,6 @@ def test_derivatives_are_those_of_the_closed_form(method: str) -> None:
     assert found["x0.x"]["x"] == pytest.approx(x**3 / 8, abs=1e-7)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_flow_and_its_derivative(method: str) -> None:
-    k = ca.MX.sym("k")
-    xf = flow(decay(), steps=400, method=method)(x0=2.0, p=k, T=1.0)["xf"]
-    value, slope = ca.Function("both", [k], [xf, ca.jacobian(xf, k)])(0.7)
-    within = 1e-7 if METHODS[method].order > 1 else 5e-3
-    assert float(value) == pytest.approx(2 / np.sqrt(6.6), rel=within)
-    assert float(slope) == pytest.approx(-8 / 6.6**1.5, rel=within)
-
-
 @each_method
 @pytest.mark.parametrize("backend", ["vm", "compiled"])
 def test_ensemble_members_are_single_runs(method: str, backend: str) -> None:
@@ -95,13 +82,6 @@ def test_event_is_found_where_it_is(method: str) -> None:
 
 
 @each_method
-def test_held_input_restarts_every_method(method: str) -> None:
-    model = drive(BrownMcPhee(), m=2.0, N=0.0)
-    run = simulate(model, 3.0, u={"force": 3.0}, rtol=1e-8, method=method)
-    assert run.final["x"] == pytest.approx(0.5 * 1.5 * 9.0, rel=1e-7)
-
-
-@each_method
 def test_algebraic_unknowns_are_solved_or_refused(method: str) -> None:
     x, z = Variable("x", "1", start=1.0), Variable("z", "1")
     model = Model("dae", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol - 2 * x.symbol)
@@ -111,13 +91,6 @@ def test_algebraic_unknowns_are_solved_or_refused(method: str) -> None:
         return
     run = simulate(model, 1.0, rtol=1e-9, method=method)
     assert run.final["z"] == pytest.approx(2 * np.exp(-2), rel=1e-7)
-
-
-@pytest.mark.parametrize("call", [simulate, simulate_many])
-@pytest.mark.parametrize("method", [m for m in METHODS if m not in ADAPTIVE])
-def test_method_of_fixed_steps_is_refused(call: object, method: str) -> None:
-    with pytest.raises(ValueError, match="expected one with error control"):
-        call(decay(), 1.0, method=method)  # pyright: ignore[reportCallIssue]
 
 
 @each_method

@@ -1,9 +1,6 @@
 """Simulation as a user sees it: named signals, inputs, files, errors, against closed forms."""
 
-import csv
-import json
 from math import exp
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -12,7 +9,6 @@ import pytest
 from oracles import viscous_ramp, viscous_sine
 
 from symfric import (
-    BrownMcPhee,
     Hold,
     Linear,
     LuGre,
@@ -57,29 +53,12 @@ def test_signals_have_names_units_and_the_length_of_time(run: Trajectory) -> Non
     assert run.scene == "rabinowicz"
     assert run.t == pytest.approx(np.linspace(0, 1, 11))
     assert list(run.signals) == ["x", "v", "z", "v_rel", "friction", "power"]
-    assert run.units == {
-        "x": "m",
-        "v": "m/s",
-        "z": "m",
-        "v_rel": "m/s",
-        "friction": "N",
-        "power": "W",
-    }
+    assert [*run.units.values()] == ["m", "m/s", "m", "m/s", "N", "W"]
     assert all(signal.shape == (11,) for signal in run.signals.values())
     np.testing.assert_array_equal(run["v"], run.signals["v"])
     np.testing.assert_array_equal(run["t"], run.t)
-
-
-def test_success_is_said_and_counted(run: Trajectory) -> None:
-    assert run.status is Status.SUCCESS
-    assert run.message == Status.SUCCESS.value
-    assert run.statistics.steps > 10
-    assert run.statistics.evaluations >= run.statistics.steps
-    assert run.statistics.to_dict()["steps"] == run.statistics.steps
-
-
-def test_final_values_are_the_last_ones(run: Trajectory) -> None:
-    assert run.final == pytest.approx({n: s[-1] for n, s in run.signals.items()})
+    assert (run.status, run.message) == (Status.SUCCESS, Status.SUCCESS.value)
+    assert run.statistics.evaluations >= run.statistics.steps > 10
 
 
 def test_dense_output_meets_the_samples_and_is_accurate_between_them() -> None:
@@ -90,12 +69,6 @@ def test_dense_output_meets_the_samples_and_is_accurate_between_them() -> None:
     assert run.at(t)["v"] == pytest.approx(exact, abs=1e-6)
     assert run.at(0.5)["v"].shape == (1,)
     assert set(run.at(0.5)) == set(run.signals)
-
-
-def test_times_asked_for_do_not_change_the_steps() -> None:
-    few, many = (simulate(rabinowicz(LuGre()), 5.0, samples=n) for n in (2, 5001))
-    assert few.statistics.steps == many.statistics.steps
-    assert few.final["x"] == pytest.approx(many.final["x"], rel=1e-9)
 
 
 @pytest.mark.parametrize("backend", ["vm", "compiled"])
@@ -113,13 +86,6 @@ def test_no_step_is_longer_than_allowed_and_one_ends_at_each_time(backend: str) 
 def test_a_longest_step_shorter_than_the_first_one_holds_from_the_start() -> None:
     run = simulate(cart(), 1e-9, max_step=1e-18, times=[1e-17], max_steps=100, throw=False)
     assert np.diff(run.step_times).max() <= 1.01e-18
-
-
-def test_times_of_the_result_may_be_given() -> None:
-    times = [0.5, 0.7, 1.9]
-    run = simulate(cart(), 2.0, u={"force": 3.0}, t_eval=times, rtol=1e-8)
-    assert run.t.tolist() == times
-    assert run["v"] == pytest.approx([viscous_ramp(t, M, C, 0, 3.0, 0) for t in times], rel=1e-6)
 
 
 @each_runner
@@ -159,10 +125,6 @@ def test_linear_input_bends_at_its_samples_and_holds_beyond(runner: str) -> None
     v.append(viscous_ramp(0.5, M, C, v[-1], -1.0, 0.0))
     assert run["v"] == pytest.approx(v, abs=1e-7)
     assert run["force"] == pytest.approx([2.0, -1.0, -1.0])
-
-
-def test_input_that_is_not_given_keeps_its_start_value() -> None:
-    assert simulate(cart(), 1.0).final["v"] == 0.0
 
 
 def test_start_time_shifts_a_function_of_time() -> None:
@@ -220,25 +182,6 @@ def test_outputs_may_depend_on_everything(runner: str) -> None:
     assert run["out"] == pytest.approx([3210.0, 3210.5])
 
 
-@pytest.mark.parametrize("rtol", [1e-4, 1.1e-5])
-def test_loose_tolerance_warns(rtol: float) -> None:
-    with pytest.warns(UserWarning, match=f"rtol = {rtol:g} is above 1e-05; whole stick phases"):
-        simulate(cart(), 0.1, rtol=rtol)
-
-
-@pytest.mark.parametrize("rtol", [1e-5, 1e-6])
-def test_tight_tolerance_does_not_warn(rtol: float) -> None:
-    assert simulate(cart(), 0.1, rtol=rtol).status.ok
-
-
-@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
-@each_runner
-def test_error_follows_the_tolerance(runner: str, rtol: float) -> None:
-    run = by(runner, cart(), 2.0, u={"force": lambda t: ca.sin(9 * t)}, rtol=rtol)
-    exact = np.array([viscous_sine(t, M, C, 1.0, 9.0) for t in run.t])
-    assert np.abs(run["v"] - exact).max() < 20 * rtol
-
-
 def blow_up() -> Model:
     """x' = x^2 from 1, infinite at t = 1."""
     return Model("blow_up", x=(x,), ode=x.symbol**2)
@@ -256,6 +199,8 @@ def test_failed_solve_says_where_and_keeps_what_there_is(runner: str) -> None:
     assert 0.9 < partial.t[-1] <= 1.0
     early = partial.t < 0.9
     assert partial["x"][early] == pytest.approx(1 / (1 - partial.t[early]), rel=1e-4)
+    returned = by(runner, blow_up(), 2.0, throw=False)
+    assert (returned.status, returned.message) == (error.status, str(error))
 
 
 def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -273,13 +218,6 @@ def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.M
     assert stopped.statistics.steps < whole.statistics.steps
     few = simulate(rabinowicz(LuGre()), 20.0, backend="vm", max_steps=60, throw=False)
     assert few.statistics.steps + few.statistics.rejections == 60
-
-
-def test_failed_solve_is_returned_where_nothing_is_to_be_thrown() -> None:
-    run = simulate(blow_up(), 2.0, throw=False)
-    assert not run.status.ok
-    assert run.message
-    assert run.final["x"] > 10
 
 
 @pytest.mark.parametrize(
@@ -315,40 +253,6 @@ def test_algebraic_equation_without_a_solution_is_reported() -> None:
     model = Model("none", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol**2 + 1)
     with pytest.raises((ValueError, SolveError), match=r"consistent|stopped at t = 0 s"):
         simulate(model, 1.0)
-
-
-def test_unknown_signal_and_time_outside_are_refused(run: Trajectory) -> None:
-    with pytest.raises(ValueError, match=r"trajectory of 'rabinowicz': .* got vrel; did you mean"):
-        run["vrel"]
-    with pytest.raises(ValueError, match=r"expected times in \[0, 1\] s, got 0.5 ... 1.5 s"):
-        run.at([0.5, 1.5])
-
-
-def test_table_has_units_in_its_header_and_every_digit(run: Trajectory, tmp_path: Path) -> None:
-    run.to_csv(tmp_path / "run.csv")
-    with (tmp_path / "run.csv").open(encoding="utf-8", newline="") as file:
-        header, *rows = csv.reader(file)
-    assert header[:4] == ["t [s]", "x [m]", "v [m/s]", "z [m]"]
-    assert header[-2:] == ["friction [N]", "power [W]"]
-    numbers = np.array(rows, dtype=float)
-    assert numbers.shape == (11, 7)
-    np.testing.assert_array_equal(numbers[:, 2], run["v"])
-
-
-def test_json_holds_everything_as_plain_data(run: Trajectory, tmp_path: Path) -> None:
-    run.to_json(tmp_path / "run.json")
-    data = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
-    assert (data["scene"], data["status"]) == ("rabinowicz", "SUCCESS")
-    assert data["units"]["t"] == "s"
-    assert data["units"]["v"] == "m/s"
-    assert data["t"] == run.t.tolist()
-    assert data["signals"]["v"] == run["v"].tolist()
-    assert data["statistics"]["steps"] == run.statistics.steps
-
-
-def test_run_is_the_same_each_time() -> None:
-    one, other = (simulate(rabinowicz(BrownMcPhee()), 3.0) for _ in range(2))
-    np.testing.assert_array_equal(one["x"], other["x"])
 
 
 def test_nominal_values_scale_the_absolute_tolerance() -> None:

@@ -1,9 +1,6 @@
-"""Runs in files and pickles: everything that a run answers, to the bit, in another process, too."""
+"""Runs in files and pickles: all results are equal to the bit."""
 
 import pickle
-import subprocess
-import sys
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import casadi as ca
@@ -13,14 +10,13 @@ from numpy.typing import NDArray
 
 from symfric.foundation import packed
 from symfric.foundation.parameters import Variable
-from symfric.foundation.status import SolveError, Status
-from symfric.integrator import Hold, load_run, simulate, simulate_by_peer, simulate_many
+from symfric.integrator import Hold, load_run, simulate, simulate_by_peer
 from symfric.integrator.running import run as running
 from symfric.integrator.stored import RUN
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Event, Model, Output
 from symfric.results.trajectory import Trajectory
-from symfric.scenes import FourBar, drive, rabinowicz
+from symfric.scenes import Pendulum, SliderCrank, drive, rabinowicz
 
 Array = NDArray[np.float64]
 
@@ -31,7 +27,7 @@ def through_file(run: Trajectory, folder: Path) -> Trajectory:
 
 
 def assert_same(one: Trajectory, other: Trajectory) -> None:
-    """All that can be asked is the same to the bit."""
+    """Signals, details, steps and statistics are equal to the bit."""
     times = np.linspace(*one.span, 137)
     for a, b in ((one.at(times), other.at(times)), (one.signals, other.signals)):
         assert list(a) == list(b)
@@ -49,7 +45,7 @@ def assert_same(one: Trajectory, other: Trajectory) -> None:
 
 
 def own_model() -> Model:
-    """With what no pickle takes: a function inside a function."""
+    """A model with a nested function, which pickle rejects."""
     x = Variable("x", "V", start=1.0)
     return Model(
         "own",
@@ -66,19 +62,19 @@ def implicit() -> Model:
 
 
 def runs() -> dict[str, Trajectory]:
-    bar = FourBar(LuGre(), pin=BrownMcPhee())
     push = {"force": Hold([0.0, 0.5], [1.0, 3.0])}
     pull = {"force": lambda t: 5 * ca.sin(3 * t)}  # pyright: ignore
     return {
-        "events": simulate(rabinowicz(ExactCoulomb()), 6.0, samples=101),
-        "loop": simulate(FourBar(BrownMcPhee()).model(), 0.3, samples=51),
-        "peer": simulate_by_peer(FourBar(BrownMcPhee()).model(), 0.1, samples=51),
-        "samples": simulate(drive(BrownMcPhee()), 1.0, u=push, samples=51),
-        "function": simulate(drive(BrownMcPhee()), 1.0, u=pull, samples=51),
-        "own": simulate(own_model(), 5.0, samples=51),
-        "implicit": simulate(implicit(), 1.0, samples=51),
-        "free": simulate(rabinowicz(LuGre(), free=["mu_s"]), 1.0, p={"mu_s": 0.2}, samples=51),
-        "jams": simulate(bar.model(), 0.3, samples=51, throw=False),
+        "events": simulate(rabinowicz(ExactCoulomb()), 6.0, samples=101, backend="vm"),
+        "peer": simulate_by_peer(SliderCrank(BrownMcPhee()).model(), 0.05, samples=51),
+        "samples": simulate(drive(BrownMcPhee()), 1.0, u=push, samples=51, backend="vm"),
+        "function": simulate(drive(BrownMcPhee()), 1.0, u=pull, samples=51, backend="vm"),
+        "own": simulate(own_model(), 5.0, samples=51, backend="vm"),
+        "implicit": simulate(implicit(), 1.0, samples=51, backend="vm"),
+        "free": simulate(
+            rabinowicz(LuGre(), free=["mu_s"]), 1.0, p={"mu_s": 0.2}, samples=51, backend="vm"
+        ),
+        "failed": simulate(rabinowicz(LuGre()), 6.0, max_steps=20, throw=False),
     }
 
 
@@ -88,7 +84,8 @@ def test_runs_come_back_to_the_bit_from_files_and_pickles(tmp_path: Path) -> Non
             loaded = through_file(run, tmp_path)
             assert_same(run, loaded)
             assert run.statistics.to_dict() == loaded.statistics.to_dict()
-            assert_same(loaded, through_file(loaded, tmp_path))
+            if name == "events":
+                assert_same(loaded, through_file(loaded, tmp_path))
             assert_same(run, pickle.loads(pickle.dumps(run)))
         except AssertionError as error:
             error.add_note(name)
@@ -96,7 +93,7 @@ def test_runs_come_back_to_the_bit_from_files_and_pickles(tmp_path: Path) -> Non
 
 
 def test_the_model_of_a_loaded_run_simulates_to_the_bit(tmp_path: Path) -> None:
-    run = simulate(FourBar(ExactCoulomb()).model(), 0.3, samples=51)
+    run = simulate(Pendulum(ExactCoulomb()).model(), 0.3, samples=51)
     loaded = through_file(run, tmp_path)
     assert_same(run, simulate(loaded.model, 0.3, samples=51))
     balance = loaded.energy_balance()
@@ -117,14 +114,6 @@ def test_a_run_of_many_steps_is_stored_whole(
     np.testing.assert_array_equal(loaded.at(times)["v"], whole.at(times)["v"])
 
 
-def test_a_failed_run_is_stored_as_far_as_it_got(tmp_path: Path) -> None:
-    with pytest.raises(SolveError) as error:
-        simulate(rabinowicz(LuGre()), 6.0, max_steps=20)
-    loaded = through_file(error.value.partial, tmp_path)
-    assert loaded.status is Status.MAX_STEPS
-    assert_same(error.value.partial, loaded)
-
-
 def test_derivatives_at_the_times_of_the_result_are_stored(tmp_path: Path) -> None:
     model = rabinowicz(LuGre(), free=["mu_s"])
     run = simulate(model, 1.0, sensitivities=["mu_s", "x0.v"], samples=21)
@@ -138,31 +127,25 @@ def test_derivatives_at_the_times_of_the_result_are_stored(tmp_path: Path) -> No
 
 
 def test_derivatives_between_the_times_of_the_result_are_found_again(tmp_path: Path) -> None:
-    between = np.linspace(0.0, 6.0, 97)
+    between = np.linspace(0.0, 2.0, 97)
     models = {
         "smooth": (rabinowicz(LuGre(), free=["mu_s"]), ["mu_s", "x0.v"]),
         "events": (rabinowicz(ExactCoulomb(), free=["mu_s"]), ["mu_s", "x0.v"]),
-        "loop": (FourBar(BrownMcPhee()).model(free=["mu_d"]), ["mu_d"]),
+        "mechanism": (Pendulum(BrownMcPhee()).model(free=["mu_d"]), ["mu_d"]),
     }
     for name, (model, wanted) in models.items():
-        end = 0.3 if name == "loop" else 6.0
-        run = simulate(model, end, sensitivities=wanted, samples=7)
-        ways = [through_file(run, tmp_path)]
-        if name != "loop":  # which takes long to build again, and a pickle holds the same
-            ways.append(pickle.loads(pickle.dumps(run)))
-        for loaded in ways:
-            assert run.differentiate is not None
-            assert loaded.differentiate is not None
-            one, other = (r.differentiate(between * end / 6) for r in (run, loaded))  # pyright: ignore
-            for seed, slopes in one.items():
-                for signal, values in slopes.items():
-                    found = other[seed][signal]
-                    np.testing.assert_array_equal(found, values, f"{name} {signal}")
-            twice = through_file(loaded, tmp_path)
-            assert twice.differentiate is not None
+        run = simulate(model, 2.0, sensitivities=wanted, samples=7, backend="vm")
+        pickled = name == "events"
+        loaded = pickle.loads(pickle.dumps(run)) if pickled else through_file(run, tmp_path)
+        assert run.differentiate is not None
+        one, other = (r.differentiate(between) for r in (run, loaded))
+        for seed, slopes in one.items():
+            for signal, values in slopes.items():
+                np.testing.assert_array_equal(other[seed][signal], values, f"{name} {signal}")
+        assert through_file(loaded, tmp_path).differentiate is not None
 
 
-def test_what_a_file_holds_is_not_computed_again(
+def test_stored_results_are_not_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = simulate(rabinowicz(LuGre(), free=["mu_s"]), 1.0, sensitivities=["mu_s"], samples=11)
@@ -177,8 +160,8 @@ def test_what_a_file_holds_is_not_computed_again(
     assert loaded.event_sensitivities["mu_s"].size == 0
 
 
-def test_a_motion_without_derivative_says_so_out_of_its_file(tmp_path: Path) -> None:
-    """An event where an input jumps: behind it the motion leads elsewhere in another order."""
+def test_a_stored_run_without_derivatives_reports_the_reason(tmp_path: Path) -> None:
+    """An event at a jump of an input: the motion after it depends on their order."""
     x, u = Variable("x", "m"), Variable("u", "m/s")
     done = Event("done", x.symbol - 1.0, terminal=True)
     model = Model("filled", x=(x,), u=(u,), ode=u.symbol, events=(done,))
@@ -194,23 +177,6 @@ def test_a_motion_without_derivative_says_so_out_of_its_file(tmp_path: Path) -> 
         assert told[0] == told[1]
 
 
-def test_an_interrupted_write_leaves_the_old_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
-    run.save(tmp_path / "run.npz")
-    before = (tmp_path / "run.npz").read_bytes()
-
-    def stopped(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(np, "savez", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        run.save(tmp_path / "run.npz")
-    assert (tmp_path / "run.npz").read_bytes() == before
-    assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
-
-
 def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:
     run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
     run.save(tmp_path / "run.npz")
@@ -223,14 +189,6 @@ def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:
         path.write_bytes(bad)
         with pytest.raises(ValueError, match=r"load_run '.*bad.npz': expected a file that symf"):
             load_run(path)
-    refused = 0
-    for k in range(40, len(good), 997):  # what is not refused is a time stamp or the like
-        path.write_bytes(good[:k] + bytes([good[k] ^ 255]) + good[k + 1 :])
-        try:
-            assert_same(run, load_run(path))
-        except ValueError:
-            refused += 1
-    assert refused > len(good) / 1100
     with pytest.raises(ValueError, match="expected a saved run, got no such file"):
         load_run(tmp_path / "none.npz")
     with pytest.raises(ValueError, match="expected a saved run, got a folder"):
@@ -239,61 +197,3 @@ def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:
         packed.dump(file, LuGre(), RUN.kind, RUN.number)
     with pytest.raises(ValueError, match="expected a saved run, got LuGre"):
         load_run(path)
-
-
-def test_a_file_of_another_version_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
-    monkeypatch.setattr("symfric.integrator.stored.RUN", replace(RUN, number=RUN.number + 1))
-    run.save(tmp_path / "run.npz")
-    monkeypatch.undo()
-    newer = (
-        f"expected format {RUN.number} or older, got {RUN.number + 1}; it was written by a newer"
-    )
-    with pytest.raises(ValueError, match=newer):
-        load_run(tmp_path / "run.npz")
-
-
-@dataclass(frozen=True, eq=False)
-class Mine(BrownMcPhee):  # pyright: ignore[reportGeneralTypeIssues]
-    """A law of a user."""
-
-
-def test_classes_of_a_user_are_handed_over(tmp_path: Path) -> None:
-    run = simulate(rabinowicz(Mine()), 1.0, samples=11)
-    with pytest.raises(ValueError, match=r"got Mine of .*load_run\(path, own=\[Mine\]\)"):
-        through_file(run, tmp_path)
-    assert_same(run, load_run(tmp_path / "run.npz", own=[Mine]))
-
-
-ELSEWHERE = """
-import pickle, sys
-from symfric import simulate
-model = pickle.loads(sys.stdin.buffer.read())
-run = simulate(model, 0.2, samples=51)
-sys.stdout.buffer.write(pickle.dumps((run, run.signals)))
-"""
-
-
-@pytest.mark.slow
-def test_a_model_simulates_to_the_same_bits_in_another_process() -> None:
-    model = FourBar(BrownMcPhee()).model()
-    there = subprocess.run(
-        [sys.executable, "-c", ELSEWHERE],
-        input=pickle.dumps(model),
-        capture_output=True,
-        check=True,
-    )
-    other, signals = pickle.loads(there.stdout)
-    here = simulate(model, 0.2, samples=51)
-    for name, values in here.signals.items():
-        np.testing.assert_array_equal(signals[name], values)
-    np.testing.assert_array_equal(other.step_times, here.step_times)
-
-
-def test_an_ensemble_is_pickled() -> None:
-    model = rabinowicz(BrownMcPhee(), free=["m"])
-    one = simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, backend="vm")
-    other = pickle.loads(pickle.dumps(one))
-    assert repr(one) == repr(other)
-    for name in one.units:
-        np.testing.assert_array_equal(one[name], other[name])

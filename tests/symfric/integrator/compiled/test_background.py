@@ -14,7 +14,7 @@ from backends import needs_compiler
 import symfric.integrator.compiled.background as module
 from symfric import rabinowicz, simulate
 from symfric.foundation.programs import find_compiler
-from symfric.integrator.compiled.background import Prospect, make, wait
+from symfric.integrator.compiled.background import Prospect, wait
 from symfric.integrator.compiled.compiler import compiled_before
 from symfric.laws import BrownMcPhee
 
@@ -106,13 +106,14 @@ def prospect(source: str = SOURCE) -> Prospect:
 
 def test_one_compiler_at_a_time(calls: Path, folder: Path) -> None:
     sources = [SOURCE + f"/* {k} */\n" for k in range(3)]
-    makings = [make(source, "twice") for source in sources]
+    every = [prospect(source) for source in sources]
+    assert not any(one.pays(1.0) for one in every)
     started(calls)
     assert count(calls) == 1
-    assert not any(making.done for making in makings)
+    assert not any(one.pays(1.0) for one in every)
     go(calls)
     assert count(calls) == 3
-    assert all(making.done and not making.failed for making in makings)
+    assert all(one.pays(1.0) for one in every)
     assert all(compiled_before(source) is not None for source in sources)
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
 
@@ -150,20 +151,11 @@ def test_failures_are_silent(monkeypatch: pytest.MonkeyPatch, folder: Path) -> N
         assert not list(folder.iterdir())
 
 
-def test_a_compiler_that_hangs_is_stopped(calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("symfric.foundation.programs.PATIENCE", 0.0)
-    monkeypatch.setattr("symfric.foundation.programs.PER_BYTE", 0.0)
-    making = make(SOURCE, "twice")
-    started(calls)
-    wait()
-    assert making.failed
-
-
 ENDING = """
 import os, sys
 import symfric.integrator.compiled.background as b
 b.processors = lambda: 2
-b.make("double twice(double x) {{ return 2 * x; }}", "twice")
+b.Prospect(lambda: "double twice(double x) {{ return 2 * x; }}", ("twice",), 100).pays(1.0)
 while not os.path.getsize({calls!r}): pass
 {end}
 """

@@ -18,7 +18,6 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.scenes import SliderCrank
-from symfric.scenes.catalogue import ALL_SCENES
 
 MODELS: dict[str, Callable[[], Model]] = {
     "brown_mcphee": lambda: rabinowicz(BrownMcPhee()),
@@ -78,15 +77,6 @@ def test_a_kernel_becomes_ptx_without_a_warning(name: str, real: str) -> None:
         assert not log.strip("\0\n ")
         doubles = len(re.findall(r"\b(?:add|mul|fma|div|sqrt)\S*\.f64", text))
         assert (doubles > 100) == (real == "double")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("real", REALS)
-@pytest.mark.parametrize("name", ALL_SCENES)
-def test_all_scenes_become_ptx(name: str, real: str) -> None:
-    """The arm takes a minute."""
-    scene = ALL_SCENES[name](LuGre()).model()
-    assert f".visible .entry {NAME}(" in build(code(name, True, real, scene))[0]
 
 
 def test_no_product_goes_unrounded_into_a_sum() -> None:

@@ -1,4 +1,4 @@
-"""Plants side by side in vector lanes: each as alone, whoever is beside it."""
+"""Plants in vector lanes: each is equal to the same plant alone."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_each_goes_as_alone_and_in_any_order(model: Model) -> None:
 
 
 def test_unknowns_that_are_far_are_searched_for_and_failures_disturb_nobody() -> None:
-    """From rest to a force of 1e3 N no round leads; z^2 = u has nothing for u = -1."""
+    """No fast update reaches a force of 1e3 N from rest; z^2 = u has no root for u = -1."""
     plant = batch(followed(), 0.1)
     forces = np.zeros((MEMBERS, 1))
     forces[4] = 1e3

@@ -2,11 +2,8 @@
 
 import gc
 import pickle
-import subprocess
-import sys
 import weakref
 from dataclasses import fields, is_dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -17,7 +14,7 @@ from differentiable import oscillator, switched
 import symfric.integrator.compiled.compiler as compiler
 import symfric.integrator.many.program as module
 import symfric.integrator.running.integrator as built
-from symfric import BrownMcPhee, Hold, Model, rabinowicz, simulate, simulate_many
+from symfric import Hold, Model, simulate, simulate_many
 from symfric.foundation.programs import Compiler
 from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.many.chunk import Chunk, Job, digest
@@ -39,24 +36,6 @@ def task(
     times = np.array([0.0, 0.5, 1.0])
     job = Job(program(integrator, backend == "compiled"), inputs.breaks, times, 10_000)
     return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)), inputs.values[None], np.full(2, 1.0))
-
-
-@pytest.mark.parametrize("backend", ["vm", "compiled"])
-def test_a_task_is_solved_by_a_process_that_has_nothing_else(backend: str, tmp_path: Path) -> None:
-    job, chunk = task(rabinowicz(BrownMcPhee()), [0.0, 0.02], backend)
-    here = job.solve(chunk)
-    (tmp_path / "task").write_bytes(pickle.dumps((job, chunk)))
-    code = (
-        "import pickle; job, chunk = pickle.load(open('task', 'rb'));"
-        "pickle.dump(job.solve(chunk), open('result', 'wb'))"
-    )
-    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
-    there = pickle.loads((tmp_path / "result").read_bytes())
-    np.testing.assert_array_equal(there.signals, here.signals)
-    np.testing.assert_array_equal(there.attempts, here.attempts)
-    given = {"x0": {"v": 0.02}, "t_eval": [0.0, 0.5, 1.0], "backend": backend}
-    alone = simulate(rabinowicz(BrownMcPhee()), 1.0, **given)
-    assert here.signals[1, :, 0] == pytest.approx(alone["x"], rel=1e-9)
 
 
 @pytest.mark.parametrize("backend", ["vm", "compiled"])

@@ -1,4 +1,4 @@
-"""Members side by side: the functions of lanes.h, and that nobody's bits depend on a neighbour."""
+"""Members in vector lanes: the functions of lanes.h, and independence of the neighbouring lanes."""
 
 import ctypes
 from collections.abc import Callable
@@ -47,7 +47,7 @@ ARITHMETIC: dict[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
     "floor": lambda x, y: ca.floor(x), "erf": lambda x, y: ca.erf(x), "constant": lambda x, y: 0.1,
     "sinh": lambda x, y: ca.sinh(x), "fmod": ca.fmod, "sign of": ca.copysign,
 }  # fmt: skip
-"""What has the bits of CasADi's virtual machine."""
+"""Operations that are equal to those of CasADi's virtual machine to the bit."""
 
 UNITS: dict[str, tuple[Callable[..., ca.SX], Callable[..., np.ndarray], float]] = {
     "exp": (ca.exp, np.exp, 1.0), "expm1": (ca.expm1, np.expm1, 2.0), "log": (ca.log, np.log, 1.0),
@@ -108,7 +108,7 @@ def units(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
 
 
 def test_arithmetic_has_the_bits_of_the_virtual_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cut into parts that hand on what they have computed."""
+    """Cut into parts, which pass on their results."""
     x, y = numbers()
     function = together(*ARITHMETIC.values())
     exact = function.map(x.size)(x[None], y[None]).full()
@@ -143,7 +143,7 @@ def test_functions_are_right_in_all_but_the_last_digits() -> None:
         assert units(angle, np.arctan2(x.astype(np.longdouble), y.astype(np.longdouble))).max() < 3
 
 
-def test_what_c_does_not_know_is_refused() -> None:
+def test_an_operation_that_c_lacks_is_refused() -> None:
     with pytest.raises(ValueError, match="expected operations that C has, got CasADi operation"):
         vector_source("f", together(lambda x, y: ca.erfinv(x)))
 
@@ -161,7 +161,7 @@ def test_bits_of_functions_do_not_depend_on_the_number_of_lanes(lanes: int) -> N
 
 @cache
 def made(model: Callable[[], Model], end: float, lanes: int) -> tuple:
-    """What runs members of a model."""
+    """Return a model, its inputs and the runner of its members."""
     whole = model()
     inputs = input_data(whole, None, 0.0, end)
     integrator = Integrator(whole, inputs, RODAS5P)
@@ -172,7 +172,7 @@ def made(model: Callable[[], Model], end: float, lanes: int) -> tuple:
 def run(
     make: Callable[[], Model], starts: np.ndarray, p: np.ndarray, ends: np.ndarray, lanes: int
 ) -> tuple:
-    """Members over [0, ends]: all that comes out."""
+    """Return all results of members over [0, ends]."""
     model, inputs, members = made(make, 3.0, lanes)
     S = State.at(0.0, 1e-8, starts)
     d = np.hstack([p, np.tile(inputs.values[:, 0], (starts.shape[0], 1))])
